@@ -1,0 +1,1 @@
+"""Case files, batches, pictures and the command line."""

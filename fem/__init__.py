@@ -1,0 +1,1 @@
+"""Light diffusing in tetrahedra."""

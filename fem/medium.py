@@ -1,0 +1,142 @@
+"""A scattering medium: its coefficients, and the diffusion coefficients that follow from them."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from tetlux.fem.fresnel import boundary_factor_classic, boundary_factor_exact
+from tetlux.meshing.errors import InputError
+
+Boundary = Literal["exact", "classic"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Medium:
+    """A homogeneous scattering medium.
+
+    Scattering is given either as `sigma_s_prime`, or as `sigma_s` together with `g`.
+
+    Parameters
+    ----------
+    sigma_a : float
+        Absorption coefficient, 1/unit.
+    eta : float
+        Refractive index relative to the outside.
+    sigma_s_prime : float, optional
+        Reduced scattering coefficient ``(1 - g) sigma_s``, 1/unit.
+    sigma_s : float, optional
+        Scattering coefficient, 1/unit.
+    g : float, optional
+        Mean cosine of the scattering angle (CS667 notes, definition 1.9 iv), between -1 and 1.
+    boundary : {"exact", "classic"}
+        How internal reflection enters the boundary factor A: by the Fresnel moments, or by the fit
+        that the published dipole uses.
+
+    Raises
+    ------
+    InputError
+        If a coefficient is negative, not finite, missing or given twice.
+    """
+
+    sigma_a: float
+    eta: float
+    sigma_s_prime: float | None = None
+    sigma_s: float | None = None
+    g: float | None = None
+    boundary: Boundary = "exact"
+
+    def __post_init__(self) -> None:
+        for name in ("sigma_a", "eta", "sigma_s_prime", "sigma_s", "g"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise InputError(f"{name} is {value}; give a finite number.")
+        for name in ("sigma_a", "sigma_s_prime", "sigma_s"):
+            value = getattr(self, name)
+            if value is not None and value < 0:
+                raise InputError(f"{name} is {value:g}; a coefficient cannot be negative.")
+        if self.eta <= 0:
+            raise InputError(f"eta is {self.eta:g}; a refractive index is greater than 0.")
+        if self.boundary not in ("exact", "classic"):
+            raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".')
+        self._check_scattering()
+        if self.sigma_t_prime <= 0:
+            raise InputError(
+                "the medium neither scatters nor absorbs, and light does not diffuse through a void; "
+                "give a scattering coefficient greater than 0."
+            )
+        if self.boundary == "classic":
+            boundary_factor_classic(self.eta)
+
+    def _check_scattering(self) -> None:
+        if self.sigma_s_prime is not None and (self.sigma_s is not None or self.g is not None):
+            other = "sigma_s" if self.sigma_s is not None else "g"
+            raise InputError(
+                f"{other} is given together with sigma_s_prime; give either sigma_s_prime, or sigma_s and g."
+            )
+        if self.sigma_s_prime is None:
+            if self.sigma_s is None:
+                raise InputError("scattering is missing; give either sigma_s_prime, or sigma_s and g.")
+            if self.g is None:
+                raise InputError("g is missing; sigma_s needs it (0 for isotropic scattering).")
+            if not -1 < self.g < 1:
+                raise InputError(f"g is {self.g:g}; it must be greater than -1 and less than 1.")
+
+    @cached_property
+    def reduced_scattering(self) -> float:
+        """sigma_s' = (1 - g) sigma_s, 1/unit."""
+        if self.sigma_s_prime is not None:
+            return self.sigma_s_prime
+        assert self.sigma_s is not None
+        assert self.g is not None
+        return (1.0 - self.g) * self.sigma_s
+
+    @property
+    def sigma_t_prime(self) -> float:
+        """sigma_t' = sigma_a + sigma_s', the reduced transport coefficient (CS667 notes, eq. 8), 1/unit."""
+        return self.sigma_a + self.reduced_scattering
+
+    @property
+    def mean_free_path(self) -> float:
+        """Transport mean free path 1/sigma_t', unit."""
+        return 1.0 / self.sigma_t_prime
+
+    @property
+    def albedo(self) -> float:
+        """Reduced albedo alpha' = sigma_s'/sigma_t'."""
+        return self.reduced_scattering / self.sigma_t_prime
+
+    @property
+    def diffusion(self) -> float:
+        """Diffusion coefficient D = 1/(3 sigma_t') (CS667 notes, eq. 9), unit."""
+        return 1.0 / (3.0 * self.sigma_t_prime)
+
+    @property
+    def sigma_tr(self) -> float:
+        """Effective transport coefficient sqrt(sigma_a/D), 1/unit."""
+        return math.sqrt(self.sigma_a / self.diffusion)
+
+    @cached_property
+    def boundary_factor(self) -> float:
+        """A of the boundary condition ``E.n = phi/(2A)``."""
+        if self.boundary == "classic":
+            return boundary_factor_classic(self.eta)
+        return boundary_factor_exact(self.eta)
+
+    @property
+    def extrapolation_length(self) -> float:
+        """zb = 2 A D, the depth outside at which the fluence extrapolates to zero, unit."""
+        return 2.0 * self.boundary_factor * self.diffusion
+
+    @property
+    def delta_eddington(self) -> tuple[float, float]:
+        """Scattering coefficient and mean cosine with the forward peak taken out (Joseph 1976).
+
+        ``sigma_s* = sigma_s (1 - g²)`` and ``g* = g/(1 + g)``; a medium given by sigma_s' alone counts
+        as isotropic. For g < 0 there is no forward peak, and both stay as they are.
+        """
+        if self.sigma_s is None or self.g is None:
+            return self.reduced_scattering, 0.0
+        if self.g < 0:
+            return self.sigma_s, self.g
+        return self.sigma_s * (1.0 - self.g**2), self.g / (1.0 + self.g)

@@ -1,0 +1,27 @@
+"""Shapes and lengths: surfaces, tetrahedra, and nothing about light."""
+
+from tetlux.meshing.errors import InputError, RunError, TetluxError
+from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.read import read_surface
+from tetlux.meshing.refine import refine
+from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+__all__ = [
+    "InputError",
+    "RunError",
+    "Surface",
+    "TetMesh",
+    "TetluxError",
+    "box",
+    "cylinder",
+    "read_surface",
+    "refine",
+    "slab",
+    "sphere",
+    "surface_from_arrays",
+    "tetrahedralize",
+    "torus",
+]

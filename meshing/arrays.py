@@ -1,0 +1,9 @@
+"""The array types that all signatures share."""
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+Vector = tuple[float, float, float]

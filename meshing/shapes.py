@@ -1,0 +1,160 @@
+"""Built-in shapes: sphere, box, slab, cylinder, torus."""
+
+import math
+
+import numpy as np
+
+from tetlux.meshing.arrays import IntArray, Vector
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.surface import Surface
+
+
+def _positive(**lengths: float) -> None:
+    for name, value in lengths.items():
+        if not math.isfinite(value) or value <= 0:
+            raise InputError(f"{name} is {value:g}; give a length greater than 0.")
+
+
+def sphere(
+    radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm"
+) -> Surface:
+    """A sphere as an icosahedron subdivided `subdivisions` times, its vertices on the sphere.
+
+    Four subdivisions give 5,120 triangles, whose volume is 0.3 % small.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, or `subdivisions` not within 1 to 7.
+    """
+    _positive(radius=radius)
+    if not 1 <= subdivisions <= 7:
+        raise InputError(f"subdivisions is {subdivisions}; give 1 to 7.")
+    import trimesh  # noqa: PLC0415
+
+    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    return surface_from_arrays(mesh.vertices + np.asarray(center), mesh.faces, unit=unit, name="sphere")
+
+
+def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> Surface:
+    """A box with edges along the axes.
+
+    Parameters
+    ----------
+    size : (3,) floats
+        Edge lengths along x, y and z.
+    center : (3,) floats
+    unit : str
+
+    Raises
+    ------
+    InputError
+        If a length is not positive.
+    """
+    for axis, length in zip("xyz", size, strict=True):
+        _positive(**{f"size along {axis}": length})
+    import trimesh  # noqa: PLC0415
+
+    mesh = trimesh.creation.box(extents=size)
+    return surface_from_arrays(mesh.vertices + np.asarray(center), mesh.faces, unit=unit, name="box")
+
+
+def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
+    """A square plate of `width` x `width` whose upper face is z = 0 and whose lower face is z = -depth.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive.
+    """
+    _positive(width=width, depth=depth)
+    plate = box((width, width, depth), center=(0.0, 0.0, -0.5 * depth), unit=unit)
+    return Surface(plate.points, plate.faces, unit, "slab")
+
+
+def cylinder(
+    radius: float, height: float, *, center: Vector = (0.0, 0.0, 0.0), segments: int = 64, unit: str = "mm"
+) -> Surface:
+    """A cylinder along z with flat ends.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, or `segments` is below 8.
+    """
+    _positive(radius=radius, height=height)
+    if segments < 8:
+        raise InputError(f"segments is {segments}; give 8 or more.")
+    angle = 2.0 * np.pi * np.arange(segments) / segments
+    ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    # Rows about as tall as a segment is wide: fTetWild is slow on needles.
+    rows = max(1, round(height / (2.0 * np.pi * radius / segments)))
+    levels = np.linspace(-0.5 * height, 0.5 * height, rows + 1)
+    points = np.vstack(
+        [np.column_stack([ring, np.full(segments, z)]) for z in levels]
+        + [np.array([[0.0, 0.0, levels[0]], [0.0, 0.0, levels[-1]]])]
+    )
+    faces = [_grid_faces(rows, segments, closed_rows=False)]
+    here = np.arange(segments)
+    following = (here + 1) % segments
+    bottom, top = len(points) - 2, len(points) - 1
+    last = rows * segments
+    faces.append(np.column_stack([following, here, np.full(segments, bottom)]))
+    faces.append(np.column_stack([here + last, following + last, np.full(segments, top)]))
+    return surface_from_arrays(points + np.asarray(center), np.vstack(faces), unit=unit, name="cylinder")
+
+
+def torus(
+    major: float, minor: float, *, center: Vector = (0.0, 0.0, 0.0), segments: int = 96, unit: str = "mm"
+) -> Surface:
+    """A torus round the z axis.
+
+    Parameters
+    ----------
+    major : float
+        Distance from the axis to the middle of the tube.
+    minor : float
+        Radius of the tube, less than `major`.
+    center : (3,) floats
+    segments : int
+        Triangles' columns along the ring; as many rows round the tube as make them nearly square.
+    unit : str
+
+    Raises
+    ------
+    InputError
+        If a length is not positive, the tube is wider than the ring, or `segments` is below 12.
+    """
+    _positive(major=major, minor=minor)
+    if minor >= major:
+        raise InputError(
+            f"minor is {minor:g} and major {major:g}; the tube's radius must be the smaller one."
+        )
+    if segments < 12:
+        raise InputError(f"segments is {segments}; give 12 or more.")
+    rows = max(12, round(segments * minor / major))
+    u = 2.0 * np.pi * np.arange(segments) / segments
+    v = 2.0 * np.pi * np.arange(rows) / rows
+    uu, vv = np.meshgrid(u, v, indexing="xy")
+    distance = major + minor * np.cos(vv)
+    points = np.column_stack(
+        [(distance * np.cos(uu)).ravel(), (distance * np.sin(uu)).ravel(), (minor * np.sin(vv)).ravel()]
+    )
+    faces = _grid_faces(rows, segments, closed_rows=True)
+    return surface_from_arrays(points + np.asarray(center), faces, unit=unit, name="torus")
+
+
+def _grid_faces(rows: int, columns: int, *, closed_rows: bool) -> IntArray:
+    """Two triangles a cell of a grid whose columns close on themselves, and whose rows may."""
+    i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    up = (i + 1) % rows if closed_rows else i + 1
+    right = (j + 1) % columns
+    a, b = i * columns + j, i * columns + right
+    c, d = up * columns + right, up * columns + j
+    return np.vstack(
+        [
+            np.column_stack([a.ravel(), b.ravel(), c.ravel()]),
+            np.column_stack([a.ravel(), c.ravel(), d.ravel()]),
+        ]
+    ).astype(np.int64)

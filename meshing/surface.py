@@ -1,0 +1,106 @@
+"""`Surface`: the closed triangle mesh that bounds a body."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
+
+UNITS = ("nm", "um", "mm", "cm", "m", "in")
+
+
+def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (m, 3) and areas (m,) of triangles; the normal of a degenerate one is zero."""
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A closed, outward oriented triangle mesh.
+
+    Made by `read_surface`, by a built-in shape, or from arrays by `surface_from_arrays`; these check it.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        Vertices, in `unit`.
+    faces : (m, 3) ndarray
+        Corners of the triangles, anticlockwise seen from outside.
+    unit : str
+        The unit of length; coefficients are in 1/unit.
+    name : str
+    repairs, warnings : tuple of str
+        What was mended when it was read, and what was left that a user should know.
+    """
+
+    points: FloatArray
+    faces: IntArray
+    unit: str = "mm"
+    name: str = "surface"
+    repairs: tuple[str, ...] = field(default=())
+    warnings: tuple[str, ...] = field(default=())
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Outward unit normals of the faces, (m, 3)."""
+        return triangle_areas(self.points, self.faces)[0]
+
+    @cached_property
+    def area(self) -> float:
+        """Area, unit²."""
+        return float(triangle_areas(self.points, self.faces)[1].sum())
+
+    @cached_property
+    def volume(self) -> float:
+        """Enclosed volume, unit³."""
+        return signed_volume(self.points, self.faces)
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Diagonal of the bounding box, unit."""
+        return float(np.linalg.norm(np.ptp(self.points, axis=0)))
+
+    @cached_property
+    def _closest(self) -> ClosestPoint:
+        return ClosestPoint(self.points, self.faces)
+
+    def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Nearest points of the surface (q, 3) and the faces they lie on (q,), for queries (q, 3)."""
+        return self._closest(queries)
+
+    def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+        """Whether each of the queries (q, 3) lies inside."""
+        return np.asarray(winding_number(self.points, self.faces, queries) > 0.5)
+
+    def crossings(self, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Where a ray meets the surface.
+
+        Returns
+        -------
+        distances : (k,) ndarray
+            Along the unit vector `direction`, ascending, all positive.
+        faces : (k,) ndarray
+        """
+        count = len(self.faces)
+        distances, _ = cross_segments(
+            np.broadcast_to(origin, (count, 3)),
+            np.broadcast_to(direction, (count, 3)),
+            self.points[self.faces],
+            # A ray through an edge must not slip between two triangles.
+            slack=1e-10,
+        )
+        faces = np.flatnonzero(distances > 1e-9 * self.diagonal)
+        order = np.argsort(distances[faces], kind="stable")
+        return distances[faces[order]], faces[order]
+
+
+def signed_volume(points: FloatArray, faces: IntArray) -> float:
+    """Volume enclosed by outward oriented triangles (divergence theorem), negative if they face inward."""
+    origin = points.mean(axis=0)
+    a, b, c = (points[faces[:, i]] - origin for i in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
