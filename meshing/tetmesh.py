@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint
-from tetlux.meshing.surface import triangle_areas
+from tetlux.meshing.surface import Surface, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -91,6 +91,11 @@ class TetMesh:
     def boundary_points(self) -> FloatArray:
         """Coordinates of the boundary nodes, (b, 3)."""
         return self.points[self.boundary_nodes]
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The boundary as a surface of its own."""
+        return Surface(self.boundary_points, self.boundary_triangles, self.unit, "mesh")
 
     @cached_property
     def boundary_areas(self) -> FloatArray:

@@ -1,0 +1,97 @@
+"""How fine a mesh has to be, and where: edges in proportion to the distance from the light."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.refine import refine
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+# Fluence falls by 1/r near a source and by exp(-sigma_tr r) far from it: its own length is the shorter of
+# r and this many decay lengths, and equal edges in that measure make equal relative errors.
+DECAY_LENGTHS = 1.5
+# Where a body is hundreds of decay lengths across, its far side is dark, and stays this coarse.
+COARSEST_SHARE = 1 / 24
+# A line is as good as points this many resolutions apart.
+SPACING = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Grading:
+    """Wanted edge lengths round a set of deposits.
+
+    Parameters
+    ----------
+    sources : (s, 3) ndarray
+        Where light is deposited, lines as rows of points.
+    resolution : (s,) ndarray
+        Length that has to be resolved at each, unit.
+    longest : float
+        Upper bound of the length that edges are measured in, unit.
+    """
+
+    sources: FloatArray
+    resolution: FloatArray
+    longest: float
+
+    def lengths(self, mesh: TetMesh) -> FloatArray:
+        """The length that light changes over in each tetrahedron, (m,), unit."""
+        centroids = mesh.points[mesh.tetrahedra].mean(axis=1)
+        distance, nearest = cKDTree(self.sources).query(centroids)
+        return np.clip(distance, self.resolution[nearest], max(self.longest, float(self.resolution.min())))
+
+
+def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Grading:
+    """The grading that the lights and the medium of a scene ask for."""
+    sources, resolutions = [], []
+    extinction = medium.sigma_a + medium.delta_eddington[0]
+    for deposit in deposits:
+        points = [deposit.points]
+        for start, direction, length in zip(
+            deposit.starts, deposit.directions, deposit.lengths, strict=True
+        ):
+            # After seven extinction lengths a beam holds a thousandth.
+            reach = min(float(length), 7.0 / extinction)
+            count = max(2, int(reach / (SPACING * deposit.resolution)) + 1)
+            points.append(start + np.linspace(0.0, reach, count)[:, None] * direction)
+        found = np.vstack(points)
+        sources.append(found)
+        resolutions.append(np.full(len(found), deposit.resolution))
+    decay = DECAY_LENGTHS / medium.sigma_tr if medium.sigma_tr > 0 else np.inf
+    longest = max(decay, COARSEST_SHARE * surface.diagonal)
+    return Grading(np.vstack(sources), np.concatenate(resolutions), longest)
+
+
+def graded(
+    mesh: TetMesh, surface: Surface, grading: Grading, fineness: float, most: int
+) -> tuple[TetMesh, bool]:
+    """Refine until no edge is longer than `fineness` times the grading's length there.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    surface : Surface
+        New boundary nodes are moved onto it.
+    grading : Grading
+    fineness : float
+    most : int
+        Tetrahedra at which refinement stops.
+
+    Returns
+    -------
+    mesh : TetMesh
+    reached : bool
+        False if `most` stopped it.
+    """
+    while True:
+        marked = mesh.longest_edges > fineness * grading.lengths(mesh)
+        if not marked.any():
+            return mesh, True
+        if len(mesh.tetrahedra) + int(marked.sum()) > most:
+            return mesh, False
+        mesh = refine(mesh, marked, surface)

@@ -1,0 +1,73 @@
+"""An isotropic point source inside the body."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface import Surface
+
+
+def as_vector(value: Vector, name: str) -> FloatArray:
+    """Three finite coordinates as an array, or an InputError that names them."""
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise InputError(f"{name} is {value}; give three finite coordinates.")
+    return vector
+
+
+def check_power(power: float) -> None:
+    """Refuse a power that is not a positive number."""
+    if not math.isfinite(power) or power <= 0:
+        raise InputError(f"power is {power:g}; give a number of watts greater than 0.")
+
+
+@dataclass(frozen=True)
+class PointSource:
+    """An isotropic point: ``Q0 = power delta(x - position)``, ``Q1 = 0`` (CS667 notes, eqs. 4 and 7).
+
+    Parameters
+    ----------
+    position : (3,) floats
+        Inside the body, unit.
+    power : float
+        W.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or the power not positive; and, when solved, if it lies outside.
+    """
+
+    position: Vector
+    power: float = 1.0
+
+    def __post_init__(self) -> None:
+        as_vector(self.position, "position")
+        check_power(self.power)
+
+    def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
+        """All of its power at one point."""
+        position = as_vector(self.position, "position")
+        if not surface.contains(position[None])[0]:
+            raise InputError(
+                f"the point source at {_text(position)} lies outside the body, which spans "
+                f"{_text(surface.points.min(axis=0))} to {_text(surface.points.max(axis=0))} {surface.unit}; "
+                "move it inside."
+            )
+        nearest, _ = surface.closest(position[None])
+        depth = float(np.linalg.norm(nearest[0] - position))
+        return Deposit(
+            incident=self.power,
+            points=position[None],
+            powers=np.array([self.power]),
+            resolution=max(depth, 0.1 * medium.mean_free_path),
+        )
+
+
+def _text(vector: FloatArray) -> str:
+    return "(" + ", ".join(f"{x:.4g}" for x in vector) + ")"

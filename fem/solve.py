@@ -1,0 +1,176 @@
+"""From a body, a medium and lights to a `Solution`: mesh, assemble, solve, estimate, refine."""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from tetlux.fem.forms import Mass, node_volumes, system_matrix
+from tetlux.fem.grading import graded, grading_for
+from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.linear import MultigridSolver
+from tetlux.fem.loads import load_vector
+from tetlux.fem.medium import Medium
+from tetlux.fem.solution import Power, Solution
+from tetlux.fem.validity import check_size, warnings_for
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+# Edges in units of the grading's length, on the first mesh.
+FIRST_FINENESS = 0.7
+# From mesh to mesh the fineness changes by no more and no less than these factors.
+STEP_LIMITS = (0.55, 0.8)
+MOST_TETRAHEDRA = 1_500_000
+
+
+@dataclass
+class Stopwatch:
+    """Seconds by stage."""
+
+    seconds: dict[str, float] = field(
+        default_factory=lambda: dict.fromkeys(("surface", "mesh", "assemble", "solve", "total"), 0.0)
+    )
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add the time of the block to a stage."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[name] += time.perf_counter() - start
+
+
+def solve(
+    body: Surface | TetMesh,
+    medium: Medium,
+    lights: Sequence[Light],
+    *,
+    tolerance: float = 0.02,
+    mesh: TetMesh | None = None,
+    mass: Mass = "lumped",
+    most_tetrahedra: int = MOST_TETRAHEDRA,
+) -> Solution:
+    """Solve for the light in a body.
+
+    A `Surface` is tetrahedralized and refined towards the lights until the estimated error of the exitance
+    is within the tolerance; a `TetMesh` is used as it is.
+
+    Parameters
+    ----------
+    body : Surface or TetMesh
+    medium : Medium
+    lights : sequence of Light
+        At least one; they add up.
+    tolerance : float
+        Wanted relative L2 error of the exitance over the surface.
+    mesh : TetMesh, optional
+        Use this mesh of the body as it is.
+    mass : {"lumped", "consistent"}
+        Integration of the terms without derivatives, see `tetlux.fem.forms.system_matrix`.
+    most_tetrahedra : int
+        Where refinement stops even if the tolerance is not met; the solution then carries a warning.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    InputError
+        If the tolerance, the body's size or a light is not sensible: see each light.
+    RunError
+        If the mesher or the linear solver fails.
+
+    Notes
+    -----
+    The estimate compares two meshes: exitance converges at second order in the mesh's fineness c, so that
+    ``e_fine = |M_fine - M_coarse| r/(1 - r)`` with ``r = (c_fine/c_coarse)²``. It knows the error of the mesh,
+    not that of the diffusion approximation.
+    """
+    if not 1e-4 <= tolerance < 1:
+        raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
+    if isinstance(body, TetMesh):
+        mesh = body
+    watch = Stopwatch()
+    started = time.perf_counter()
+    with watch.stage("surface"):
+        surface = body.surface if isinstance(body, TetMesh) else body
+        check_size(surface, medium)
+        deposits = [light.deposit_in(surface, medium) for light in lights]
+    warnings = list(surface.warnings) + warnings_for(surface, medium)
+    warnings += [w for d in deposits for w in d.warnings]
+    if mesh is not None:
+        solution = _solve_on(mesh, medium, deposits, mass, watch)
+    else:
+        solution = _refined_solution(surface, medium, deposits, tolerance, mass, most_tetrahedra, watch)
+        if not solution.error_estimate <= tolerance:
+            warnings.append(
+                f"the tolerance of {tolerance:g} was not met: the estimated error is "
+                f"{solution.error_estimate:.2g} at the limit of {most_tetrahedra:,} tetrahedra."
+            )
+    watch.seconds["total"] = time.perf_counter() - started
+    return replace(solution, seconds=dict(watch.seconds), warnings=list(dict.fromkeys(warnings)))
+
+
+def _refined_solution(
+    surface: Surface,
+    medium: Medium,
+    deposits: list[Deposit],
+    tolerance: float,
+    mass: Mass,
+    most: int,
+    watch: Stopwatch,
+) -> Solution:
+    grading = grading_for(deposits, medium, surface)
+    fineness = FIRST_FINENESS
+    with watch.stage("mesh"):
+        mesh = tetrahedralize(surface)
+        mesh, reached = graded(mesh, surface, grading, fineness, most)
+    solution = _solve_on(mesh, medium, deposits, mass, watch)
+    factor = STEP_LIMITS[0]
+    while reached:
+        with watch.stage("mesh"):
+            mesh, reached = graded(mesh, surface, grading, fineness * factor, most)
+        if len(mesh.tetrahedra) == len(solution.mesh.tetrahedra):
+            break
+        finer = _solve_on(mesh, medium, deposits, mass, watch)
+        estimate = difference(finer, solution) * factor**2 / (1.0 - factor**2)
+        solution = replace(finer, error_estimate=estimate)
+        if estimate <= tolerance:
+            break
+        fineness *= factor
+        factor = float(np.clip(0.95 * np.sqrt(tolerance / estimate), *STEP_LIMITS))
+    return solution
+
+
+def difference(fine: Solution, coarse: Solution) -> float:
+    """Relative L2 difference of two exitances over the surface of the finer one's mesh."""
+    weights = fine.mesh.boundary_node_areas
+    gap = fine.exitance - coarse.exitance_at(fine.mesh.boundary_points)
+    return float(np.sqrt((weights @ gap**2) / (weights @ fine.exitance**2)))
+
+
+def _solve_on(
+    mesh: TetMesh, medium: Medium, deposits: list[Deposit], mass: Mass, watch: Stopwatch
+) -> Solution:
+    with watch.stage("assemble"):
+        matrix = system_matrix(mesh, medium, mass)
+        load = np.sum([load_vector(mesh, medium, d) for d in deposits], axis=0)
+    with watch.stage("solve"):
+        fluence = MultigridSolver(matrix).solve(load)
+    outflow = mesh.boundary_node_areas @ fluence[mesh.boundary_nodes] / (2.0 * medium.boundary_factor)
+    power = Power(
+        incident=sum(d.incident for d in deposits),
+        specular=sum(d.specular for d in deposits),
+        absorbed=sum(d.absorbed for d in deposits) + medium.sigma_a * float(node_volumes(mesh) @ fluence),
+        exited=float(outflow),
+        ballistic=sum(d.ballistic for d in deposits),
+    )
+    return Solution(mesh, medium, fluence, power)

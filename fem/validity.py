@@ -1,0 +1,51 @@
+"""Is diffusion a fair model here? What a user should read before the picture."""
+
+from tetlux.fem.medium import Medium
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface import Surface
+
+# Bodies of fewer or more mean free paths than these are a mistaken unit, not a scene.
+SMALLEST_BODY = 0.5
+LARGEST_BODY = 2e4
+LOW_ALBEDO = 0.9
+THIN = 4.0
+
+
+def check_size(surface: Surface, medium: Medium) -> None:
+    """Refuse a body that cannot be of the unit its coefficients are in.
+
+    Raises
+    ------
+    InputError
+        If the body's bounding box is under 0.5 or over 20,000 mean free paths across.
+    """
+    across = surface.diagonal / medium.mean_free_path
+    if SMALLEST_BODY <= across <= LARGEST_BODY:
+        return
+    size = "small" if across < SMALLEST_BODY else "large"
+    raise InputError(
+        f"{surface.name} is {surface.diagonal:.3g} {surface.unit} across, which is {across:.2g} mean free paths "
+        f"of {medium.mean_free_path:.3g} {surface.unit}: absurdly {size} for diffusion; check the unit, the scale "
+        f"of the surface, and that coefficients are in 1/{surface.unit}."
+    )
+
+
+def warnings_for(surface: Surface, medium: Medium) -> list[str]:
+    """Plain sentences on where the diffusion approximation itself is off, with figures.
+
+    The figures are radiative transfer against diffusion: a half-space under a wide beam, by reduced albedo.
+    """
+    found = []
+    if medium.albedo < LOW_ALBEDO:
+        found.append(
+            f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for: expect "
+            "reflectances too high by 3 % at 0.9 and 7 % at 0.5, and more close to the light."
+        )
+    # The mean chord of a body is 4 V/S (Cauchy).
+    thickness = 4.0 * surface.volume / surface.area / medium.mean_free_path
+    if thickness < THIN:
+        found.append(
+            f"the body is {thickness:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: "
+            "transmitted light in particular will be off by tens of per cent."
+        )
+    return found
