@@ -52,9 +52,7 @@ def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Gr
     extinction = medium.sigma_a + medium.delta_eddington[0]
     for deposit in deposits:
         points = [deposit.points]
-        for start, direction, length in zip(
-            deposit.starts, deposit.directions, deposit.lengths, strict=True
-        ):
+        for start, direction, length in zip(deposit.starts, deposit.directions, deposit.lengths, strict=True):
             # After seven extinction lengths a beam holds a thousandth.
             reach = min(float(length), 7.0 / extinction)
             count = max(2, int(reach / (SPACING * deposit.resolution)) + 1)
@@ -67,9 +65,7 @@ def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Gr
     return Grading(np.vstack(sources), np.concatenate(resolutions), longest)
 
 
-def graded(
-    mesh: TetMesh, surface: Surface, grading: Grading, fineness: float, most: int
-) -> tuple[TetMesh, bool]:
+def graded(mesh: TetMesh, surface: Surface, grading: Grading, fineness: float, most: int) -> tuple[TetMesh, bool]:
     """Refine until no edge is longer than `fineness` times the grading's length there.
 
     Parameters

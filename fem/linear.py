@@ -61,9 +61,7 @@ class MultigridSolver:
         # The iteration's own residual drifts from the true one; one more round on what is left mends that.
         rest = load / size - self.matrix @ result
         if np.linalg.norm(rest) > AIM:
-            result = result + cg(
-                self.matrix, rest, rtol=0.1, atol=0.0, maxiter=ITERATIONS, M=self._preconditioner
-            )[0]
+            result = result + cg(self.matrix, rest, rtol=0.1, atol=0.0, maxiter=ITERATIONS, M=self._preconditioner)[0]
             rest = load / size - self.matrix @ result
         residual = float(np.linalg.norm(rest))
         if not residual <= REFUSED:

@@ -125,7 +125,7 @@ class Medium:
 
     @property
     def extrapolation_length(self) -> float:
-        """zb = 2 A D, the depth outside at which the fluence extrapolates to zero, unit."""
+        """Zb = 2 A D, the depth outside at which the fluence extrapolates to zero, unit."""
         return 2.0 * self.boundary_factor * self.diffusion
 
     @property

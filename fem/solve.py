@@ -1,7 +1,7 @@
 """From a body, a medium and lights to a `Solution`: mesh, assemble, solve, estimate, refine."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
@@ -23,7 +23,7 @@ from tetlux.meshing.tetmesh import TetMesh
 # Edges in units of the grading's length, on the first mesh.
 FIRST_FINENESS = 0.7
 # From mesh to mesh the fineness changes by no more and no less than these factors.
-STEP_LIMITS = (0.55, 0.8)
+STEP_LIMITS = (0.5, 0.7)
 MOST_TETRAHEDRA = 1_500_000
 
 
@@ -54,6 +54,7 @@ def solve(
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
     most_tetrahedra: int = MOST_TETRAHEDRA,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Solution:
     """Solve for the light in a body.
 
@@ -74,6 +75,8 @@ def solve(
         Integration of the terms without derivatives, see `tetlux.fem.forms.system_matrix`.
     most_tetrahedra : int
         Where refinement stops even if the tolerance is not met; the solution then carries a warning.
+    report : callable
+        Called with a line of text as each stage ends.
 
     Returns
     -------
@@ -104,12 +107,13 @@ def solve(
         surface = body.surface if isinstance(body, TetMesh) else body
         check_size(surface, medium)
         deposits = [light.deposit_in(surface, medium) for light in lights]
+    problem = _Problem(medium, deposits, mass, watch, report)
     warnings = list(surface.warnings) + warnings_for(surface, medium)
     warnings += [w for d in deposits for w in d.warnings]
     if mesh is not None:
-        solution = _solve_on(mesh, medium, deposits, mass, watch)
+        solution = problem.solved_on(mesh)
     else:
-        solution = _refined_solution(surface, medium, deposits, tolerance, mass, most_tetrahedra, watch)
+        solution = _refined_until(problem, surface, tolerance, most_tetrahedra)
         if not solution.error_estimate <= tolerance:
             warnings.append(
                 f"the tolerance of {tolerance:g} was not met: the estimated error is "
@@ -119,30 +123,51 @@ def solve(
     return replace(solution, seconds=dict(watch.seconds), warnings=list(dict.fromkeys(warnings)))
 
 
-def _refined_solution(
-    surface: Surface,
-    medium: Medium,
-    deposits: list[Deposit],
-    tolerance: float,
-    mass: Mass,
-    most: int,
-    watch: Stopwatch,
-) -> Solution:
-    grading = grading_for(deposits, medium, surface)
-    fineness = FIRST_FINENESS
-    with watch.stage("mesh"):
-        mesh = tetrahedralize(surface)
-        mesh, reached = graded(mesh, surface, grading, fineness, most)
-    solution = _solve_on(mesh, medium, deposits, mass, watch)
-    factor = STEP_LIMITS[0]
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """What is solved, on whichever mesh."""
+
+    medium: Medium
+    deposits: list[Deposit]
+    mass: Mass
+    watch: Stopwatch
+    report: Callable[[str], None]
+
+    def solved_on(self, mesh: TetMesh) -> Solution:
+        medium, deposits = self.medium, self.deposits
+        with self.watch.stage("assemble"):
+            matrix = system_matrix(mesh, medium, self.mass)
+            load = np.sum([load_vector(mesh, medium, d) for d in deposits], axis=0)
+        with self.watch.stage("solve"):
+            fluence = MultigridSolver(matrix).solve(load)
+        outflow = mesh.boundary_node_areas @ fluence[mesh.boundary_nodes] / (2.0 * medium.boundary_factor)
+        power = Power(
+            incident=sum(d.incident for d in deposits),
+            specular=sum(d.specular for d in deposits),
+            absorbed=sum(d.absorbed for d in deposits) + medium.sigma_a * float(node_volumes(mesh) @ fluence),
+            exited=float(outflow),
+            ballistic=sum(d.ballistic for d in deposits),
+        )
+        return Solution(mesh, medium, fluence, power)
+
+
+def _refined_until(problem: _Problem, surface: Surface, tolerance: float, most: int) -> Solution:
+    """Refine towards the lights, in steps, until two meshes agree to the tolerance or one is too large."""
+    grading = grading_for(problem.deposits, problem.medium, surface)
+    fineness, factor = FIRST_FINENESS, STEP_LIMITS[0]
+    with problem.watch.stage("mesh"):
+        base = tetrahedralize(surface)
+        problem.report(f"tetrahedralized: {len(base.tetrahedra):,} tetrahedra")
+        mesh, reached = graded(base, surface, grading, fineness, most)
+    solution = problem.solved_on(mesh)
+    problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra")
     while reached:
-        with watch.stage("mesh"):
+        with problem.watch.stage("mesh"):
             mesh, reached = graded(mesh, surface, grading, fineness * factor, most)
-        if len(mesh.tetrahedra) == len(solution.mesh.tetrahedra):
-            break
-        finer = _solve_on(mesh, medium, deposits, mass, watch)
+        finer = problem.solved_on(mesh)
         estimate = difference(finer, solution) * factor**2 / (1.0 - factor**2)
         solution = replace(finer, error_estimate=estimate)
+        problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {estimate:.2%}")
         if estimate <= tolerance:
             break
         fineness *= factor
@@ -155,22 +180,3 @@ def difference(fine: Solution, coarse: Solution) -> float:
     weights = fine.mesh.boundary_node_areas
     gap = fine.exitance - coarse.exitance_at(fine.mesh.boundary_points)
     return float(np.sqrt((weights @ gap**2) / (weights @ fine.exitance**2)))
-
-
-def _solve_on(
-    mesh: TetMesh, medium: Medium, deposits: list[Deposit], mass: Mass, watch: Stopwatch
-) -> Solution:
-    with watch.stage("assemble"):
-        matrix = system_matrix(mesh, medium, mass)
-        load = np.sum([load_vector(mesh, medium, d) for d in deposits], axis=0)
-    with watch.stage("solve"):
-        fluence = MultigridSolver(matrix).solve(load)
-    outflow = mesh.boundary_node_areas @ fluence[mesh.boundary_nodes] / (2.0 * medium.boundary_factor)
-    power = Power(
-        incident=sum(d.incident for d in deposits),
-        specular=sum(d.specular for d in deposits),
-        absorbed=sum(d.absorbed for d in deposits) + medium.sigma_a * float(node_volumes(mesh) @ fluence),
-        exited=float(outflow),
-        ballistic=sum(d.ballistic for d in deposits),
-    )
-    return Solution(mesh, medium, fluence, power)

@@ -57,9 +57,7 @@ def surface_from_arrays(
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     crossing = count_self_intersections(points, faces)
     if crossing:
-        warnings.append(
-            f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken."
-        )
+        warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
     return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings))
 
 
@@ -136,9 +134,7 @@ def _closed(
             "repair it in a mesh editor."
         )
     if (counts > 2).any():
-        warnings.append(
-            f"{int((counts > 2).sum())} edges are shared by more than two triangles (touching parts)."
-        )
+        warnings.append(f"{int((counts > 2).sum())} edges are shared by more than two triangles (touching parts).")
     return points, faces
 
 
@@ -178,9 +174,7 @@ def boundary_loops(faces: IntArray) -> list[IntArray]:
     return loops
 
 
-def _oriented(
-    points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]
-) -> IntArray:
+def _oriented(points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]) -> IntArray:
     """Consistent winding within each body, and every body outward; cavities are refused."""
     edges = _directed_edges(faces)
     # An edge between two triangles of like winding is walked once each way.
@@ -203,8 +197,7 @@ def _oriented(
         )
         if inside and inward:
             raise InputError(
-                f"{name}: there is a cavity inside the body, and cavities are not supported; "
-                "remove the inner surface."
+                f"{name}: there is a cavity inside the body, and cavities are not supported; remove the inner surface."
             )
         if inside:
             warnings.append(f"body {i + 1} of {len(parts)} lies inside another and changes nothing.")

@@ -16,9 +16,7 @@ def _positive(**lengths: float) -> None:
             raise InputError(f"{name} is {value:g}; give a length greater than 0.")
 
 
-def sphere(
-    radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm"
-) -> Surface:
+def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm") -> Surface:
     """A sphere as an icosahedron subdivided `subdivisions` times, its vertices on the sphere.
 
     Four subdivisions give 5,120 triangles, whose volume is 0.3 % small.
@@ -128,9 +126,7 @@ def torus(
     """
     _positive(major=major, minor=minor)
     if minor >= major:
-        raise InputError(
-            f"minor is {minor:g} and major {major:g}; the tube's radius must be the smaller one."
-        )
+        raise InputError(f"minor is {minor:g} and major {major:g}; the tube's radius must be the smaller one.")
     if segments < 12:
         raise InputError(f"segments is {segments}; give 12 or more.")
     rows = max(12, round(segments * minor / major))

@@ -41,9 +41,7 @@ class TetMesh:
     def __post_init__(self) -> None:
         p, t = self.points, self.tetrahedra
         if p.ndim != 2 or p.shape[1] != 3 or t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
-            raise InputError(
-                f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}."
-            )
+            raise InputError(f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}.")
         if t.min() < 0 or t.max() >= len(p):
             raise InputError("a tetrahedron names a node that does not exist.")
         if not np.isfinite(p).all():

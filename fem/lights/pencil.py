@@ -108,9 +108,7 @@ class PencilBeam:
                 entry = origin + distances[0] * direction
                 enter = _Entry.through(entry, direction, surface.normals[faces[0]], medium.eta, share)
                 parts.append(
-                    _as_point(enter, surface, medium)
-                    if self.deposit == "point"
-                    else _as_line(enter, surface, medium)
+                    _as_point(enter, surface, medium) if self.deposit == "point" else _as_line(enter, surface, medium)
                 )
         if not parts:
             raise self._missed(surface)
@@ -137,9 +135,7 @@ class PencilBeam:
 
     def _missed(self, surface: Surface) -> InputError:
         low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-        spans = ", ".join(
-            f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True)
-        )
+        spans = ", ".join(f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True))
         return InputError(
             f"the beam from {tuple(self.origin)} along {tuple(self.direction)} misses the body, which spans "
             f"{spans} {surface.unit}; change its origin or direction."
@@ -160,9 +156,7 @@ class _Entry:
         return self.incident - self.specular
 
     @staticmethod
-    def through(
-        point: FloatArray, direction: FloatArray, normal: FloatArray, eta: float, power: float
-    ) -> "_Entry":
+    def through(point: FloatArray, direction: FloatArray, normal: FloatArray, eta: float, power: float) -> "_Entry":
         """Snell's law and Fresnel's, from outside (index 1) into the medium (index eta)."""
         cosine = max(-float(direction @ normal), 0.0)
         lost = float(reflectance(cosine, 1.0 / eta))

@@ -1,0 +1,84 @@
+"""The command line: ``tetlux run``, ``tetlux check``, ``tetlux schema``."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+from tetlux.meshing.errors import TetluxError
+
+# cases.* is imported where it is used: `tetlux schema` and `--help` need no solver.
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Returns
+    -------
+    int
+        0 if all went well, 1 if some case failed, 2 if the request itself is wrong.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return int(options.command(options))
+    except TetluxError as error:
+        print(f"tetlux: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("tetlux: interrupted; finished cases are kept.", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has had enough of it.
+        sys.stderr.close()
+        return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="tetlux", description="Light diffusing through any shape, by tetrahedral finite elements."
+    )
+    parser.add_argument("--version", action="version", version=f"tetlux {version('tetlux')}")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    run = commands.add_parser("run", help="solve case files and write their results")
+    run.add_argument(
+        "cases",
+        nargs="+",
+        metavar="CASE",
+        help="a YAML case file, or the name of one that ships (sphere, hare, ...)",
+    )
+    run.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: results")
+    run.set_defaults(command=_run)
+
+    check = commands.add_parser("check", help="check case files and the surfaces they name, without solving")
+    check.add_argument("cases", nargs="+", metavar="CASE")
+    check.set_defaults(command=_check)
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
+    schema.set_defaults(command=_schema)
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch import load_all, run_all  # noqa: PLC0415
+
+    return run_all(load_all(options.cases), options.out)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch import check_all  # noqa: PLC0415
+
+    return check_all(options.cases)
+
+
+def _schema(_: argparse.Namespace) -> int:
+    from tetlux.cases.schema import CaseSpec  # noqa: PLC0415
+
+    print(json.dumps(CaseSpec.model_json_schema(), indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

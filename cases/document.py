@@ -1,0 +1,119 @@
+"""A YAML document that knows the line of every key."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from tetlux.meshing.errors import InputError
+
+Key = tuple[str | int, ...]
+LARGEST_FILE = 1_000_000
+
+
+class _Loader(yaml.SafeLoader):
+    """Plain data only; and 1e-3 is a number, which YAML 1.1 takes for text."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float",
+    re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"),
+    list("-+0123456789."),
+)
+
+
+@dataclass(frozen=True)
+class Document:
+    """Plain data read from a YAML file.
+
+    Attributes
+    ----------
+    path : Path
+    data : dict
+    lines : dict
+        Line number of each key, by its path in the document.
+    """
+
+    path: Path
+    data: dict[str, Any]
+    lines: dict[Key, int]
+
+    def error(self, key: Key, message: str) -> InputError:
+        """An error that names this file, the line of a key (or of what holds it), and the key."""
+        known = key
+        while known and known not in self.lines:
+            known = known[:-1]
+        where = f"{self.path}, line {self.lines[known]}" if known else f"{self.path}"
+        name = dotted(key)
+        return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
+
+
+def dotted(key: Key) -> str:
+    """A key as people write it: ``lights[0].pencil.origin``."""
+    text = ""
+    for part in key:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def read_document(path: Path) -> Document:
+    """Read a YAML file that holds one mapping.
+
+    Raises
+    ------
+    InputError
+        If it is missing, unreadable, no YAML, or something else than a mapping.
+    """
+    if not path.exists():
+        raise InputError(f"{path} does not exist; check the path of the case file.")
+    if not path.is_file():
+        raise InputError(f"{path} is not a file; give a YAML case file.")
+    try:
+        size = path.stat().st_size
+        if size > LARGEST_FILE:
+            raise InputError(f"{path} is {size / 1e6:.0f} MB; a case file is a few lines of YAML.")
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8 text; save it as UTF-8.") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}.") from error
+    loader = _Loader(text)
+    try:
+        node = loader.get_single_node()
+        if not isinstance(node, yaml.MappingNode):
+            raise InputError(f"{path} is {'empty' if node is None else 'not a mapping'}; give keys and values.")
+        lines: dict[Key, int] = {}
+        _note_lines(path, node, (), lines)
+        data = loader.construct_document(node)  # type: ignore[no-untyped-call]
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark
+        line = f", line {mark.line + 1}" if mark else ""
+        raise InputError(f"{path}{line}: not valid YAML: {error.problem}.") from error
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        first = (str(error).splitlines() or ["no reason given"])[0]
+        raise InputError(f"{path}: not valid YAML: {first}.") from error
+    finally:
+        loader.dispose()
+    return Document(path, data, lines)
+
+
+def _note_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int]) -> None:
+    if len(lines) > 10_000:
+        raise InputError(f"{path} holds more than 10,000 keys; a case file is a few lines of YAML.")
+    if isinstance(node, yaml.MappingNode):
+        for name, value in node.value:
+            part: Key = (*key, str(name.value))
+            if part in lines:
+                raise InputError(
+                    f"{path}, line {name.start_mark.line + 1}: {dotted(part)}: this key stands here twice."
+                )
+            lines[part] = name.start_mark.line + 1
+            _note_lines(path, value, part, lines)
+    elif isinstance(node, yaml.SequenceNode):
+        for index, value in enumerate(node.value):
+            lines[*key, index] = value.start_mark.line + 1
+            _note_lines(path, value, (*key, index), lines)

@@ -1,0 +1,115 @@
+"""One run: solve a case and write what it asks for, whole or not at all."""
+
+import json
+import shutil
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.cases.case import Case
+from tetlux.cases.picture import Ray, Scene, draw
+from tetlux.cases.summary import summarize
+from tetlux.fem.lights import PencilBeam, PointSource
+from tetlux.fem.solution import Solution
+from tetlux.fem.solve import solve
+from tetlux.meshing.arrays import Vector
+from tetlux.meshing.errors import RunError
+from tetlux.meshing.files import write_mesh, write_surface
+from tetlux.meshing.surface import Surface
+
+Report = Callable[[str], None]
+FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+SUMMARY = "summary.json"
+
+
+def run_case(case: Case, out: Path, report: Report = lambda _: None) -> Path:
+    """Solve a case and write its results.
+
+    Results are written into a folder beside the final one and moved there when all are complete, the
+    summary last: where there is a summary, the run was finished.
+
+    Parameters
+    ----------
+    case : Case
+    out : Path
+        Folder of all results; this case's go to ``out / case.name``.
+    report : callable
+        Called with a line of text as each stage ends.
+
+    Returns
+    -------
+    Path
+        The folder of this case's results.
+
+    Raises
+    ------
+    RunError
+        If the mesher or the solver fails, or the results cannot be written.
+    """
+    started = time.perf_counter()
+    solution = solve(case.surface, case.medium, case.lights, tolerance=case.tolerance, report=report)
+    target = out / case.name
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".partial-", dir=target) as folder:
+            _write(case, solution, Path(folder), started)
+            _move(Path(folder), target)
+    except OSError as error:
+        raise RunError(
+            f"results cannot be written to {target}: {error.strerror or error}; choose another folder with --out."
+        ) from error
+    return target
+
+
+def _write(case: Case, solution: Solution, folder: Path, started: float) -> None:
+    writing = time.perf_counter()
+    mesh = solution.mesh
+    warnings = list(solution.warnings)
+    boundary = Surface(mesh.boundary_points, mesh.boundary_triangles, mesh.unit, case.name)
+    if "surface" in case.outputs:
+        write_surface(boundary, folder / FILES["surface"], {"exitance": solution.exitance})
+    if "volume" in case.outputs:
+        write_mesh(mesh, folder / FILES["volume"], {"fluence": solution.fluence})
+    if "picture" in case.outputs:
+        scene = Scene(
+            points=boundary.points,
+            triangles=boundary.faces,
+            exitance=solution.exitance,
+            unit=mesh.unit,
+            title=case.name,
+            lights=tuple(_ray(light, case.surface) for light in case.lights),
+        )
+        warnings += draw(scene, folder / FILES["picture"])
+    now = time.perf_counter()
+    seconds = {**solution.seconds, "write": now - writing, "total": now - started}
+    summary = json.dumps(summarize(case, solution, seconds, warnings), indent=2, allow_nan=False)
+    (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
+
+
+def _move(folder: Path, target: Path) -> None:
+    """Replace an earlier run's results by this one's, never leaving a summary beside another run's files."""
+    (target / SUMMARY).unlink(missing_ok=True)
+    for name in FILES.values():
+        if (folder / name).exists():
+            (folder / name).replace(target / name)
+        else:
+            (target / name).unlink(missing_ok=True)
+    shutil.move(folder / SUMMARY, target / SUMMARY)
+
+
+def _ray(light: object, surface: Surface) -> Ray:
+    """Where a picture draws a light."""
+    if isinstance(light, PencilBeam):
+        end = light.entry(surface)
+        start = end - 0.3 * surface.diagonal * light.rays()[1]
+        return Ray(_vector(start), _vector(end))
+    assert isinstance(light, PointSource)
+    return Ray(light.position, light.position)
+
+
+def _vector(point: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Vector:
+    x, y, z = point.tolist()
+    return x, y, z
