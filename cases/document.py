@@ -86,7 +86,7 @@ def read_document(path: Path) -> Document:
             raise InputError(f"{path} is {'empty' if node is None else 'not a mapping'}; give keys and values.")
         lines: dict[Key, int] = {}
         _note_lines(path, node, (), lines)
-        data = loader.construct_document(node)  # type: ignore[no-untyped-call]
+        data = loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         line = f", line {mark.line + 1}" if mark else ""

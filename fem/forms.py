@@ -80,4 +80,4 @@ def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_a
 def node_volumes(mesh: TetMesh) -> FloatArray:
     """``∫ v`` of every node's hat function, (n,): weights that sum to the volume."""
     weights = np.repeat(mesh.volumes / 4.0, 4)
-    return np.bincount(mesh.tetrahedra.ravel(), weights, minlength=len(mesh.points))
+    return np.asarray(np.bincount(mesh.tetrahedra.ravel(), weights, minlength=len(mesh.points)), dtype=np.float64)

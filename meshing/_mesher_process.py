@@ -1,6 +1,5 @@
 """What runs in the mesher's own process: pytetwild can crash, hang and write into its working directory."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +7,10 @@ import numpy as np
 
 def main() -> None:
     """Tetrahedralize ``input.npz`` of the working directory into ``output.npz``."""
-    import pytetwild  # noqa: PLC0415
+    from pytetwild.pytetwild import tetrahedralize  # noqa: PLC0415
 
     job = np.load(Path("input.npz"))
-    points, tetrahedra = pytetwild.tetrahedralize(
+    points, tetrahedra = tetrahedralize(
         job["points"],
         job["faces"],
         edge_length_abs=float(job["edge_length"]),
@@ -24,4 +23,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    main()

@@ -155,13 +155,17 @@ def _check_against(mesh: TetMesh, surface: Surface, epsilon: float) -> None:
     """Refuse a mesh that is not the body of the surface."""
     # The envelope may shift the whole boundary by epsilon; self-intersecting input overlaps itself.
     slack = 0.02 + 2.0 * epsilon * surface.diagonal * surface.area / surface.volume
-    change = mesh.volume / surface.volume - 1.0
-    crossing = any("crosses itself" in w or "lies inside" in w for w in surface.warnings)
-    if abs(change) > slack + (0.2 if crossing else 0.0):
-        raise RunError(
-            f"{surface.name}: the mesh holds {change:+.1%} of the surface's volume; parts are thinner than the "
-            f"mesher's envelope of {epsilon * surface.diagonal:.3g} {surface.unit}: give a smaller epsilon."
-        )
+    # A surface that crosses itself counts what overlaps twice, and the mesh is of the union.
+    overlap = 0.3 if any("crosses itself" in w or "lies inside" in w for w in surface.warnings) else 0.0
+    for quantity, change in (
+        ("volume", mesh.volume / surface.volume - 1.0),
+        ("area", mesh.area / surface.area - 1.0),
+    ):
+        if abs(change) > slack + overlap:
+            raise RunError(
+                f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
+                f"the mesher's envelope of {epsilon * surface.diagonal:.3g} {surface.unit}: give a smaller epsilon."
+            )
     wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:

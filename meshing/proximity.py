@@ -1,5 +1,7 @@
 """Where is the surface? Nearest points, insides and rays, for a soup of triangles."""
 
+from typing import Any
+
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -44,7 +46,10 @@ class ClosestPoint:
 
         nearest = np.empty((len(queries), 3))
         faces = np.empty(len(queries), dtype=np.int64)
-        point, face, sub, distance2 = [0.0, 0.0, 0.0], reference(0), reference(0), reference(0.0)
+        point = [0.0, 0.0, 0.0]
+        face: Any = reference(0)
+        sub: Any = reference(0)
+        distance2: Any = reference(0.0)
         for i, query in enumerate(np.asarray(queries, dtype=float).tolist()):
             self._locator.FindClosestPoint(query, point, face, sub, distance2)
             nearest[i] = point
@@ -114,6 +119,7 @@ def cross_segments(
     edge1, edge2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = np.cross(directions, edge2)
     determinant = np.einsum("ij,ij->i", edge1, p)
+    size = np.prod([np.linalg.norm(v, axis=1) for v in (edge1, edge2, directions)], axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1.0 / determinant
         s = origins - corners[:, 0]
@@ -121,5 +127,5 @@ def cross_segments(
         q = np.cross(s, edge1)
         v = np.einsum("ij,ij->i", directions, q) * inverse
         t = np.einsum("ij,ij->i", edge2, q) * inverse
-        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & np.isfinite(t)
+        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (np.abs(determinant) > 1e-12 * size)
     return np.where(hit, t, np.nan), np.column_stack([u, v])

@@ -146,31 +146,31 @@ def boundary_loops(faces: IntArray) -> list[IntArray]:
     """The rims of holes: closed chains of vertices along edges that belong to one triangle only."""
     edges = _directed_edges(faces)
     _, inverse, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    rim = edges[counts[inverse.reshape(-1)] == 1]
+    rim = [(a, b) for a, b in edges[counts[inverse.reshape(-1)] == 1].tolist()]
     neighbours: dict[int, list[int]] = {}
-    for a, b in rim.tolist():
+    for a, b in rim:
         neighbours.setdefault(a, []).append(b)
         neighbours.setdefault(b, []).append(a)
-    # Holes that touch at a vertex cannot be told apart by walking; the caller finds them still open.
+    directed = set(rim)
     loops = []
-    left = {v for v, others in neighbours.items() if len(others) == 2}
-    outgoing = dict(rim.tolist())
-    while left:
-        loop = [left.pop()]
-        previous = -1
-        while True:
-            here = loop[-1]
-            choices = [v for v in neighbours[here] if v != previous and v in left]
-            if not choices:
-                break
-            following = outgoing.get(here)
-            step = following if following in choices else choices[0]
-            left.discard(step)
-            loop.append(step)
-            previous = here
-        if len(loop) >= 3 and loop[0] in neighbours[loop[-1]]:
-            forward = outgoing.get(loop[0]) == loop[1]
-            loops.append(np.array(loop if forward else loop[::-1], dtype=np.int64))
+    for start in neighbours:
+        path = [start]
+        while path:
+            here = path[-1]
+            if not neighbours[here]:
+                path.pop()
+                continue
+            following = neighbours[here].pop()
+            neighbours[following].remove(here)
+            if following in path:
+                # Holes that touch at a vertex come apart here: each return to a vertex ends a loop.
+                first = path.index(following)
+                loop = path[first:]
+                del path[first + 1 :]
+                forward = (loop[0], loop[1]) in directed
+                loops.append(np.array(loop if forward else loop[::-1], dtype=np.int64))
+            else:
+                path.append(following)
     return loops
 
 
@@ -242,5 +242,7 @@ def count_self_intersections(points: FloatArray, faces: IntArray) -> int:
     apart = (faces[face][:, :, None] != edges[edge][:, None, :]).all(axis=(1, 2))
     edge, face = edge[apart], face[apart]
     start = points[edges[edge, 0]]
-    t, _ = cross_segments(start, points[edges[edge, 1]] - start, points[faces[face]])
-    return len(np.unique(face[(t > 0.0) & (t < 1.0)]))
+    # Touching is not crossing, and in tessellated planes it is the rule.
+    margin = 1e-6
+    t, _ = cross_segments(start, points[edges[edge, 1]] - start, points[faces[face]], slack=-margin)
+    return len(np.unique(face[(t > margin) & (t < 1.0 - margin)]))

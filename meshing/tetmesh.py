@@ -104,7 +104,8 @@ class TetMesh:
     def boundary_node_areas(self) -> FloatArray:
         """A third of the area of the triangles around each boundary node, (b,): weights that sum to `area`."""
         weights = np.repeat(self.boundary_areas / 3.0, 3)
-        return np.bincount(self.boundary_triangles.ravel(), weights, minlength=len(self.boundary_nodes))
+        sums = np.bincount(self.boundary_triangles.ravel(), weights, minlength=len(self.boundary_nodes))
+        return np.asarray(sums, dtype=np.float64)
 
     @cached_property
     def area(self) -> float:
@@ -182,11 +183,12 @@ class TetMesh:
             count = min(wanted, len(self.tetrahedra))
             if len(left) == 0 or count == tried:
                 break
-            distance, near = self._centroids.query(queries[left], k=range(tried + 1, count + 1))
-            for column in range(near.shape[1]):
-                inner = self.barycentric(queries[left], near[:, column])
+            found = self._centroids.query(queries[left], k=list(range(tried + 1, count + 1)))
+            distance, near = np.asarray(found[0]), np.asarray(found[1], dtype=np.int64)
+            for column in near.T:
+                inner = self.barycentric(queries[left], column)
                 hit = (inner.min(axis=1) >= -1e-10) & (cells[left] < 0)
-                cells[left[hit]] = near[hit, column]
+                cells[left[hit]] = column[hit]
                 weights[left[hit]] = inner[hit]
             # No tetrahedron reaches farther from its centroid than three quarters of its longest edge.
             reach = 0.75 * float(self.longest_edges.max())

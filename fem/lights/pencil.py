@@ -10,7 +10,7 @@ from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import as_vector, check_power
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -94,7 +94,7 @@ class PencilBeam:
         self._check_outside(surface, direction, faces)
         if len(faces) == 0:
             raise self._missed(surface)
-        return origin + distances[0] * direction
+        return np.asarray(origin + distances[0] * direction)
 
     def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
@@ -126,7 +126,7 @@ class PencilBeam:
             )
         return Deposit(**{**vars(deposit), "warnings": tuple(dict.fromkeys(warnings))})
 
-    def _check_outside(self, surface: Surface, direction: FloatArray, faces: FloatArray | np.ndarray) -> None:  # type: ignore[type-arg]
+    def _check_outside(self, surface: Surface, direction: FloatArray, faces: IntArray) -> None:
         if len(faces) and float(surface.normals[faces[0]] @ direction) > 0:
             raise InputError(
                 f"the beam starts inside the body, at {tuple(self.origin)}; move its origin outside, "

@@ -1,0 +1,60 @@
+"""What runs in the drawer's own process: without GL libraries, VTK ends in a segmentation fault."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pyvista import PolyData
+
+
+def main(job_path: str, image_path: str) -> None:
+    """Draw the stage in ``job_path`` (npz) off-screen with PyVista into ``image_path`` (npy, (h, w, 3) uint8)."""
+    import pyvista  # noqa: PLC0415
+
+    with np.load(job_path) as data:
+        job = {key: data[key] for key in data.files}
+    width, height = job["size"].tolist()
+    plotter = pyvista.Plotter(off_screen=True, window_size=[width, height], lighting="none")
+    plotter.set_background(job["background"].tolist())
+    center = job["center"]
+    # Not positional, so only the direction counts.
+    lamp = pyvista.Light(position=center + job["lamp"], focal_point=center, light_type="scene light")
+    plotter.add_light(lamp)
+    shaded, full = job["shading"].tolist()
+    look = {"smooth_shading": True, "ambient": shaded, "diffuse": full - shaded, "specular": 0.0}
+    body = _soup(job["corners"], job["normals"])
+    body.point_data["share"] = job["shares"].ravel()
+    table = pyvista.LookupTable(values=np.round(255 * np.column_stack([job["table"], np.ones(256)])))
+    table.scalar_range = (0.0, 1.0)
+    plotter.add_mesh(body, scalars="share", cmap=table, interpolate_before_map=True, show_scalar_bar=False, **look)
+    if len(job["arrows"]):
+        arrows = _soup(job["arrows"], job["arrow_normals"])
+        plotter.add_mesh(arrows, color=job["light"].tolist(), **look)
+    camera = plotter.camera
+    camera.parallel_projection = True
+    camera.focal_point = center.tolist()
+    # Any distance will do in a parallel projection; the clipping planes follow from it.
+    camera.position = (center + float(job["distance"]) * job["toward"]).tolist()
+    camera.up = job["up"].tolist()
+    camera.parallel_scale = float(job["half_height"])
+    plotter.renderer.ResetCameraClippingRange()
+    image = np.asarray(plotter.screenshot(return_img=True))
+    plotter.close()
+    np.save(Path(image_path), image)
+
+
+def _soup(corners: np.ndarray, normals: np.ndarray) -> "PolyData":
+    """Triangles (m, 3, 3) that share no corner, with a normal for each."""
+    import pyvista  # noqa: PLC0415
+
+    order = np.arange(3 * len(corners)).reshape(-1, 3)
+    mesh = pyvista.PolyData(corners.reshape(-1, 3), faces=np.insert(order, 0, 3, axis=1).ravel())
+    mesh.point_data.active_normals = normals.reshape(-1, 3)
+    return mesh
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,163 @@
+"""The picture of a run: the body in the colours of its exitance."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.cases.picture_frame import frame
+from tetlux.cases.picture_plain import draw_plain
+from tetlux.cases.picture_stage import (
+    BACKGROUND,
+    FULL,
+    LIGHT,
+    OVERSAMPLING,
+    PANEL,
+    SHADED,
+    Ray,
+    Stage,
+    build_stage,
+    exitance_range,
+)
+from tetlux.meshing.arrays import FloatArray, IntArray
+
+__all__ = ["Ray", "Scene", "draw"]
+
+Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
+# The command that draws a body with PyVista; the names of two files are added.
+RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process")
+# Seconds; 50,000 triangles take about two without a graphics card.
+TIME_LIMIT = 120.0
+# Measured on a bare Debian 12: either package alone is not enough.
+WITHOUT_PYVISTA = (
+    "the picture was drawn without PyVista, which could not render on this machine; "
+    "on Debian, `apt-get install libgl1 libegl1` brings what it needs."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is to be seen.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        Vertices of the body, in `unit`.
+    triangles : (m, 3) ndarray
+        Anticlockwise seen from outside.
+    exitance : (n,) ndarray
+        W/unit², at the vertices.
+    unit, title : str
+    lights : tuple of Ray
+        The lights to draw in.
+    """
+
+    points: FloatArray
+    triangles: IntArray
+    exitance: FloatArray
+    unit: str
+    title: str
+    lights: tuple[Ray, ...] = ()
+
+
+def draw(scene: Scene, path: Path) -> list[str]:
+    """Draw a body in the colours of its exitance.
+
+    The colours follow the logarithm of the exitance, down to six decades below its maximum. The camera
+    looks at the lit side.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+        Where the PNG goes, 1400 x 1050 pixels; replaced only when the new picture is complete.
+
+    Returns
+    -------
+    list of str
+        A sentence if PyVista could not render here and a plainer drawing was made instead.
+
+    Raises
+    ------
+    OSError
+        If the picture cannot be written.
+    """
+    ends = exitance_range(scene.exitance)
+    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights)
+    image = _drawn_with_pyvista(stage)
+    warnings = [] if image is not None else [WITHOUT_PYVISTA]
+    unfinished = path.with_name(path.name + ".part")
+    try:
+        frame(
+            unfinished,
+            _averaged(draw_plain(stage) if image is None else image),
+            stage.camera,
+            scene.lights,
+            ends=ends,
+            table=stage.table,
+            below=ends is not None and bool((scene.exitance < ends[0] * (1 - 1e-9)).any()),
+            unit=scene.unit,
+            title=scene.title,
+            extent=np.ptp(scene.points, axis=0),
+        )
+        os.replace(unfinished, path)  # noqa: PTH105
+    finally:
+        unfinished.unlink(missing_ok=True)
+    return warnings
+
+
+def _drawn_with_pyvista(stage: Stage) -> Image | None:
+    """The body as PyVista draws it in a process of its own, or None where it cannot."""
+    camera = stage.camera
+    with tempfile.TemporaryDirectory(prefix="tetlux-picture-", ignore_cleanup_errors=True) as folder:
+        job, output = Path(folder) / "stage.npz", Path(folder) / "image.npy"
+        np.savez(
+            job,
+            size=OVERSAMPLING * np.array(PANEL),
+            background=BACKGROUND,
+            light=LIGHT,
+            shading=(SHADED, FULL),
+            lamp=camera.lamp,
+            corners=stage.corners,
+            normals=stage.normals,
+            shares=stage.shares,
+            table=stage.table,
+            arrows=stage.arrows,
+            arrow_normals=stage.arrow_normals,
+            center=camera.center,
+            toward=camera.toward,
+            up=camera.up,
+            distance=4.0 * camera.pixel * max(PANEL),
+            half_height=0.5 * camera.pixel * PANEL[1],
+        )
+        try:
+            done = subprocess.run(
+                [*RENDERER, str(job), str(output)],
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                timeout=TIME_LIMIT,
+                check=False,
+            )
+        except (subprocess.TimeoutExpired, OSError):
+            return None
+        if done.returncode != 0 or not output.exists():
+            return None
+        image: Image = np.load(output)
+    expected = (OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3)
+    # A broken driver may also return without an error and leave the window empty.
+    blank = image.shape != expected or bool((image == image[0, 0]).all())
+    return None if blank else image
+
+
+def _averaged(image: Image) -> Image:
+    """Every square of `OVERSAMPLING` pixels as one."""
+    n = OVERSAMPLING
+    height, width = image.shape[0] // n, image.shape[1] // n
+    mean = image.reshape(height, n, width, n, 3).mean(axis=(1, 3), dtype=np.float32)
+    return np.asarray(np.round(mean), dtype=np.uint8)

@@ -1,0 +1,99 @@
+"""A drawer that needs no graphics library: triangles into pixels, the nearest one wins."""
+
+import numpy as np
+
+from tetlux.cases.picture_stage import (
+    BACKGROUND,
+    FULL,
+    LIGHT,
+    OVERSAMPLING,
+    PANEL,
+    SHADED,
+    Stage,
+)
+from tetlux.meshing.arrays import FloatArray, IntArray
+
+# Pairs of a pixel and a triangle looked at in one go; bounds the memory to about 100 MB.
+BATCH = 1_000_000
+
+
+def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    """Draw the body and the arrows; (h, w, 3) at `OVERSAMPLING` times the panel's size."""
+    corners = np.concatenate([stage.corners, stage.arrows])
+    placed = stage.camera.project(corners.reshape(-1, 3)).reshape(-1, 3, 3) * OVERSAMPLING
+    body = len(stage.corners)
+    owner = _nearest_triangles(placed, closed=body)
+    flat = owner.ravel()
+    pixels = np.flatnonzero(flat >= 0)
+    flat = flat[pixels]
+    width = owner.shape[1]
+    weights = _weights(placed[flat, :, :2], pixels % width + 0.5, pixels // width + 0.5)
+    colors = np.empty((len(pixels), 3))
+    lit = flat >= body
+    shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
+    colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
+    colors[lit] = LIGHT
+    normals = np.concatenate([stage.normals, stage.arrow_normals])
+    lamp, eye = (
+        np.einsum("ij,ij->i", weights, (normals @ axis)[flat]) for axis in (stage.camera.lamp, stage.camera.toward)
+    )
+    # As VTK does, a normal that points away from the eye is turned round.
+    cosine = np.clip(np.where(eye < 0, -lamp, lamp), 0.0, 1.0)
+    colors *= (SHADED + (FULL - SHADED) * cosine)[:, None]
+    image = np.tile(np.round(255 * np.asarray(BACKGROUND)).astype(np.uint8), (owner.size, 1))
+    image[pixels] = np.round(255 * colors).astype(np.uint8)
+    return image.reshape(*owner.shape, 3)
+
+
+def _nearest_triangles(placed: FloatArray, closed: int) -> IntArray:
+    """Which triangle is seen at each pixel, or -1, (h, w); of the first `closed` only the front is drawn."""
+    size = np.array([OVERSAMPLING * n for n in PANEL])
+    a, b, c = (placed[:, i, :2] for i in range(3))
+    # Rows count downwards, so a triangle seen from its front runs clockwise.
+    area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    drawn = np.flatnonzero((area < 0) | ((area > 0) & (np.arange(len(placed)) >= closed)))
+    # The pixels whose middles, at n + 1/2, lie within a triangle's rectangle.
+    low = np.maximum(np.ceil(placed[drawn, :, :2].min(axis=1) - 0.5).astype(int), 0)
+    high = np.minimum(np.floor(placed[drawn, :, :2].max(axis=1) - 0.5).astype(int), size - 1)
+    columns, rows = np.maximum(high - low + 1, 0).T
+    owner = np.full((size[1], size[0]), -1, dtype=np.int64)
+    nearness = np.full(owner.shape, -np.inf)
+    # One strip is one row of pixels of one triangle.
+    strip, row = np.repeat(np.arange(len(drawn)), rows), _counting(rows)
+    ends = np.cumsum(columns[strip])
+    cuts = np.searchsorted(ends, np.arange(BATCH, int(columns @ rows), BATCH))
+    for part in np.split(np.arange(len(strip)), cuts):
+        long = columns[strip[part]]
+        one = np.repeat(part, long)
+        first = low[strip[one]]
+        pixels = np.column_stack([first[:, 0] + _counting(long), first[:, 1] + row[one]])
+        _keep_nearest(owner, nearness, placed, drawn[strip[one]], pixels)
+    return owner
+
+
+def _keep_nearest(
+    owner: IntArray, nearness: FloatArray, placed: FloatArray, triangle: IntArray, pixels: IntArray
+) -> None:
+    """Give each pixel (column, row) to the nearest triangle that covers its middle; changes the first two."""
+    weights = _weights(placed[triangle, :, :2], *(pixels.T + 0.5))
+    inside = (weights >= -1e-9).all(axis=1)
+    triangle, column, row = triangle[inside], *pixels[inside].T
+    near = np.einsum("ij,ij->i", weights[inside], placed[triangle, :, 2])
+    np.maximum.at(nearness, (row, column), near)
+    wins = near == nearness[row, column]
+    owner[row[wins], column[wins]] = triangle[wins]
+
+
+def _weights(corners: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Barycentric coordinates (n, 3) of points in triangles of the plane (n, 3, 2), pair by pair."""
+    (ax, ay), (bx, by), (cx, cy) = (corners[:, i].T for i in range(3))
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
+    third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
+    return np.column_stack([1.0 - second - third, second, third])
+
+
+def _counting(lengths: IntArray) -> IntArray:
+    """0, 1, ... up to each length, one after the other."""
+    starts = np.cumsum(lengths) - lengths
+    return np.arange(int(lengths.sum())) - np.repeat(starts, lengths)

@@ -1,0 +1,191 @@
+"""Pictures: what they show, that both drawers show the same, and what happens when one of them fails."""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tetlux.cases import picture
+from tetlux.cases.picture import Ray, Scene, draw
+from tetlux.cases.picture_frame import LEFT, TOP, bar_ticks
+from tetlux.cases.picture_plain import draw_plain
+from tetlux.cases.picture_stage import (
+    BACKGROUND,
+    OVERSAMPLING,
+    PANEL,
+    Camera,
+    build_stage,
+    corner_normals,
+    exitance_range,
+    map_shares,
+)
+from tetlux.meshing import box, sphere, torus
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.surface import Surface
+
+DIES: tuple[str, ...] = (sys.executable, "-c", "import os; os.abort()")
+
+
+def lit(surface: Surface, entry: Vector, start: Vector) -> Scene:
+    """A body that glows round an entry point, over more decades than are drawn."""
+    distance = np.linalg.norm(surface.points - np.asarray(entry), axis=1)
+    exitance = 0.1 * np.exp(-1.5 * distance) / (distance + 0.5)
+    return Scene(surface.points, surface.faces, exitance, "mm", "a case", (Ray(start, entry),))
+
+
+@pytest.fixture(scope="module")
+def ball() -> Scene:
+    # Its entry point is oblique to every axis, so that a mirrored picture would show.
+    entry = (8.0, 0.0, 6.0)
+    return lit(sphere(10.0, subdivisions=3), entry, (16.0, 0.0, 12.0))
+
+
+def pixels(path: Path) -> FloatArray:
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"), dtype=np.float64)
+
+
+def camera_of(scene: Scene) -> Camera:
+    return build_stage(scene.points, scene.triangles, scene.exitance, scene.lights).camera
+
+
+def brightest(image: FloatArray, camera: Camera, scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Middle of the yellow pixels of the panel, and where the entry point should be, in pixels of the panel."""
+    panel = image[TOP : TOP + PANEL[1], LEFT : LEFT + PANEL[0]]
+    # Yellow, as no other colour of the picture: much green, and more of it than of blue.
+    rows, columns = np.nonzero((panel[..., 1] > 170) & (panel[..., 1] > panel[..., 2] + 40))
+    assert len(rows) > 50
+    entry = camera.project(np.array([scene.lights[0].end]))[0, :2]
+    return np.array([columns.mean(), rows.mean()]), entry
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_brightest_colours_are_at_the_entry_point(
+    ball: Scene, plain: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if plain:
+        monkeypatch.setattr(picture, "RENDERER", DIES)
+    target = tmp_path / "picture.png"
+    warnings = draw(ball, target)
+    image = pixels(target)
+    assert image.shape == (1050, 1400, 3)
+    found, wanted = brightest(image, camera_of(ball), ball)
+    # The arrow hides a part of the bright spot: measured 0.04 of the radius.
+    radius = 10.0 / camera_of(ball).pixel
+    assert np.linalg.norm(found - wanted) < 0.1 * radius
+    if plain:
+        assert len(warnings) == 1
+        assert "libgl1 libegl1" in warnings[0]
+    else:
+        assert warnings == []
+    assert [p.name for p in tmp_path.iterdir()] == ["picture.png"]
+
+
+def test_both_drawers_draw_the_same() -> None:
+    body = torus(10.0, 4.0, segments=48)
+    scene = lit(body, (-14.0, 0.0, 0.0), (-30.0, 0.0, 0.0))
+    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights)
+    ours = draw_plain(stage).astype(np.int64)
+    theirs = picture._drawn_with_pyvista(stage)
+    assert theirs is not None
+    assert ours.shape == theirs.shape == (OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3)
+    # Measured: 0.12 to 0.17 % of the pixels differ by more than three steps, those on outlines.
+    apart = np.abs(ours - theirs.astype(np.int64)).max(axis=2)
+    assert (apart > 3).mean() < 0.004
+
+
+@pytest.mark.parametrize("command", [DIES, ("no-such-command",), (sys.executable, "-c", "")])
+def test_a_renderer_that_fails_is_done_without(
+    command: tuple[str, ...], ball: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(picture, "RENDERER", command)
+    stage = build_stage(ball.points, ball.triangles, ball.exitance, ball.lights)
+    assert picture._drawn_with_pyvista(stage) is None
+
+
+def test_a_renderer_that_hangs_is_stopped(ball: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "RENDERER", (sys.executable, "-c", "import time; time.sleep(60)"))
+    monkeypatch.setattr(picture, "TIME_LIMIT", 0.3)
+    stage = build_stage(ball.points, ball.triangles, ball.exitance, ball.lights)
+    assert picture._drawn_with_pyvista(stage) is None
+
+
+def test_a_failure_leaves_the_old_picture_and_nothing_else(
+    ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def half(path: Path, *_: object, **__: object) -> None:
+        path.write_bytes(b"half a picture")
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(picture, "RENDERER", DIES)
+    monkeypatch.setattr(picture, "frame", half)
+    target = tmp_path / "picture.png"
+    target.write_bytes(b"the old one")
+    with pytest.raises(OSError, match="disk is full"):
+        draw(ball, target)
+    assert target.read_bytes() == b"the old one"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize("exitance", [np.append(np.nan, np.zeros(7)), np.full(8, 0.25)])
+def test_dark_and_even_bodies_are_drawn(exitance: FloatArray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "RENDERER", DIES)
+    cube = box((2.0, 2.0, 2.0))
+    target = tmp_path / "picture.png"
+    draw(Scene(cube.points, cube.faces, exitance, "mm", "$ in a title", ()), target)
+    middle = pixels(target)[TOP + PANEL[1] // 2, LEFT + PANEL[0] // 2]
+    assert np.abs(middle - 255 * np.asarray(BACKGROUND)).max() > 30
+
+
+def test_the_light_is_seen_from_its_side() -> None:
+    ball = sphere(10.0, subdivisions=2)
+    for direction in np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.0, -0.8]]]):
+        end, start = tuple(-10.0 * direction), tuple(-20.0 * direction)
+        camera = camera_of(lit(ball, end, start))
+        assert camera.toward @ -direction > 0.3
+        # z stays up, and all of the body and the arrow's tip stays in the panel.
+        assert camera.up[2] > 0.3
+        placed = camera.project(ball.points)[:, :2]
+        assert (placed > 0).all()
+        assert (placed < PANEL).all()
+
+
+def test_the_camera_moves_so_that_the_body_does_not_hide_the_entry_point() -> None:
+    # A wall beside the entry point hides it from the first view, 50 degrees anticlockwise of the light.
+    base, wall = box((10.0, 10.0, 10.0)), box((20.0, 2.0, 40.0), center=(15.0, 7.0, 5.0))
+    both = Surface(np.vstack([base.points, wall.points]), np.vstack([base.faces, wall.faces + 8]))
+    camera = camera_of(lit(both, (5.0, 0.0, 0.0), (10.0, 0.0, 0.0)))
+    assert camera_of(lit(base, (5.0, 0.0, 0.0), (10.0, 0.0, 0.0))).toward[1] > 0.5
+    assert camera.toward[1] < -0.5
+
+
+def test_colours_follow_the_logarithm_over_six_decades_at_most() -> None:
+    exitance = np.array([0.0, -1e-18, np.nan, 1e-12, 1e-7, 1e-4, 1e-1])
+    ends = exitance_range(exitance)
+    assert ends == pytest.approx((1e-7, 1e-1))
+    np.testing.assert_allclose(map_shares(exitance, ends), [0, 0, 0, 0, 0, 0.5, 1], atol=1e-12)
+    # Noise on an even glow must not fill the colour map.
+    even = exitance_range(np.array([1.0, 1.0 + 1e-9]))
+    assert even is not None
+    assert math.isclose(even[1] / even[0], 2.0)
+
+
+@pytest.mark.parametrize("ends", [(3e-8, 2e-2), (0.4, 0.5), (0.3, 2.5), (0.5, 1.0), (1e-12, 1e-6), (2e4, 9e4)])
+def test_every_colour_bar_has_labels_within_its_ends(ends: tuple[float, float]) -> None:
+    ticks = bar_ticks(*ends)
+    assert 2 <= len(ticks) <= 8
+    assert all(ends[0] * 0.999 <= value <= ends[1] * 1.001 for value, _ in ticks)
+    assert len({label for _, label in ticks}) == len(ticks)
+
+
+def test_normals_are_smooth_on_a_sphere_and_break_at_the_edges_of_a_box() -> None:
+    ball = sphere(1.0, subdivisions=3)
+    corners = ball.points[ball.faces]
+    # The mean of six triangles round a vertex misses the sphere's normal by 0.011 at this fineness.
+    assert np.abs(corner_normals(corners, ball.faces) - corners).max() < 0.02
+    cube = box((1.0, 2.0, 3.0))
+    normals = corner_normals(cube.points[cube.faces], cube.faces)
+    np.testing.assert_allclose(normals, np.repeat(cube.normals[:, None], 3, axis=1), atol=1e-12)

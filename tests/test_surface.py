@@ -1,0 +1,200 @@
+"""Reading, checking and mending surfaces."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from tetlux.meshing import InputError, Surface, box, cylinder, read_surface, slab, sphere, surface_from_arrays, torus
+from tetlux.meshing.arrays import FloatArray, IntArray
+
+
+@pytest.fixture
+def cube() -> tuple[FloatArray, IntArray]:
+    surface = box((1.0, 2.0, 3.0))
+    return surface.points.copy(), surface.faces.copy()
+
+
+@pytest.mark.parametrize("suffix", ["stl", "stl_ascii", "obj", "ply", "off", "glb", "3mf"])
+def test_every_format_reads_back_the_same_body(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"ball.{suffix.split('_', maxsplit=1)[0]}"
+    path.write_bytes(_exported(trimesh.creation.icosphere(subdivisions=2, radius=3.0), suffix))
+    surface = read_surface(path, scale=2.0)
+    assert len(surface.faces) == 320
+    assert surface.volume == pytest.approx(8 * trimesh.creation.icosphere(subdivisions=2, radius=3.0).volume, rel=1e-5)
+    assert surface.name == path.name
+
+
+def _exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
+    data = mesh.export(file_type=kind)
+    return data.encode() if isinstance(data, str) else data
+
+
+def test_shapes_have_the_volume_and_area_of_their_formulas() -> None:
+    # Inscribed triangles: a little less than the smooth body, by under half a per cent.
+    expected: list[tuple[Surface, float, float]] = [
+        (sphere(2.0), 4 / 3 * np.pi * 8, 4 * np.pi * 4),
+        (cylinder(2.0, 5.0), np.pi * 4 * 5, 2 * np.pi * 2 * 5 + 2 * np.pi * 4),
+        (torus(5.0, 2.0), 2 * np.pi**2 * 5 * 4, 4 * np.pi**2 * 5 * 2),
+    ]
+    for surface, volume, area in expected:
+        assert 0.99 * volume < surface.volume < volume
+        assert 0.995 * area < surface.area < area
+        assert surface.repairs == surface.warnings == ()
+    assert box((1.0, 2.0, 3.0)).volume == pytest.approx(6.0)
+    plate = slab(6.0, 2.0)
+    assert plate.points[:, 2].max() == 0.0
+    assert plate.points[:, 2].min() == -2.0
+    assert plate.volume == pytest.approx(72.0)
+
+
+def test_normals_point_outward(ball: Surface) -> None:
+    middles = ball.points[ball.faces].mean(axis=1)
+    assert (np.einsum("ij,ij->i", ball.normals, middles) > 0).all()
+
+
+def test_inside_outside_and_nearest(ball: Surface) -> None:
+    inside = ball.contains(np.array([[0.0, 0, 0], [0, 0, 9.9], [0, 0, 10.1], [50, 0, 0]]))
+    assert inside.tolist() == [True, True, False, False]
+    nearest, _ = ball.closest(np.array([[0.0, 0, 20.0]]))
+    assert nearest[0] == pytest.approx([0, 0, 10], abs=0.05)
+
+
+def test_a_ray_enters_and_leaves(ball: Surface) -> None:
+    distances, faces = ball.crossings(np.array([0.3, 0.2, 30.0]), np.array([0.0, 0.0, -1.0]))
+    height = np.sqrt(100 - 0.3**2 - 0.2**2)
+    assert distances == pytest.approx([30 - height, 30 + height], abs=0.03)
+    assert ball.normals[faces[0], 2] > 0 > ball.normals[faces[1], 2]
+
+
+def test_an_inside_out_surface_is_turned(cube: tuple[FloatArray, IntArray]) -> None:
+    points, faces = cube
+    surface = surface_from_arrays(points, faces[:, ::-1])
+    assert surface.volume == pytest.approx(6.0)
+    assert "inside-out" in surface.repairs[0]
+
+
+def test_mixed_winding_is_made_consistent(cube: tuple[FloatArray, IntArray]) -> None:
+    points, faces = cube
+    faces[[0, 3, 7]] = faces[[0, 3, 7], ::-1]
+    surface = surface_from_arrays(points, faces)
+    assert surface.volume == pytest.approx(6.0)
+    assert any("winding" in r for r in surface.repairs)
+
+
+def test_duplicates_and_collapsed_triangles_go(cube: tuple[FloatArray, IntArray]) -> None:
+    points, faces = cube
+    soup_points = points[faces].reshape(-1, 3)
+    soup_faces = np.arange(len(soup_points)).reshape(-1, 3)
+    faces = np.vstack([soup_faces, soup_faces[:1], [[0, 0, 1]]])
+    surface = surface_from_arrays(soup_points, faces)
+    assert len(surface.points) == 8
+    assert len(surface.faces) == 12
+    assert [r.split()[0] for r in surface.repairs] == ["merged", "removed", "removed"]
+
+
+@pytest.mark.parametrize("missing", [[7], [7, 800, 801]])
+def test_small_holes_are_closed(ball: Surface, missing: list[int]) -> None:
+    surface = surface_from_arrays(ball.points, np.delete(ball.faces, missing, axis=0))
+    assert surface.volume == pytest.approx(ball.volume, rel=1e-4)
+    assert "small holes" in surface.repairs[0]
+
+
+def test_a_missing_side_is_refused_with_its_place(cube: tuple[FloatArray, IntArray]) -> None:
+    points, faces = cube
+    with pytest.raises(InputError, match=r"box: the surface is open: a hole .* wide around \("):
+        surface_from_arrays(points, faces[2:], name="box")
+
+
+def test_self_intersection_is_counted() -> None:
+    a, b = box((2.0, 2.0, 2.0)), box((2.0, 2.0, 2.0), center=(1.1, 0.9, 1.2))
+    surface = surface_from_arrays(np.vstack([a.points, b.points]), np.vstack([a.faces, b.faces + 8]))
+    assert any("crosses itself" in w for w in surface.warnings)
+    assert any("2 bodies" in w for w in surface.warnings)
+
+
+def test_a_cavity_is_refused() -> None:
+    outer, inner = sphere(3.0, subdivisions=2), sphere(1.0, subdivisions=2)
+    faces = np.vstack([outer.faces, inner.faces[:, ::-1] + len(outer.points)])
+    with pytest.raises(InputError, match="cavity"):
+        surface_from_arrays(np.vstack([outer.points, inner.points]), faces)
+
+
+@pytest.mark.parametrize(
+    ("points", "faces", "message"),
+    [
+        (np.zeros((0, 3)), np.zeros((0, 3)), "empty"),
+        (np.zeros((5, 3)), np.zeros((0, 3)), "points but no triangles"),
+        (np.zeros((4, 2)), [[0, 1, 2]], "shape"),
+        (np.zeros((4, 3)), [[0, 1, 2, 3]], "shape"),
+        (np.eye(4, 3), [[0, 1, 9]], "does not exist"),
+        (np.eye(4, 3), [[0, 1, -1]], "does not exist"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]], [[0, 1, 2]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.inf]], [[0, 1, 2]], "not finite"),
+        (np.eye(4, 3), [[0, 1, 2]], "at least four"),
+    ],
+)
+def test_arrays_that_bound_no_body(points: object, faces: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        surface_from_arrays(np.array(points), np.array(faces, dtype=int))
+
+
+def test_a_flat_surface_is_refused(cube: tuple[FloatArray, IntArray]) -> None:
+    points, faces = cube
+    for height in (0.0, 1e-12):
+        with pytest.raises(InputError, match="flat"):
+            surface_from_arrays(points * [1.0, 1.0, height], faces)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("none.stl", None, "does not exist"),
+        ("empty.stl", b"", "is empty"),
+        ("prose.stl", b"It was a dark and stormy night; the rain fell in torrents.\n" * 9, "triangle"),
+        ("prose.obj", b"It was a dark and stormy night.\n", "triangle"),
+        ("prose.ply", b"It was a dark and stormy night.\n", "PLY mesh"),
+        ("points.ply", b"", "no triangles"),
+        ("figure.docx", b"PK", "not read"),
+        ("cut.glb", b"glTF\x02\x00\x00\x00", "GLB mesh"),
+        ("cut.3mf", b"PK\x03\x04", "3MF mesh"),
+    ],
+)
+def test_files_that_are_no_surface(name: str, content: bytes | None, message: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if name == "points.ply":
+        content = _exported(trimesh.PointCloud(np.eye(3)), "ply")  # type: ignore[arg-type]
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=message) as caught:
+        read_surface(path)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_a_scale_and_a_unit_are_checked(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="is a folder"):
+        read_surface(tmp_path)
+    with pytest.raises(InputError, match="scale is -1"):
+        read_surface(tmp_path / "a.stl", scale=-1.0)
+    with pytest.raises(InputError, match='unit "furlong"'):
+        sphere(1.0, unit="furlong")
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sphere(0.0), "radius is 0"),
+        (lambda: sphere(1.0, subdivisions=9), "subdivisions is 9"),
+        (lambda: box((1.0, -1.0, 1.0)), "size along y"),
+        (lambda: slab(1.0, float("nan")), "depth is nan"),
+        (lambda: cylinder(1.0, 1.0, segments=3), "segments is 3"),
+        (lambda: torus(1.0, 2.0), "minor is 2"),
+        (lambda: torus(2.0, 1.0, segments=3), "segments is 3"),
+    ],
+)
+def test_shapes_refuse_impossible_lengths(make: object, message: str) -> None:
+    assert callable(make)
+    with pytest.raises(InputError, match=message):
+        make()
