@@ -91,7 +91,9 @@ def _merged(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Fl
         np.round((points - points.min(axis=0)) / cell), axis=0, return_index=True, return_inverse=True
     )
     if len(first) < len(points):
-        repairs.append(f"merged {len(points) - len(first)} vertices that coincide with another.")
+        # Formats that give every triangle vertices of its own are no flaw of the surface.
+        if len(points) != 3 * len(faces):
+            repairs.append(f"merged {len(points) - len(first)} vertices that coincide with another.")
         points, faces = points[first], inverse.reshape(-1)[faces]
 
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])

@@ -92,6 +92,7 @@ def test_duplicates_and_collapsed_triangles_go(cube: tuple[FloatArray, IntArray]
     assert len(surface.points) == 8
     assert len(surface.faces) == 12
     assert [r.split()[0] for r in surface.repairs] == ["merged", "removed", "removed"]
+    assert surface_from_arrays(soup_points, soup_faces).repairs == ()
 
 
 @pytest.mark.parametrize("missing", [[7], [7, 800, 801]])

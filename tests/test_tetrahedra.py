@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.meshing import InputError, RunError, Surface, TetMesh, box, mesher, refine, tetrahedralize
+from tetlux.meshing import InputError, RunError, Surface, TetMesh, box, mesher, refine, sphere, tetrahedralize
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.files import read_mesh, write_mesh
 
@@ -34,10 +34,10 @@ def test_boundary_triangles_face_outward(ball_mesh: TetMesh) -> None:
 
 
 def test_edge_length_makes_finer_meshes() -> None:
-    cube = box((1.0, 1.0, 1.0))
-    coarse = tetrahedralize(cube, edge_length=0.5)
-    fine = tetrahedralize(cube, edge_length=0.2)
-    assert len(fine.tetrahedra) > 4 * len(coarse.tetrahedra)
+    small = sphere(1.0, subdivisions=2)
+    coarse = tetrahedralize(small, edge_length=0.6)
+    fine = tetrahedralize(small, edge_length=0.15)
+    assert len(fine.tetrahedra) > 3 * len(coarse.tetrahedra)
 
 
 def test_refinement_brings_the_boundary_back_to_the_surface(ball: Surface, ball_mesh: TetMesh) -> None:
@@ -66,7 +66,7 @@ def test_quality_is_one_for_a_regular_tetrahedron_and_small_for_a_sliver() -> No
     regular = np.array([[1.0, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]])
     assert TetMesh(regular, np.array([[0, 1, 2, 3]])).quality == pytest.approx([1.0])
     flat = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0.01], [0, 1, 0]])
-    assert TetMesh(flat, np.array([[0, 1, 2, 3]])).quality[0] < 0.05
+    assert TetMesh(flat, np.array([[0, 1, 3, 2]])).quality[0] < 0.05
 
 
 def test_points_are_found_and_interpolated(ball_mesh: TetMesh) -> None:
@@ -141,7 +141,7 @@ def test_the_mesher_leaves_nothing_in_the_working_directory(tmp_path: Path, monk
 def test_a_mesh_that_is_not_the_body_is_refused(monkeypatch: pytest.MonkeyPatch, ball: Surface) -> None:
     cube = block((2, 2, 2), (1.0, 1.0, 1.0))
     monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (cube.points, cube.tetrahedra))
-    with pytest.raises(RunError, match="volume is .* off the surface's"):
+    with pytest.raises(RunError, match=r"volume is .* off the surface's"):
         tetrahedralize(ball)
 
 
@@ -153,6 +153,7 @@ def test_the_mesher_refuses_what_it_would_ignore(name: str, ball: Surface) -> No
 
 def test_importing_meshing_is_light() -> None:
     """What reads no file and draws no picture must not wait for the libraries that do."""
-    code = "import sys, tetlux.meshing; print([m for m in ('pyvista', 'trimesh', 'pytetwild', 'meshio') if m in sys.modules])"
+    heavy = ("pyvista", "trimesh", "pytetwild", "meshio")
+    code = f"import sys, tetlux.meshing; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

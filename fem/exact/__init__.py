@@ -1,0 +1,9 @@
+"""Closed forms to hold the solver against, one module for each body.
+
+Every function takes a `Medium` and returns what unit power, or unit irradiance, gives. Exitance is
+``M = phi/(2A)``, W/unit², unless the function says otherwise.
+"""
+
+from tetlux.fem.exact import cylinder, dipole, half_space, slab, slab_plane, sphere, sphere_light
+
+__all__ = ["cylinder", "dipole", "half_space", "slab", "slab_plane", "sphere", "sphere_light"]

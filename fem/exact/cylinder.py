@@ -1,0 +1,285 @@
+"""An infinite cylinder along z in the diffusion approximation, with the exact (Robin) boundary.
+
+The axis is the z axis; sources lie at the angle 0. Every function returns what unit power gives, or unit
+power for each unit of length of a line. Exitance is ``M = phi/(2A)``. With ``k = sigma_tr``, radius a,
+``beta = zb/a``, ``rho_m(r) = I_m(kappa r)/I_m(kappa a)`` and the logarithmic derivatives u, v of
+`bessel.WallRates` at ``kappa a``, a point source at radius r0 gives
+
+    M = 1/(2 pi² a) ∫0..inf dq cos(q z) sum_m e_m cos(m theta) rho_m(r0)/(1 + beta u_m),   kappa² = k² + q²
+
+with ``e_0 = 1``, else 2: the Fourier transform of ``e^{-k d}/d`` along z, and the addition theorem of K_0
+(Watson 1944, 11.3). A line parallel to the axis is its order q = 0.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from scipy import special
+
+from tetlux.fem.exact import checks
+from tetlux.fem.exact.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.quadrature import CUTOFF, composite_rule
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+
+HALF = 0.0  # the order of I_m is m itself
+LINE_ORDERS = 400_000
+POINT_TERMS = 200_000_000
+CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
+
+
+def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta: npt.ArrayLike) -> FloatArray:
+    """Give the exitance of a cylinder that holds a line source parallel to its axis.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of; ``sigma_a = 0`` is allowed.
+    radius : float
+        Radius of the cylinder, unit.
+    source_radius : float
+        Distance of the line from the axis, from 0 to less than `radius`, unit.
+    theta : (...) array_like
+        Angle at the axis between the line and the point of the surface, radians.
+
+    Returns
+    -------
+    (...) ndarray
+        ``M = phi/(2A)`` for 1 W/unit, W/unit², to about 1e-13 of the largest value.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, or the line not inside or less than 1e-4 of the radius below the surface.
+    """
+    a, t = _source(radius, source_radius)
+    angle = checks.numbers("theta", theta)
+    x = np.array([medium.sigma_tr * a])
+    order = _line_order(float(x[0]), t)
+    growth = wall_rates(order, x, HALF).growth[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    series = _multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
+    return (_cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
+
+
+def line_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
+    """Fluence inside a cylinder of a line source of 1 W/unit at x = source_radius, y = 0.
+
+    The line's field without a boundary, ``K_0(k d)/(2 pi D)``, and the wall's answer as a series.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of.
+    radius, source_radius : float
+        Radius of the cylinder, distance of the line from the axis, unit.
+    points : (n, 3) array_like
+        Where to evaluate, in the cylinder or on its surface, unit; z does not matter.
+
+    Returns
+    -------
+    (n,) ndarray
+        W/unit², to about 1e-13 of the largest value on the surface; infinite on the line.
+
+    Raises
+    ------
+    InputError
+        As `line_exitance`, or if a point is outside.
+    """
+    a, t = _source(radius, source_radius)
+    fraction, theta, distance, _ = _places(points, a, t)
+    x = medium.sigma_tr * a
+    order = _line_order(x, t)
+    weight = _wall_answer(medium.extrapolation_length / a, np.array([x]), order)
+    if x == 0.0:
+        # Order 0 has its logarithm in the free field: K_0(x d) + order 0 -> log(1/d) + beta.
+        weight[0] = medium.extrapolation_length / a
+    weight *= inner_ratios(order, x, np.array([t]), HALF)
+    with np.errstate(divide="ignore"):
+        field = -np.log(distance) if x == 0.0 else special.k0(x * distance)
+    chunk = max(1, CHUNK // (order + 1))
+    for start in range(0, fraction.size, chunk):
+        part = slice(start, start + chunk)
+        series = weight * inner_ratios(order, x, fraction[part], HALF)
+        field[part] += _cosine_sum(series, theta[part])
+    return np.asarray(field / (2.0 * math.pi * medium.diffusion))
+
+
+def line_total(medium: Medium, *, radius: float, source_radius: float) -> float:
+    """Power that leaves the cylinder, of 1 W from a point or from a unit of a line.
+
+    ``I_0(k r0)/[I_0(k a) + zb k I_1(k a)]``. The rest is absorbed. Parameters and errors are those of
+    `line_exitance`.
+    """
+    a, t = _source(radius, source_radius)
+    x = np.array([medium.sigma_tr * a])
+    growth = wall_rates(0, x, HALF).growth[0, 0]
+    ratio = inner_ratios(0, x, np.array([t]), HALF)[0, 0]
+    return float(ratio / (1.0 + medium.extrapolation_length / a * growth))
+
+
+def point_exitance(
+    medium: Medium, *, radius: float, source_radius: float, theta: npt.ArrayLike, z: npt.ArrayLike
+) -> FloatArray:
+    """Give the exitance of a cylinder that holds an isotropic point source of unit power at z = 0.
+
+    The integral over q is a sum with equal steps: that is the field of a row of sources so far apart that
+    they do not see each other, and converges exponentially.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of; ``sigma_a = 0`` is allowed.
+    radius : float
+        Radius of the cylinder, unit.
+    source_radius : float
+        Distance of the source from the axis, from 0 to less than `radius`, unit.
+    theta, z : (...) array_like
+        Angle at the axis from the source, radians, and distance along the axis, unit; of shapes that
+        broadcast.
+
+    Returns
+    -------
+    (...) ndarray
+        ``M = phi/(2A)``, W/unit², to about 1e-13 of the largest value.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, or the source not inside or so close below the surface, about 1/500
+        of the radius, that the sum gets too long.
+    """
+    a, t = _source(radius, source_radius)
+    angle, height = np.broadcast_arrays(checks.numbers("theta", theta), checks.numbers("z", z))
+    angles, heights = angle.ravel(), height.ravel()
+    k, beta = medium.sigma_tr, medium.extrapolation_length / a
+    order = _line_order(k * a, t)
+    # The slowest decay along z: a lower bound of the first root of ``beta y J_1(y) = J_0(y)``.
+    slowest = math.hypot(k, math.sqrt(4.0 / (1.0 + 2.0 * beta)) / a)
+    period = 2.0 * float(np.max(np.abs(heights), initial=0.0)) + CUTOFF / slowest
+    step = 2.0 * math.pi / period
+    count = int(_reach(k, a, t) / step) + 2
+    if order * count > POINT_TERMS:
+        raise InputError(
+            f"source_radius is {source_radius:g} and z goes to {np.max(np.abs(heights)):g}, which needs too long "
+            "a sum; use half_space for a source close below the surface, and a smaller z."
+        )
+    waves = np.cos(np.outer(angles, np.arange(order + 1))) * _multiplicity(order)
+    total = np.zeros(angles.size)
+    chunk = max(1, CHUNK // (order + 1))
+    for start in range(0, count, chunk):
+        q = step * np.arange(start, min(start + chunk, count))
+        x = a * np.hypot(k, q)
+        growth = wall_rates(order, x, HALF).growth
+        ratio = inner_ratios(order, x, np.full(x.shape, t), HALF)
+        along = np.cos(np.outer(heights, q)) * np.where(q == 0.0, 0.5 * step, step)
+        total += np.sum(waves @ (ratio / (1.0 + beta * growth)) * along, axis=1)
+    return np.asarray(total / (2.0 * math.pi**2 * a)).reshape(angle.shape)
+
+
+def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
+    """Fluence inside a cylinder of an isotropic point source of unit power at (source_radius, 0, 0).
+
+    The source's field without a boundary, and the wall's answer as an integral and a series.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of.
+    radius, source_radius : float
+        Radius of the cylinder, distance of the source from the axis, unit.
+    points : (n, 3) array_like
+        Where to evaluate, in the cylinder or on its surface, unit. Each takes a table of its own: slow for
+        many points.
+
+    Returns
+    -------
+    (n,) ndarray
+        W/unit², to about 1e-12 of the largest value on the surface; infinite at the source.
+
+    Raises
+    ------
+    InputError
+        As `point_exitance`, or if a point is outside.
+    """
+    a, t = _source(radius, source_radius)
+    fraction, theta, distance, z = _places(points, a, t)
+    x = medium.sigma_tr * a
+    order = _line_order(x, t)
+    reach = _reach(medium.sigma_tr, a, t) * a
+    # Panels shrink towards q = 0, where order 0 is a logarithm, and resolve the oscillation along z.
+    panels = max(8, int(np.max(np.abs(z), initial=0.0) * reach / 8.0) + 1)
+    first = reach / panels
+    edges = np.concatenate([[0.0], first * 2.0 ** np.arange(-36, 0, dtype=float), first * np.arange(1, panels + 1)])
+    q, weights = composite_rule(edges, 12)
+    if order * q.size > CHUNK * 10:
+        raise InputError(
+            f"source_radius is {source_radius:g}, too close below the surface of the cylinder for its series; "
+            "use half_space for a source as close as that."
+        )
+    wall = np.hypot(x, q)
+    answer = _wall_answer(medium.extrapolation_length / a, wall, order)
+    answer *= inner_ratios(order, wall, np.full(wall.shape, t), HALF)
+    with np.errstate(divide="ignore"):
+        total = np.exp(-x * np.hypot(distance, z)) / np.hypot(distance, z)
+    for i in range(total.size):
+        series = answer * inner_ratios(order, wall, np.full(wall.shape, fraction[i]), HALF)
+        around = np.cos(np.arange(order + 1) * theta[i]) @ series
+        total[i] += 2.0 / math.pi * float((weights * np.cos(q * z[i])) @ around)
+    return np.asarray(total / (4.0 * math.pi * medium.diffusion * a))
+
+
+def _source(radius: float, source_radius: float) -> tuple[float, float]:
+    """Check the source; return the radius, and the source's as a fraction of it."""
+    a = checks.positive("radius", radius)
+    return a, checks.within("source_radius", source_radius, -1e-300, a, "cylinder") / a
+
+
+def _line_order(x: float, t: float) -> int:
+    """Order at which the series may end, if it ends."""
+    order = order_needed(x, t, HALF, CUTOFF)
+    if order > LINE_ORDERS:
+        raise InputError(
+            f"the source is {1.0 - t:.1g} of the radius below the surface of the cylinder, too close for its "
+            "series; use half_space for a source as close as that."
+        )
+    return order
+
+
+def _reach(k: float, a: float, t: float) -> float:
+    """Largest q that counts, 1/unit: ``e^{-(kappa - k)(a - r0)}`` is the cutoff's there."""
+    rest = CUTOFF / (a * (1.0 - t))
+    return math.sqrt(rest * (rest + 2.0 * k))
+
+
+def _places(points: npt.ArrayLike, a: float, t: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Distance from the axis, angle, distance from the source's line, z; lengths in radii."""
+    where = checks.points(points) / a
+    fraction = checks.numbers("|(x, y)|/radius of points", np.hypot(where[:, 0], where[:, 1]), high=1.0 + 1e-12)
+    theta = np.arctan2(where[:, 1], where[:, 0])
+    return np.minimum(fraction, 1.0), theta, np.hypot(where[:, 0] - t, where[:, 1]), where[:, 2]
+
+
+def _multiplicity(order: int) -> FloatArray:
+    """``e_m``: 1 for order 0, else 2."""
+    return np.asarray(np.where(np.arange(order + 1) == 0, 1.0, 2.0))
+
+
+def _wall_answer(beta: float, x: FloatArray, order: int) -> FloatArray:
+    """``e_m (beta v - 1)/[(1 + beta u)(u + v)]``, of shape (order + 1, len(x))."""
+    rates = wall_rates(order, x, HALF)
+    u, v = rates.growth, rates.decay
+    with np.errstate(divide="ignore"):  # order 0 at x = 0
+        return np.asarray(_multiplicity(order)[:, None] * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v)))
+
+
+def _cosine_sum(series: FloatArray, theta: FloatArray) -> FloatArray:
+    """``sum_m c_m cos(m theta)``; coefficients (orders, 1) for all angles, or (orders, n)."""
+    total = np.zeros_like(theta)
+    chunk = max(1, CHUNK // max(theta.size, 1))
+    for start in range(0, len(series), chunk):
+        m = np.arange(start, min(start + chunk, len(series)))
+        total += np.sum(series[m] * np.cos(np.outer(m, theta)), axis=0)
+    return total

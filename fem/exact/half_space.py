@@ -1,0 +1,193 @@
+"""The half-space z >= 0 in the diffusion approximation, with the exact (Robin) boundary.
+
+The medium fills z >= 0, so z is depth and the surface's outward normal is -z. Every function returns what
+unit power, or unit irradiance, gives. Exitance is ``M = phi/(2A)`` in W/unit².
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.fem.exact import checks
+from tetlux.fem.exact.beam import Source, beam_source
+from tetlux.fem.exact.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+
+
+def point_fluence(medium: Medium, *, depth: float, points: npt.ArrayLike) -> FloatArray:
+    """Fluence of an isotropic point source of unit power at (0, 0, depth).
+
+    With ``r1`` and ``r2`` the distances from the source and from its mirror image above the surface,
+
+        4 pi D phi = e^{-k r1}/r1 - e^{-k r2}/r2 + 2 ∫0..inf e^{-l/zb} w (1 + k R) e^{-k R}/R³ dl
+
+    with ``w = z + depth + l`` and ``R² = rho² + w²``: the classic mirror source and sink line (Bryan 1890;
+    Carslaw and Jaeger 1959, section 14.9), after one integration by parts, which leaves no cancellation.
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space; ``sigma_a = 0`` is allowed.
+    depth : float
+        Depth of the source, greater than 0, unit.
+    points : (n, 3) array_like
+        Where to evaluate, z >= 0, unit.
+
+    Returns
+    -------
+    (n,) ndarray
+        Fluence, W/unit², to about 1e-12 of itself; infinite at the source.
+
+    Raises
+    ------
+    InputError
+        If the source or a point is outside.
+    """
+    z0 = checks.positive("depth", depth)
+    x = checks.points(points)
+    rho = np.hypot(x[:, 0], x[:, 1])
+    z = checks.numbers("the z of points", x[:, 2], low=0.0)
+    k = medium.sigma_tr
+    r1 = np.hypot(rho, z - z0)
+    r2 = np.hypot(rho, z + z0)
+    with np.errstate(divide="ignore"):
+        direct = np.exp(-k * r1) / r1
+    mirrored = direct - np.exp(-k * r2) / r2
+    return (mirrored + 2.0 * sink_line(k, medium.extrapolation_length, rho, z + z0)) / (
+        4.0 * math.pi * medium.diffusion
+    )
+
+
+def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> FloatArray:
+    """Give the exitance above an isotropic point source of unit power.
+
+    `point_fluence` at z = 0, over 2A.
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space.
+    depth : float
+        Depth of the source, greater than 0, unit.
+    rho : (...) array_like
+        Distance on the surface from the point above the source, unit.
+
+    Returns
+    -------
+    (...) ndarray
+        ``M = phi/(2A)``, W/unit², to about 1e-12 of itself.
+
+    Raises
+    ------
+    InputError
+        If the source is outside, or a distance negative.
+    """
+    z0 = checks.positive("depth", depth)
+    distance = checks.numbers("rho", rho, low=0.0)
+    line = sink_line(medium.sigma_tr, medium.extrapolation_length, distance.ravel(), np.full(distance.size, z0))
+    return (line / (2.0 * math.pi * medium.extrapolation_length)).reshape(distance.shape)
+
+
+def point_total(medium: Medium, *, depth: float) -> float:
+    """Power that leaves through the surface, ``e^{-k z0}/(1 + k zb)``; the rest of 1 W is absorbed.
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space.
+    depth : float
+        Depth of the source, greater than 0, unit.
+
+    Raises
+    ------
+    InputError
+        If the source is outside.
+    """
+    z0 = checks.positive("depth", depth)
+    k = medium.sigma_tr
+    return float(np.exp(-k * z0) / (1.0 + k * medium.extrapolation_length))
+
+
+def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "delta-eddington") -> FloatArray:
+    """Give the exitance around a pencil beam without width that enters at the origin along z.
+
+    `point_exitance` integrated along the beam; both integrals, along the beam and along the sink line, meet
+    in one over their common height ``w``. Near the entry M grows like log(1/rho), and falls below zero like
+    -1/rho where the source has a first moment: a beam without width is singular there.
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space.
+    rho : (...) array_like
+        Distance on the surface from the entry, greater than 0, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    (...) ndarray
+        ``M = phi/(2A)`` for unit power that has entered, W/unit², to about 1e-12 of its singular part.
+
+    Raises
+    ------
+    InputError
+        If a distance is not positive.
+    """
+    distance = checks.numbers("rho", rho, low=np.finfo(float).tiny)
+    beam = beam_source(medium, source)
+    sink = 1.0 / medium.extrapolation_length
+    reach = CUTOFF / min(beam.extinction, sink)
+    nodes, weights = graded_rule()
+    w = reach * nodes[:, None]
+    density = beam.volume * two_decays(w, beam.extinction, sink) - beam.forward * np.exp(-sink * w)
+
+    def integral(part: FloatArray) -> FloatArray:
+        return np.asarray((reach * weights) @ (density * mirror_flux(medium.sigma_tr, part, w)))
+
+    return (sink / (2.0 * math.pi) * in_chunks(integral, distance.ravel())).reshape(distance.shape)
+
+
+def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float:
+    """Power that comes back from a pencil beam; also the diffuse reflectance of a wide beam.
+
+    ``(q0 - k q1)/[(sigma + k)(1 + k zb)]`` with the densities of `beam.BeamSource`. For ``"similarity"`` it is
+    ``alpha'/[(1 + q)(1 + 2 A q/3)]``, ``q = sqrt(3 (1 - alpha'))``.
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered, between 0 and 1.
+    """
+    beam = beam_source(medium, source)
+    k = medium.sigma_tr
+    escape = (beam.isotropic - k * beam.forward) / (beam.extinction + k)
+    return escape / (1.0 + k * medium.extrapolation_length)
+
+
+def sink_line(k: float, zb: float, rho: FloatArray, height: FloatArray) -> FloatArray:
+    """``∫0..inf e^{-l/zb} w (1 + k R) e^{-k R}/R³ dl`` with ``w = height + l``; 0 at ``zb = 0``."""
+    if zb == 0.0:
+        return np.zeros_like(rho)
+    nodes, weights = graded_rule()
+    l = CUTOFF * zb * nodes[:, None]  # noqa: E741
+
+    def integral(part: FloatArray, above: FloatArray) -> FloatArray:
+        return np.asarray((CUTOFF * zb * weights) @ (np.exp(-l / zb) * mirror_flux(k, part, above + l)))
+
+    return in_chunks(integral, rho, height)
+
+
+def mirror_flux(k: float, rho: FloatArray, w: FloatArray) -> FloatArray:
+    """``-d/dw e^{-k R}/R = w (1 + k R) e^{-k R}/R³``."""
+    distance = np.hypot(rho, w)
+    return np.asarray(w * (1.0 + k * distance) * np.exp(-k * distance) / distance**3)

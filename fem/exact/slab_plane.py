@@ -1,0 +1,100 @@
+"""The slab 0 <= z <= L in one dimension: what a wide collimated beam along z gives back and lets through."""
+
+import numpy as np
+
+from tetlux.fem.exact import checks
+from tetlux.fem.exact.beam import Source, beam_source
+from tetlux.fem.exact.quadrature import CUTOFF, composite_rule
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+
+
+def escape_front(medium: Medium, thickness: float, depth: FloatArray) -> FloatArray:
+    """Share of the power of a source at `depth` that leaves through z = 0, the other share not being lost.
+
+    ``[sinh k(L - z) + zb k cosh k(L - z)]/[(1 + zb² k²) sinh k L + 2 zb k cosh k L]``, the solution of
+    ``D phi'' = sigma_a phi - delta`` with Robin boundaries, written so that it neither overflows nor fails at k = 0.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness : float
+        L, unit.
+    depth : (...) ndarray
+        From 0 to L, unit.
+
+    Returns
+    -------
+    (...) ndarray
+    """
+    k, zb = medium.sigma_tr, medium.extrapolation_length
+    rest = thickness - depth
+    above = _scaled_sinh(k, rest) + zb * _scaled_cosh(k, rest)
+    whole = (1.0 + (zb * k) ** 2) * _scaled_sinh(k, np.asarray(thickness)) + 2.0 * zb * _scaled_cosh(
+        k, np.asarray(thickness)
+    )
+    return np.asarray(np.exp(-k * depth) * above / whole)
+
+
+def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
+    """Diffuse reflectance of a slab in a wide beam that enters at z = 0, both faces Robin.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness : float
+        L, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered. What of the beam reaches the far face leaves there, unreflected.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive.
+    """
+    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=False)
+
+
+def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
+    """Diffuse transmittance of a slab in a wide beam; the ballistic share is not part of it.
+
+    Parameters, result and errors are those of `beam_reflectance`; `ballistic_transmittance` is the rest.
+    """
+    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=True)
+
+
+def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
+    """Share of the beam that crosses the slab without scattering, in the sense of `source`: ``e^{-sigma L}``."""
+    beam = beam_source(medium, source)
+    return float(np.exp(-beam.extinction * checks.positive("thickness", thickness)))
+
+
+def _beam_exit(medium: Medium, thickness: float, source: Source, *, far: bool) -> float:
+    """Integrate the escape over the beam: ``∫ e^{-sigma z}(q0 f + q1 f') dz``, f' by parts."""
+    beam = beam_source(medium, source)
+    reach = min(thickness, CUTOFF / beam.extinction)
+    z, weights = composite_rule(np.linspace(0.0, reach, 9), 16)
+
+    def escape(depth: FloatArray) -> FloatArray:
+        return escape_front(medium, thickness, thickness - depth if far else depth)
+
+    inside = beam.volume * float((weights * np.exp(-beam.extinction * z)) @ escape(z))
+    ends = escape(np.array([0.0, thickness]))
+    return inside + beam.forward * float(np.exp(-beam.extinction * thickness) * ends[1] - ends[0])
+
+
+def _scaled_sinh(k: float, length: FloatArray) -> FloatArray:
+    """``e^{-k l} sinh(k l)/k``, l at k = 0."""
+    return np.asarray(length if k == 0.0 else -np.expm1(-2.0 * k * length) / (2.0 * k))
+
+
+def _scaled_cosh(k: float, length: FloatArray) -> FloatArray:
+    """``e^{-k l} cosh(k l)``."""
+    return np.asarray(0.5 * (1.0 + np.exp(-2.0 * k * length)))

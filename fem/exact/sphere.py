@@ -1,0 +1,196 @@
+"""A ball in the diffusion approximation, with the exact (Robin) boundary.
+
+The ball is centred at the origin. Every function returns what unit power, or unit irradiance, gives.
+Exitance is ``M = phi/(2A)`` in W/unit². With ``k = sigma_tr``, radius a, ``beta = zb/a``, and the
+logarithmic derivatives u and v of `bessel.WallRates` at k a, a point source at radius r0 gives
+
+    M = 1/(4 pi a²) sum_l (2l + 1) P_l(cos gamma) rho_l(r0)/(1 + beta u_l),   rho_l(r) = i_l(k r)/i_l(k a)
+
+which follows from the expansion of ``e^{-k d}/d`` (DLMF 10.60.3) and the boundary ``phi + zb dphi/dr = 0``.
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.fem.exact import checks
+from tetlux.fem.exact.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.legendre import legendre_sum
+from tetlux.fem.exact.quadrature import CUTOFF, graded_rule
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+
+HALF = 0.5  # i_l is I_{l + 1/2} but for a power of its argument
+DIRECT_ORDERS = 20_000
+POINT_ORDERS = 400_000
+CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
+
+
+def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma: npt.ArrayLike) -> FloatArray:
+    """Give the exitance of a ball that holds an isotropic point source of unit power.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of; ``sigma_a = 0`` is allowed.
+    radius : float
+        Radius of the ball, unit.
+    source_radius : float
+        Distance of the source from the centre, from 0 to less than `radius`, unit.
+    gamma : (...) array_like
+        Angle at the centre between the source and the point of the surface, radians.
+
+    Returns
+    -------
+    (...) ndarray
+        ``M = phi/(2A)``, W/unit². The error is about 1e-13 of the largest value on the surface, so where M
+        is smaller than that it is rounding noise; for a source less than 1/500 of the radius below the
+        surface, the error grows to about 1e-9 of the largest value.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, the source not inside, or an angle not finite.
+    """
+    a = checks.positive("radius", radius)
+    angle = checks.numbers("gamma", gamma)
+    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
+    flat = angle.ravel()
+    order = order_needed(medium.sigma_tr * a, t, HALF, CUTOFF)
+    sums = _direct(medium, a, t, flat, order) if order <= DIRECT_ORDERS else _split(medium, a, t, flat, order)
+    return np.asarray(sums / (4.0 * math.pi * a**2)).reshape(angle.shape)
+
+
+def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
+    """Fluence inside a ball of an isotropic point source of unit power at (0, 0, source_radius).
+
+    The source's field without a boundary in closed form, and the wall's answer as a series,
+
+        4 pi D a phi = a e^{-k d}/d + sum_l (2l+1) P_l rho_l(r0) rho_l(r) (beta v_l - 1)/[(1 + beta u_l)(u_l + v_l)]
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius of the ball, unit.
+    source_radius : float
+        Distance of the source from the centre, unit.
+    points : (n, 3) array_like
+        Where to evaluate, in the ball or on its surface, unit.
+
+    Returns
+    -------
+    (n,) ndarray
+        Fluence, W/unit², to about 1e-13 of the largest value on the surface; infinite at the source.
+
+    Raises
+    ------
+    InputError
+        If the source or a point is outside, or the source is less than 1e-4 of the radius below the surface.
+    """
+    a = checks.positive("radius", radius)
+    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
+    where = checks.points(points) / a
+    # A point computed to lie on the surface may miss it by rounding.
+    fraction = np.minimum(checks.numbers("|points|/radius", np.linalg.norm(where, axis=1), high=1 + 1e-12), 1.0)
+    x = medium.sigma_tr * a
+    order = order_needed(x, t, HALF, CUTOFF)
+    if order > POINT_ORDERS:
+        raise InputError(
+            f"source_radius is {source_radius:g}, too close below the surface of the ball for its series; "
+            "use half_space for a source as close as that."
+        )
+    distance = np.linalg.norm(where - [0.0, 0.0, t], axis=1)
+    gamma = np.arctan2(np.hypot(where[:, 0], where[:, 1]), where[:, 2])
+    with np.errstate(divide="ignore"):
+        free = np.exp(-x * distance) / distance
+    rates = wall_rates(order, np.array([x]), HALF)
+    u, v = rates.growth, rates.decay
+    beta = medium.extrapolation_length / a
+    weight = (2.0 * np.arange(order + 1)[:, None] + 1.0) * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v))
+    weight *= inner_ratios(order, x, np.array([t]), HALF)
+    chunk = max(1, CHUNK // order)
+    for start in range(0, fraction.size, chunk):
+        part = slice(start, start + chunk)
+        free[part] += legendre_sum(weight * inner_ratios(order, x, fraction[part], HALF), gamma[part])
+    return np.asarray(free / (4.0 * math.pi * medium.diffusion * a))
+
+
+def point_total(medium: Medium, *, radius: float, source_radius: float) -> float:
+    """Power that leaves a ball with an isotropic point source of unit power.
+
+    Order 0 of the series: ``i_0(k r0)/[i_0(k a) + zb k i_0'(k a)]``. The rest is absorbed.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius, source_radius : float
+        Radius of the ball, distance of the source from its centre, unit.
+
+    Returns
+    -------
+    float
+        Between 0 and 1, W.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive or the source not inside.
+    """
+    a = checks.positive("radius", radius)
+    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
+    x = np.array([medium.sigma_tr * a])
+    ratio = inner_ratios(0, x, np.array([t]), HALF)[0, 0]
+    growth = wall_rates(0, x, HALF).growth[0, 0]
+    return float(ratio / (1.0 + medium.extrapolation_length / a * growth))
+
+
+def _direct(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
+    """``4 pi a² M`` by the series as it stands."""
+    x = np.array([medium.sigma_tr * a])
+    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    growth = wall_rates(order, x, HALF).growth[:, 0]
+    beta = medium.extrapolation_length / a
+    return legendre_sum((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth), gamma)
+
+
+def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
+    """``4 pi a² M`` for a source close below the surface: singular part, and a series that converges.
+
+    The singular part is twice the source's field without a boundary, and the sum of the series at k = 0
+    without that; what is left falls like l^-3.
+    """
+    x = np.array([medium.sigma_tr * a])
+    order = min(order, int(max(4000, 40.0 * x[0])))
+    l = np.arange(order + 1)  # noqa: E741
+    beta = medium.extrapolation_length / a
+    distance = chord(np.asarray(1.0 - t), gamma)
+    image = 2.0 / beta * np.exp(-x * distance) / distance
+    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    residual = (2.0 * l + 1.0) * ratio * residual_weight(order, x, beta)
+    residual -= (1.0 - 2.0 / beta) * t**l / (1.0 + beta * l)
+    return image + (1.0 - 2.0 / beta) * _static_sum(t, beta, gamma) + legendre_sum(residual, gamma)
+
+
+def residual_weight(order: int, x: FloatArray, beta: float) -> FloatArray:
+    """``1/(1 + beta u) - (2/beta)/(u + v)`` without the cancellation."""
+    rates = wall_rates(order, x, HALF)
+    u, v = rates.growth[:, 0], rates.decay[:, 0]
+    return np.asarray((beta * (v - u) - 2.0) / (beta * (1.0 + beta * u) * (u + v)))
+
+
+def _static_sum(t: float, beta: float, gamma: FloatArray) -> FloatArray:
+    """``sum_l t^l P_l(cos gamma)/(1 + beta l)``: as images, with ``1/(1 + beta l) = ∫ e^{-s} e^{-beta l s} ds``."""
+    nodes, weights = graded_rule()
+    s = CUTOFF * nodes[:, None]
+    missing = -np.expm1(-beta * s) * t + (1.0 - t)
+    return np.asarray((CUTOFF * weights) @ (np.exp(-s) / chord(missing, gamma)))
+
+
+def chord(missing: FloatArray, gamma: FloatArray) -> FloatArray:
+    """Distance from the surface of the unit ball to a point at the radius ``1 - missing``, at the angle gamma."""
+    return np.asarray(np.hypot(missing, 2.0 * np.sqrt(1.0 - missing) * np.sin(0.5 * gamma)))

@@ -1,0 +1,156 @@
+"""Where lights put their power, and that nothing of it is lost on the way to the nodes."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import TISSUE, block
+from tetlux.fem import Deposit, Medium, PencilBeam, PointSource
+from tetlux.fem.fresnel import reflectance
+from tetlux.fem.loads import load_vector
+from tetlux.meshing import InputError, Surface, TetMesh, slab
+
+FORWARD = Medium(sigma_a=0.05, sigma_s=10.0, g=0.9, eta=1.4)
+
+
+def total(deposit: Deposit) -> float:
+    """What a deposit accounts for, but for what it leaves to be scattered along segments."""
+    return deposit.specular + deposit.absorbed + deposit.ballistic + float(deposit.powers.sum())
+
+
+def test_a_point_source_keeps_its_power(ball: Surface, ball_mesh: TetMesh) -> None:
+    deposit = PointSource((1.0, 2.0, 3.0), power=2.5).deposit_in(ball, TISSUE)
+    assert (deposit.incident, total(deposit)) == (2.5, 2.5)
+    load = load_vector(ball_mesh, TISSUE, deposit)
+    assert load.sum() == pytest.approx(2.5, rel=1e-14)
+    # Linear functions see the source where it is.
+    assert load @ ball_mesh.points == pytest.approx([2.5, 5.0, 7.5])
+
+
+def test_a_pencil_beam_at_right_angles_puts_one_point_a_mean_free_path_deep() -> None:
+    plate = slab(60.0, 10.0)
+    deposit = PencilBeam((1.0, 2.0, 5.0), (0.0, 0.0, -2.0), power=3.0).deposit_in(plate, TISSUE)
+    assert deposit.points == pytest.approx(np.array([[1.0, 2.0, -TISSUE.mean_free_path]]))
+    assert deposit.specular == pytest.approx(3 * (0.4 / 2.4) ** 2)
+    assert deposit.powers[0] == pytest.approx(TISSUE.albedo * (3 - deposit.specular))
+    assert total(deposit) == pytest.approx(3.0)
+
+
+def test_a_slanting_beam_refracts() -> None:
+    angle = math.radians(50)
+    direction = (math.sin(angle), 0.0, -math.cos(angle))
+    deposit = PencilBeam((-5 * direction[0], 0.0, 5 * math.cos(angle)), direction).deposit_in(slab(60.0, 10.0), TISSUE)
+    inside = math.asin(math.sin(angle) / 1.4)
+    expected = TISSUE.mean_free_path * np.array([[math.sin(inside), 0, -math.cos(inside)]])
+    assert deposit.points == pytest.approx(expected, abs=1e-9)
+    assert deposit.specular == pytest.approx(float(reflectance(math.cos(angle), 1 / 1.4)))
+
+
+def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -> None:
+    thin = slab(20.0, 0.5)
+    beam = PencilBeam((0.1, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
+    deposit = beam.deposit_in(thin, FORWARD)
+    extinction = 0.05 + 10 * (1 - 0.81)
+    lost = (0.4 / 2.4) ** 2
+    through = (1 - lost) * math.exp(-extinction * 0.5)
+    # The part that the far face reflects comes back once and again.
+    passes = through * (1 - lost) / (1 - lost**2 * math.exp(-2 * extinction * 0.5))
+    back = passes * lost * math.exp(-extinction * 0.5)
+    assert deposit.specular == pytest.approx(lost)
+    assert deposit.ballistic == pytest.approx(passes + back, rel=1e-9)
+    scattered = (1 - lost - deposit.ballistic) * 1.9 / 1.95
+    assert deposit.absorbed == pytest.approx((1 - lost - deposit.ballistic) * 0.05 / 1.95, rel=1e-9)
+    assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-12)
+    assert load_vector(block((8, 8, 2), (20.0, 20.0, 0.5)), FORWARD, deposit).sum() == pytest.approx(scattered)
+
+
+@pytest.mark.parametrize("counts", [(1, 1, 1), (2, 2, 3), (3, 5, 7)])
+def test_a_line_is_integrated_exactly_on_any_mesh(counts: tuple[int, int, int]) -> None:
+    """A P1 mesh reproduces linear functions, so ``∫ Q0 z + (1/sigma_t') ∫ Q1 . grad z`` has a closed form on it."""
+    depth, flux = 4.0, 2.0
+    deposit = Deposit(
+        incident=flux,
+        # Down an edge that many tetrahedra share: each stretch must count once.
+        starts=np.zeros((1, 3)),
+        directions=np.array([[0.0, 0.0, -1.0]]),
+        lengths=np.array([depth]),
+        fluxes=np.array([flux]),
+    )
+    mesh = block(counts, (6.0, 6.0, depth))
+    load = load_vector(mesh, FORWARD, deposit)
+    scattering, cosine = FORWARD.delta_eddington
+    mu = FORWARD.sigma_a + scattering
+    decay = math.exp(-mu * depth)
+    q0 = flux * scattering / mu * (1 - decay)
+    q0_z = -flux * scattering * (1 - (1 + mu * depth) * decay) / mu**2
+    q1_z = -cosine * q0 / FORWARD.sigma_t_prime
+    assert load.sum() == pytest.approx(q0, rel=1e-12)
+    assert load @ mesh.points[:, 2] == pytest.approx(q0_z + q1_z, rel=1e-10)
+    assert load @ mesh.points[:, :2] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_a_slanting_line_is_integrated_exactly() -> None:
+    direction = np.array([[0.6, 0.0, -0.8]])
+    deposit = Deposit(
+        incident=1.0,
+        starts=np.array([[-1.0, 0.3, 0.0]]),
+        directions=direction,
+        lengths=np.array([5.0]),
+        fluxes=np.array([1.0]),
+    )
+    mesh = block((5, 4, 6), (12.0, 12.0, 4.0))
+    load = load_vector(mesh, TISSUE, deposit)
+    mu = TISSUE.sigma_t_prime
+    decay = math.exp(-mu * 5)
+    power = TISSUE.albedo * (1 - decay)
+    mean = TISSUE.albedo * (1 - (1 + mu * 5) * decay) / mu
+    assert load.sum() == pytest.approx(power, rel=1e-12)
+    assert load @ mesh.points == pytest.approx(power * deposit.starts[0] + mean * direction[0], rel=1e-10)
+
+
+def test_a_beam_with_a_radius_is_spread_evenly_over_its_disc() -> None:
+    deposit = PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(slab(60.0, 10.0), TISSUE)
+    distance = np.linalg.norm(deposit.points[:, :2], axis=1)
+    assert distance.max() < 2.0
+    # Over a disc the mean square distance from the middle is half the radius squared.
+    assert (distance**2).mean() == pytest.approx(2.0, rel=1e-9)
+    assert deposit.points[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=0.05)
+    assert total(deposit) == pytest.approx(1.0)
+
+
+def test_what_misses_is_not_incident() -> None:
+    deposit = PencilBeam((30.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(slab(60.0, 10.0), TISSUE)
+    assert deposit.incident == pytest.approx(0.5, abs=0.05)
+    assert "misses the body" in deposit.warnings[0]
+
+
+def test_warnings_of_deposits() -> None:
+    plate, thin = slab(60.0, 10.0), slab(60.0, 0.5)
+    beam = PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0))
+    assert beam.deposit_in(plate, TISSUE).warnings == ()
+    assert "singular" in replace(beam, deposit="line").deposit_in(plate, TISSUE).warnings[0]
+    assert "less than two mean free paths" in beam.deposit_in(thin, TISSUE).warnings[0]
+    assert thin.contains(beam.deposit_in(thin, TISSUE).points)[0]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: PointSource((0.0, 0.0, 11.0)), r"point source at \(0, 0, 11\) lies outside"),
+        (lambda: PencilBeam((0.0, 20.0, 20.0), (0.0, 0.0, -1.0)), "misses the body, which spans x -10"),
+        (lambda: PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, 1.0)), "misses"),
+        (lambda: PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0)), "starts inside"),
+        (lambda: PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, 0.0)), "direction is zero"),
+        (lambda: PencilBeam((0.0, 0.0, math.nan), (0.0, 0.0, 1.0)), "origin is"),
+        (lambda: PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), power=0.0), "power is 0"),
+        (lambda: PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=-1.0), "radius is -1"),
+        (lambda: PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="dot"), 'deposit is "dot"'),  # type: ignore[arg-type]
+        (lambda: PointSource((0.0, 0.0, 1.0), power=math.inf), "power is inf"),
+    ],
+)
+def test_lights_that_cannot_be(make: object, message: str, ball: Surface) -> None:
+    assert callable(make)
+    with pytest.raises(InputError, match=message):
+        make().deposit_in(ball, TISSUE)

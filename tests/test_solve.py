@@ -1,0 +1,192 @@
+"""The solver held against closed forms and conservation of power."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+
+from tests.conftest import TISSUE, block
+from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
+from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.forms import node_volumes, system_matrix
+from tetlux.fem.linear import MultigridSolver
+from tetlux.meshing import InputError, RunError, Surface, TetMesh, slab, sphere
+
+
+def exitance_error(solution: Solution, depth: float = TISSUE.mean_free_path) -> float:
+    """Relative L2 error of the exitance on the ball, source `depth` below the pole."""
+    points = solution.mesh.boundary_points
+    gamma = np.arccos(np.clip(points[:, 2] / np.linalg.norm(points, axis=1), -1, 1))
+    truth = exact_sphere.point_exitance(solution.medium, radius=10.0, source_radius=10.0 - depth, gamma=gamma)
+    weights = solution.mesh.boundary_node_areas
+    return math.sqrt((weights @ (solution.exitance - truth) ** 2) / (weights @ truth**2))
+
+
+def test_sphere_against_its_series_with_default_settings(ball_solution: Solution) -> None:
+    # Five runs: 0.0107 to 0.0118, with 24,000 tetrahedra.
+    assert exitance_error(ball_solution) < 0.02
+    assert ball_solution.power.exited == pytest.approx(0.79094984, rel=0.005)
+    # The estimate was 1.3 to 1.7 times the error.
+    assert 0.5 < ball_solution.error_estimate / exitance_error(ball_solution) < 3
+    assert ball_solution.error_estimate <= 0.02
+    assert ball_solution.warnings == []
+
+
+def test_values_at_points(ball_solution: Solution) -> None:
+    gamma = np.radians([30.0, 60, 90, 180])
+    points = 12.0 * np.column_stack([np.sin(gamma), 0 * gamma, np.cos(gamma)])
+    truth = [1.724342e-3, 2.759599e-4, 8.764252e-5, 2.427934e-5]
+    assert ball_solution.exitance_at(points) == pytest.approx(truth, rel=0.06)
+    inside = ball_solution.fluence_at(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 10.5]]))
+    assert inside[0] > 0
+    assert math.isnan(inside[1])
+
+
+def test_the_ledger_closes(ball_solution: Solution) -> None:
+    power = ball_solution.power
+    assert abs(power.balance_error) < 1e-9
+    assert power.absorbed + power.exited == pytest.approx(1.0, abs=1e-9)
+    mesh = ball_solution.mesh
+    assert mesh.boundary_node_areas @ ball_solution.exitance == pytest.approx(power.exited, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_a_smaller_tolerance_is_met(ball: Surface) -> None:
+    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 10.0 - TISSUE.mean_free_path))], tolerance=0.01)
+    # Three runs: 0.0050 to 0.0054.
+    assert exitance_error(solution) < 0.01
+    assert 0.5 < solution.error_estimate / exitance_error(solution) < 3
+
+
+def test_a_tolerance_that_cannot_be_met_is_said(ball: Surface) -> None:
+    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 9.0))], tolerance=0.001, most_tetrahedra=15_000)
+    assert solution.error_estimate > 0.001
+    assert "tolerance of 0.001 was not met" in solution.warnings[-1]
+
+
+def test_exitance_converges_at_second_order_on_a_plate() -> None:
+    """An eigenfunction of the box: cosines that meet the Robin condition on all six faces."""
+    medium = Medium(sigma_a=0.3, sigma_s_prime=1.2, eta=1.3)
+    half, zb = 2.0, medium.extrapolation_length
+    # k tan(k L) = 1/zb on both ends of each axis
+    low, high = 0.0, math.pi / 2 / half
+    for _ in range(80):
+        k = 0.5 * (low + high)
+        low, high = (k, high) if k * math.tan(k * half) < 1 / zb else (low, k)
+    rate = 3 * k**2 * medium.diffusion + medium.sigma_a
+    errors = []
+    for count in (4, 8, 16):
+        mesh = block((count, count, count), (2 * half, 2 * half, 2 * half))
+        points = mesh.points + [0, 0, half]
+        truth = np.cos(k * points).prod(axis=1)
+        fluence = MultigridSolver(system_matrix(mesh, medium)).solve(node_volumes(mesh) * rate * truth)
+        weights, nodes = mesh.boundary_node_areas, mesh.boundary_nodes
+        gap = (fluence - truth)[nodes]
+        errors.append(math.sqrt(weights @ gap**2 / (weights @ truth[nodes] ** 2)))
+    rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert (rates > 1.8).all()
+    assert errors[-1] < 0.01
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_a_constant_fluence_is_absorbed_and_exits_as_its_integrals_say(mass: str) -> None:
+    """With phi = 1 the form is the volume times sigma_a plus the area over 2A, whatever the mesh."""
+    mesh = block((3, 2, 2), (3.0, 2.0, 2.0))
+    ones = np.ones(len(mesh.points))
+    value = ones @ system_matrix(mesh, TISSUE, mass) @ ones  # type: ignore[arg-type]
+    assert value == pytest.approx(0.01 * 12 + 32 / (2 * TISSUE.boundary_factor), rel=1e-12)
+
+
+def test_lumping_keeps_the_fluence_positive_where_consistent_mass_does_not() -> None:
+    dark = Medium(sigma_a=5.0, sigma_s_prime=5.0, eta=1.4)
+    mesh = block((6, 6, 6), (6.0, 6.0, 6.0))
+    source = [PointSource((0.1, 0.2, -3.1))]
+    lumped = solve(mesh, dark, source).fluence
+    consistent = solve(mesh, dark, source, mass="consistent").fluence
+    assert lumped.min() > -1e-12 * lumped.max()
+    assert consistent.min() < -1e-3 * consistent.max()
+
+
+def test_a_given_mesh_is_used_as_it_is(ball: Surface, ball_mesh: TetMesh) -> None:
+    source = [PointSource((0.0, 0.0, 5.0))]
+    alone = solve(ball_mesh, TISSUE, source)
+    beside = solve(ball, TISSUE, source, mesh=ball_mesh)
+    assert alone.mesh is ball_mesh
+    assert beside.mesh is ball_mesh
+    assert (alone.fluence == beside.fluence).all()
+    assert math.isnan(alone.error_estimate)
+
+
+def test_lights_add_up(ball_mesh: TetMesh) -> None:
+    one, two = PointSource((0.0, 0.0, 5.0)), PencilBeam((20.0, 0.0, 0.0), (-1.0, 0.0, 0.0), power=2.0)
+    both = solve(ball_mesh, TISSUE, [one, two])
+    apart = [solve(ball_mesh, TISSUE, [light]) for light in (one, two)]
+    assert both.fluence == pytest.approx(apart[0].fluence + apart[1].fluence, rel=1e-8)
+    assert both.power.incident == 3.0
+    assert abs(both.power.balance_error) < 1e-9
+
+
+@pytest.mark.parametrize("deposit", ["point", "line"])
+def test_a_pencil_beam_on_a_ball_against_monte_carlo(deposit: str, ball: Surface) -> None:
+    """Radius 10, sigma_a .01, sigma_s 5, g .8, eta 1.4: 0.7648 of the power comes out, by Monte Carlo.
+
+    Diffusion itself gives 0.7614 with a point and 0.7651 with a line.
+    """
+    medium = Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4)
+    beam = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit=deposit)  # type: ignore[arg-type]
+    solution = solve(ball, medium, [beam], tolerance=0.05, most_tetrahedra=60_000)
+    expected = {"point": 0.7614, "line": 0.7651}[deposit]
+    assert solution.power.exited == pytest.approx(expected, rel=0.004)
+    assert solution.power.specular == pytest.approx(0.0277778, rel=0.01)
+    assert abs(solution.power.balance_error) < 1e-9
+
+
+def test_the_solver_refuses_what_it_did_not_solve() -> None:
+    # Without its diagonal's rank the system has no solution for this load.
+    singular = csr_array(diags_array([np.append(np.ones(700), 0.0)], offsets=[0]))
+    with pytest.raises(RunError, match="relative residual"):
+        MultigridSolver(singular).solve(np.ones(701))
+
+
+def test_the_solver_leaves_the_random_state_alone(ball_mesh: TetMesh) -> None:
+    np.random.seed(3)  # noqa: NPY002
+    expected = np.random.random()  # noqa: NPY002
+    np.random.seed(3)  # noqa: NPY002
+    MultigridSolver(system_matrix(ball_mesh, TISSUE))
+    assert np.random.random() == expected  # noqa: NPY002
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_lengths_have_no_scale_of_their_own(scale: float, ball_mesh: TetMesh) -> None:
+    """Lengths times s and coefficients over s make exitances over s²."""
+    beam = [PointSource((0.0, 0.0, 5.0))]
+    scaled_beam = [PointSource((0.0, 0.0, 5.0 * scale))]
+    plain = solve(ball_mesh, TISSUE, beam)
+    mesh = TetMesh(ball_mesh.points * scale, ball_mesh.tetrahedra)
+    scaled = solve(mesh, Medium(sigma_a=0.01 / scale, sigma_s_prime=1.0 / scale, eta=1.4), scaled_beam)
+    assert scaled.exitance * scale**2 == pytest.approx(plain.exitance, rel=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("radius", "message"), [(0.01, "absurdly small for diffusion; check the unit"), (1e5, "absurdly large")]
+)
+def test_bodies_of_another_unit_are_refused(radius: float, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        solve(sphere(radius), TISSUE, [PointSource((0.0, 0.0, 0.0))])
+
+
+def test_limits_of_diffusion_are_said(ball_mesh: TetMesh) -> None:
+    source = [PointSource((0.0, 0.0, 0.0))]
+    assert solve(ball_mesh, TISSUE, source).warnings == []
+    dark = solve(ball_mesh, Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4), source)
+    assert "reduced albedo is 0.667" in dark.warnings[0]
+    thin = solve(slab(60.0, 1.0), TISSUE, [PointSource((0.0, 0.0, -0.5))], tolerance=0.3)
+    assert any("mean free paths thick on average" in w for w in thin.warnings)
+
+
+def test_requests_that_make_no_sense(ball: Surface) -> None:
+    with pytest.raises(InputError, match="no light"):
+        solve(ball, TISSUE, [])
+    with pytest.raises(InputError, match="tolerance is 0"):
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, 0.0))], tolerance=0.0)
