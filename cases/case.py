@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ class Case:
     lights : tuple of Light
     tolerance : float
     outputs : tuple of str
+    reading_seconds : float
+        Spent on reading and checking the surface.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Case:
     lights: tuple[Light, ...]
     tolerance: float
     outputs: tuple[str, ...]
+    reading_seconds: float = 0.0
 
 
 def library_folder() -> Path:
@@ -150,8 +154,10 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
         raise located(("medium", *_named_first(str(error), spec.medium.model_dump())), error) from error
     try:
         label = spec.surface.model_dump_json() + spec.unit
+        started = time.perf_counter()
         if label not in surfaces:
             surfaces[label] = _surface(spec.surface, spec.unit, document.path.parent)
+        reading_seconds = time.perf_counter() - started
         surface = surfaces[label]
         check_size(surface, medium)
     except InputError as error:
@@ -165,13 +171,14 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
             raise located(("lights", index), error) from error
         lights.append(light)
     return Case(
-        name,
-        document.path,
-        surface,
-        medium,
-        tuple(lights),
-        spec.tolerance,
-        tuple(dict.fromkeys(spec.outputs)),
+        name=name,
+        source=document.path,
+        surface=surface,
+        medium=medium,
+        lights=tuple(lights),
+        tolerance=spec.tolerance,
+        outputs=tuple(dict.fromkeys(spec.outputs)),
+        reading_seconds=reading_seconds,
     )
 
 

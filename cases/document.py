@@ -79,8 +79,8 @@ def read_document(path: Path) -> Document:
         raise InputError(f"{path} is not UTF-8 text; save it as UTF-8.") from error
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from error
-    loader = _Loader(text)
     try:
+        loader = _Loader(text)
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
             raise InputError(f"{path} is {'empty' if node is None else 'not a mapping'}; give keys and values.")
@@ -96,8 +96,6 @@ def read_document(path: Path) -> Document:
             raise
         first = (str(error).splitlines() or ["no reason given"])[0]
         raise InputError(f"{path}: not valid YAML: {first}.") from error
-    finally:
-        loader.dispose()
     return Document(path, data, lines)
 
 

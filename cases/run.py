@@ -84,7 +84,8 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> None
         )
         warnings += draw(scene, folder / FILES["picture"])
     now = time.perf_counter()
-    seconds = {**solution.seconds, "write": now - writing, "total": now - started}
+    seconds = {**solution.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
+    seconds["surface"] += case.reading_seconds
     summary = json.dumps(summarize(case, solution, seconds, warnings), indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
 

@@ -28,6 +28,7 @@ def test_every_format_reads_back_the_same_body(suffix: str, tmp_path: Path) -> N
 
 def _exported(mesh: trimesh.Trimesh, kind: str) -> bytes:
     data = mesh.export(file_type=kind)
+    assert isinstance(data, str | bytes)
     return data.encode() if isinstance(data, str) else data
 
 

@@ -148,7 +148,7 @@ def test_a_mesh_that_is_not_the_body_is_refused(monkeypatch: pytest.MonkeyPatch,
 @pytest.mark.parametrize("name", ["edge_length", "epsilon", "time_limit"])
 def test_the_mesher_refuses_what_it_would_ignore(name: str, ball: Surface) -> None:
     with pytest.raises(InputError, match=f"{name} is -1"):
-        tetrahedralize(ball, **{name: -1.0})  # type: ignore[arg-type]
+        tetrahedralize(ball, **{name: -1.0})
 
 
 def test_importing_meshing_is_light() -> None:

@@ -1,0 +1,62 @@
+"""The package as it is installed."""
+
+import subprocess
+import sys
+import tomllib
+from importlib.metadata import files, version
+from pathlib import Path
+
+import pytest
+
+from tetlux.cases.cli import main
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_every_folder_of_code_is_in_the_package() -> None:
+    """A subpackage that is not listed runs from a checkout and is missing from the wheel."""
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    found = {
+        f"tetlux.{'.'.join(path.parent.relative_to(ROOT).parts)}"
+        for top in ("meshing", "fem", "cases")
+        for path in (ROOT / top).rglob("*.py")
+    }
+    assert found == set(listed)
+
+
+def test_the_types_and_the_cases_ship() -> None:
+    installed = {str(f) for f in files("tetlux") or []}
+    if not any("cases" in f for f in installed):
+        pytest.skip("an editable install lists no files")
+    assert {f"tetlux/{name}/py.typed" for name in ("meshing", "fem", "cases")} <= installed
+    assert {"tetlux/cases/library/hare.stl", "tetlux/cases/library/sphere.yaml"} <= installed
+
+
+def test_dependencies_run_one_way() -> None:
+    """cases -> fem -> meshing."""
+    for folder, forbidden in (("meshing", ("tetlux.fem", "tetlux.cases")), ("fem", ("tetlux.cases",))):
+        for path in (ROOT / folder).rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            assert not any(f"import {name}" in text or f"from {name}" in text for name in forbidden), path
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["--version"])
+    assert stop.value.code == 0
+    assert capsys.readouterr().out == f"tetlux {version('tetlux')}\n"
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "sphere", "--fast"]])
+def test_a_wrong_command_line_ends_with_two(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(arguments)
+    assert stop.value.code == 2
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tetlux.cases", "check", "sphere"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("sphere: right; 5,120 triangles")

@@ -1,0 +1,183 @@
+"""Runs: what they write, whole or not at all."""
+
+import json
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from tetlux.cases import picture, run
+from tetlux.cases.case import Case, find_case_file, load_cases
+from tetlux.cases.cli import main
+from tetlux.cases.run import run_case
+from tetlux.fem.exact import slab
+from tetlux.fem.solve import solve
+from tetlux.meshing import RunError
+from tetlux.meshing.files import read_mesh
+
+QUICK = """\
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights:
+  - pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 2.0}
+tolerance: 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of one finished run, in a folder with a space in its name."""
+    folder = tmp_path_factory.mktemp("a run")
+    (folder / "ball.yaml").write_text(QUICK)
+    assert main(["run", str(folder / "ball.yaml"), "--out", str(folder / "the results")]) == 0
+    return folder / "the results" / "ball"
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Case:
+    (tmp_path / "ball.yaml").write_text(QUICK)
+    return load_cases(tmp_path / "ball.yaml")[0]
+
+
+def test_a_run_writes_its_files_and_no_others(finished: Path) -> None:
+    assert sorted(p.name for p in finished.iterdir()) == ["picture.png", "summary.json", "surface.ply", "volume.vtu"]
+
+
+def test_the_summary_holds_what_it_promises(finished: Path) -> None:
+    summary = json.loads((finished / "summary.json").read_text())
+    assert {k: summary[k] for k in ("case", "unit", "model", "tolerance")} == {
+        "case": "ball", "unit": "mm", "model": "fem", "tolerance": 0.1,
+    }  # fmt: skip
+    assert set(summary["mesh"]) == {"nodes", "tetrahedra", "volume", "area", "surface_deviation", "min_quality"}
+    assert summary["mesh"]["volume"] == pytest.approx(4 / 3 * np.pi * 1000, rel=0.02)
+    assert 0 < summary["mesh"]["surface_deviation"] < 0.15
+    (channel,) = summary["channels"]
+    assert channel["name"] == "all"
+    assert channel["sigma_tr"] == pytest.approx(0.174069, rel=1e-5)
+    assert channel["albedo"] == pytest.approx(1 / 1.01)
+    power = channel["power"]
+    assert power["incident"] == 2.0
+    assert abs(power["balance_error"]) < 1e-9
+    # 2 W, less the specular share, times the reduced albedo, times the series' total.
+    expected = 2 * (1 - (0.4 / 2.4) ** 2) / 1.01 * 0.79095
+    assert power["exited"] == pytest.approx(expected, rel=0.01)
+    assert channel["exitance"]["mean"] * summary["mesh"]["area"] == pytest.approx(power["exited"], rel=1e-9)
+    assert 0 < channel["exitance"]["min"] < channel["exitance"]["mean"] < channel["exitance"]["max"]
+    assert channel["fluence"]["max"] > 2 * 2.948 * channel["exitance"]["max"]
+    assert 0 < channel["error_estimate"] <= 0.1
+    assert set(summary["seconds"]) == {"surface", "mesh", "assemble", "solve", "write", "total"}
+    assert summary["warnings"] == []
+    assert summary["versions"]["tetlux"]
+
+
+def test_the_surface_and_volume_files_hold_the_solution(finished: Path) -> None:
+    summary = json.loads((finished / "summary.json").read_text())
+    surface = meshio.read(finished / "surface.ply")
+    exitance = surface.point_data["exitance"]
+    assert exitance.max() == pytest.approx(summary["channels"][0]["exitance"]["max"])
+    assert surface.points[exitance.argmax()] == pytest.approx([0, 0, 10], abs=0.5)
+    volume = meshio.read(finished / "volume.vtu")
+    assert volume.point_data["fluence"].max() == pytest.approx(summary["channels"][0]["fluence"]["max"])
+    assert len(read_mesh(finished / "volume.vtu").tetrahedra) == summary["mesh"]["tetrahedra"]
+
+
+def test_progress_is_printed_for_each_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "ball.yaml").write_text(QUICK + "outputs: []\n")
+    assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "[1/1] ball"
+    for word in ("tetrahedralized", "solved on", "estimated error", "written to"):
+        assert any(word in line for line in lines)
+    assert [p.name for p in (tmp_path / "out" / "ball").iterdir()] == ["summary.json"]
+
+
+def test_a_run_replaces_the_files_of_an_earlier_one(case: Case, tmp_path: Path) -> None:
+    target = tmp_path / "out" / "ball"
+    target.mkdir(parents=True)
+    for name in ("picture.png", "volume.vtu", "summary.json"):
+        (target / name).write_text("old")
+    (target / "notes.txt").write_text("mine")
+    run_case(replace(case, outputs=("surface",)), tmp_path / "out")
+    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply"]
+
+
+def test_a_fault_while_writing_leaves_no_half_result(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(run, "write_mesh", full)
+    with pytest.raises(RunError, match="No space left on device; choose another folder"):
+        run_case(case, tmp_path / "out")
+    assert list((tmp_path / "out" / "ball").iterdir()) == []
+
+
+def test_a_failing_case_does_not_stop_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(surface: object, *rest: object, **options: object) -> object:
+        if surface.name == "box":  # type: ignore[attr-defined]
+            raise RunError("the mesher failed.")
+        return solve(surface, *rest, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(run, "solve", failing)
+    (tmp_path / "a.yaml").write_text(QUICK.replace("sphere: {radius: 10}", "box: {size: [9, 9, 9]}"))
+    (tmp_path / "b.yaml").write_text(QUICK + "outputs: [surface]\n")
+    assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(tmp_path / "out")]) == 1
+    printed = capsys.readouterr()
+    assert "a failed: the mesher failed." in printed.err
+    assert "1 of 2 cases failed" in printed.err
+    assert (tmp_path / "out" / "b" / "summary.json").exists()
+    assert not (tmp_path / "out" / "a").exists()
+
+
+def test_a_working_directory_without_write_permission_is_enough(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    locked = tmp_path / "locked"
+    locked.mkdir()
+    locked.chmod(0o555)
+    monkeypatch.chdir(locked)
+    run_case(replace(case, outputs=()), tmp_path / "out")
+    assert list(locked.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs file permissions")
+def test_an_output_folder_that_cannot_be_made(case: Case, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(RunError, match="results cannot be written to"):
+        run_case(replace(case, outputs=()), tmp_path / "file")
+
+
+def test_a_machine_without_rendering_still_gets_its_picture(
+    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(picture, "RENDERER", (sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"))
+    folder = run_case(replace(case, outputs=("picture",)), tmp_path)
+    assert (folder / "picture.png").stat().st_size > 20_000
+    summary = json.loads((folder / "summary.json").read_text())
+    assert "apt-get install" in summary["warnings"][-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["slab", "torus", "hare"])
+def test_the_cases_that_ship_run(name: str, tmp_path: Path) -> None:
+    (case,) = load_cases(find_case_file(name))
+    folder = run_case(replace(case, outputs=()), tmp_path)
+    summary = json.loads((folder / "summary.json").read_text())
+    (channel,) = summary["channels"]
+    assert abs(channel["power"]["balance_error"]) < 1e-9
+    assert channel["error_estimate"] <= 0.02
+    assert summary["warnings"] == []
+    if name == "slab":
+        thickness, depth = 10.0, case.medium.mean_free_path
+        front = slab.point_total(case.medium, thickness=thickness, depth=depth)
+        back = slab.point_total(case.medium, thickness=thickness, depth=depth, face="back")
+        scattered = case.medium.albedo * (1 - channel["power"]["specular"])
+        # The plate ends 30 mm from the beam, five decay lengths: its rim takes less than 0.1 %.
+        assert channel["power"]["exited"] == pytest.approx(scattered * (front + back), rel=0.004)
