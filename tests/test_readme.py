@@ -1,0 +1,55 @@
+"""The README's own code."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tetlux.cases.case import load_cases
+from tetlux.cases.schema import CaseSpec
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_the_python_lines_run_and_say_what_they_promise() -> None:
+    (code,) = blocks("python")
+    names: dict[str, Any] = {}
+    exec(code, names)
+    solution = names["solution"]
+    assert solution.exitance.shape == solution.mesh.boundary_nodes.shape
+    # The series at 90 degrees, times the share of the power that is scattered.
+    share = (1 - (0.4 / 2.4) ** 2) / 1.01
+    assert solution.exitance_at([[0, 10, 0]])[0] == pytest.approx(8.764252e-5 * share, rel=0.03)
+    assert solution.fluence_at([[0, 0, 5]])[0] > 0
+    assert solution.error_estimate <= 0.02
+    assert names["same"].mesh is names["mesh"]
+    assert np.isnan(names["same"].error_estimate)
+
+
+def test_the_case_file_is_right(tmp_path: Path) -> None:
+    (text,) = blocks("yaml")
+    (tmp_path / "plate.yaml").write_text(text)
+    assert [case.name for case in load_cases(tmp_path / "plate.yaml")] == [
+        f"plate/medium.sigma_a={value}" for value in (0.001, 0.01, 0.1)
+    ]
+
+
+def test_every_key_of_the_case_file_is_explained() -> None:
+    keys = set(re.findall(r"`([a-z_.\[\]]+)`", README))
+    for name in CaseSpec.model_fields:
+        assert any(key == name or key.startswith((f"{name}.", f"{name}[")) for key in keys), name
+    for section, prefix in (("SurfaceSpec", "surface."), ("MediumSpec", "medium."), ("PencilSpec", "lights[].pencil.")):
+        for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
+            assert f"{prefix}{name}" in keys, f"{prefix}{name}"
+
+
+def test_the_two_commands_are_there() -> None:
+    install, check = blocks("sh")
+    assert install.strip().endswith("tetlux run hare")
+    assert check.strip().endswith("python -m pytest")
