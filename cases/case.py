@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.schema import CaseSpec, LightSpec, SurfaceSpec
-from tetlux.fem.lights import Light, PencilBeam, PointSource
+from tetlux.fem.lights import DiffuseLight, Light, PencilBeam, PointSource
 from tetlux.fem.medium import Medium
 from tetlux.fem.validity import check_size
 from tetlux.meshing import shapes
@@ -207,5 +207,7 @@ def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:
 def _light(spec: LightSpec) -> Light:
     if spec.pencil:
         return PencilBeam(**spec.pencil.model_dump())
-    assert spec.point is not None
-    return PointSource(**spec.point.model_dump())
+    if spec.point:
+        return PointSource(**spec.point.model_dump())
+    assert spec.diffuse is not None
+    return DiffuseLight(**spec.diffuse.model_dump())

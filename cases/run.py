@@ -7,15 +7,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from tetlux.cases.case import Case
 from tetlux.cases.picture import Ray, Scene, draw
 from tetlux.cases.summary import summarize
 from tetlux.fem.lights import PencilBeam, PointSource
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
-from tetlux.meshing.arrays import Vector
+from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.files import write_mesh, write_surface
 from tetlux.meshing.surface import Surface
@@ -80,7 +78,7 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> None
             exitance=solution.exitance,
             unit=mesh.unit,
             title=case.name,
-            lights=tuple(_ray(light, case.surface) for light in case.lights),
+            lights=tuple(ray for light in case.lights for ray in _rays(light, case.surface)),
         )
         warnings += draw(scene, folder / FILES["picture"])
     now = time.perf_counter()
@@ -101,16 +99,17 @@ def _move(folder: Path, target: Path) -> None:
     shutil.move(folder / SUMMARY, target / SUMMARY)
 
 
-def _ray(light: object, surface: Surface) -> Ray:
-    """Where a picture draws a light."""
+def _rays(light: object, surface: Surface) -> tuple[Ray, ...]:
+    """How a picture draws a light; diffuse light comes from everywhere and is not drawn."""
     if isinstance(light, PencilBeam):
         end = light.entry(surface)
         start = end - 0.3 * surface.diagonal * light.rays()[1]
-        return Ray(_vector(start), _vector(end))
-    assert isinstance(light, PointSource)
-    return Ray(light.position, light.position)
+        return (Ray(_vector(start), _vector(end)),)
+    if isinstance(light, PointSource):
+        return (Ray(light.position, light.position),)
+    return ()
 
 
-def _vector(point: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Vector:
+def _vector(point: FloatArray) -> Vector:
     x, y, z = point.tolist()
     return x, y, z

@@ -142,11 +142,18 @@ class PointSpec(Section):
     power: Number = Field(1.0, description="W")
 
 
+class DiffuseSpec(Section):
+    """Diffuse light from all around, as `tetlux.fem.DiffuseLight`."""
+
+    irradiance: Number = Field(description="W/unit²")
+
+
 class LightSpec(Choice):
     """One light."""
 
     pencil: PencilSpec | None = None
     point: PointSpec | None = None
+    diffuse: DiffuseSpec | None = None
 
 
 Output = Literal["surface", "volume", "picture"]

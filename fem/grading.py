@@ -33,22 +33,31 @@ class Grading:
         Length that has to be resolved at each, unit.
     longest : float
         Upper bound of the length that edges are measured in, unit.
+    skin : float
+        Length to be resolved all over the surface, unit; infinite where no light falls on all of it.
     """
 
     sources: FloatArray
     resolution: FloatArray
     longest: float
+    skin: float = np.inf
 
     def lengths(self, mesh: TetMesh) -> FloatArray:
         """The length that light changes over in each tetrahedron, (m,), unit."""
         centroids = mesh.points[mesh.tetrahedra].mean(axis=1)
-        distance, nearest = cKDTree(self.sources).query(centroids)
-        return np.clip(distance, self.resolution[nearest], max(self.longest, float(self.resolution.min())))
+        lengths = np.full(len(centroids), self.longest)
+        if len(self.sources):
+            distance, nearest = cKDTree(self.sources).query(centroids)
+            lengths = np.minimum(lengths, np.maximum(distance, self.resolution[nearest]))
+        if self.skin < self.longest:
+            depth, _ = cKDTree(mesh.boundary_points).query(centroids)
+            lengths = np.minimum(lengths, np.maximum(depth, self.skin))
+        return lengths
 
 
 def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Grading:
     """The grading that the lights and the medium of a scene ask for."""
-    sources, resolutions = [], []
+    sources, resolutions = [np.zeros((0, 3))], [np.zeros(0)]
     extinction = medium.sigma_a + medium.delta_eddington[0]
     for deposit in deposits:
         points = [deposit.points]
@@ -60,9 +69,13 @@ def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Gr
         found = np.vstack(points)
         sources.append(found)
         resolutions.append(np.full(len(found), deposit.resolution))
-    decay = DECAY_LENGTHS / medium.sigma_tr if medium.sigma_tr > 0 else np.inf
-    longest = max(decay, COARSEST_SHARE * surface.diagonal)
-    return Grading(np.vstack(sources), np.concatenate(resolutions), longest)
+    decay = 1.0 / medium.sigma_tr if medium.sigma_tr > 0 else np.inf
+    return Grading(
+        np.vstack(sources),
+        np.concatenate(resolutions),
+        longest=max(min(DECAY_LENGTHS * decay, surface.diagonal), COARSEST_SHARE * surface.diagonal),
+        skin=2.0 * decay if any(d.irradiance for d in deposits) else np.inf,
+    )
 
 
 def graded(mesh: TetMesh, surface: Surface, grading: Grading, fineness: float, most: int) -> tuple[TetMesh, bool]:

@@ -1,7 +1,11 @@
-"""The right-hand side: what deposits put on the nodes, ``∫ Q0 v + (1/sigma_t') ∫ Q1 . grad v``."""
+"""The right-hand side: what deposits put on the nodes, ``∫ Q0 v + (1/sigma_t') ∫ Q1 . grad v``.
+
+Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside.
+"""
 
 import numpy as np
 
+from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
@@ -20,7 +24,7 @@ def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
     Returns
     -------
     (n,) ndarray
-        Sums to the scattered power that the deposit holds, W, to rounding.
+        Of points and segments, sums to the scattered power that they hold, W, to rounding.
     """
     load = np.zeros(len(mesh.points))
     if len(deposit.points):
@@ -29,6 +33,9 @@ def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
         deposit.starts, deposit.directions, deposit.lengths, deposit.fluxes, strict=True
     ):
         _add_segment(load, mesh, medium, start, direction, float(length), float(flux))
+    if deposit.transmitted_irradiance:
+        _, c2 = moments(medium.eta)
+        load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
     return load
 
 

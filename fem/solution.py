@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tetlux.fem.fresnel import moments
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tetmesh import TetMesh
@@ -52,6 +53,8 @@ class Solution:
     fluence : (n,) ndarray
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
+    transmitted_irradiance : float
+        Diffuse light that passed to the inside, W/unit².
     error_estimate : float
         Estimated relative L2 error of the exitance; nan if there was one mesh only.
     seconds : dict
@@ -63,14 +66,23 @@ class Solution:
     medium: Medium
     fluence: FloatArray
     power: Power
+    transmitted_irradiance: float = 0.0
     error_estimate: float = np.nan
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
     @cached_property
     def exitance(self) -> FloatArray:
-        """Exitance ``M = phi/(2A)`` at the boundary nodes of `mesh`, (b,), W/unit²."""
-        return self.fluence[self.mesh.boundary_nodes] / (2.0 * self.medium.boundary_factor)
+        """Exitance at the boundary nodes of `mesh`, (b,), W/unit².
+
+        ``M = phi/(2A)``; under diffuse light ``M = E_t + E.n``, where the boundary condition makes
+        ``E.n = (phi - 4 E_t/(1 - 2 C1))/(2A)``.
+        """
+        exitance = self.fluence[self.mesh.boundary_nodes] / (2.0 * self.medium.boundary_factor)
+        if self.transmitted_irradiance:
+            _, c2 = moments(self.medium.eta)
+            exitance = exitance + self.transmitted_irradiance * (1.0 - 2.0 / (1.0 + 3.0 * c2))
+        return exitance
 
     def exitance_at(self, points: FloatArray) -> FloatArray:
         """Exitance at the points of the surface nearest to given points.

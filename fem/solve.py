@@ -22,9 +22,11 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # Edges in units of the grading's length, on the first mesh.
 FIRST_FINENESS = 0.7
+# The first mesh may use this part of the tetrahedra allowed, so that a second one can tell its error.
+FIRST_SHARE = 8
 # From mesh to mesh the fineness changes by no more and no less than these factors.
 STEP_LIMITS = (0.5, 0.7)
-MOST_TETRAHEDRA = 1_500_000
+MOST_TETRAHEDRA = 1_000_000
 
 
 @dataclass
@@ -140,15 +142,17 @@ class _Problem:
             load = np.sum([load_vector(mesh, medium, d) for d in deposits], axis=0)
         with self.watch.stage("solve"):
             fluence = MultigridSolver(matrix).solve(load)
-        outflow = mesh.boundary_node_areas @ fluence[mesh.boundary_nodes] / (2.0 * medium.boundary_factor)
-        power = Power(
-            incident=sum(d.incident for d in deposits),
-            specular=sum(d.specular for d in deposits),
+        transmitted = sum(d.transmitted_irradiance for d in deposits)
+        outside = sum(d.irradiance for d in deposits) * mesh.area
+        ledger = Power(
+            incident=sum(d.incident for d in deposits) + outside,
+            specular=sum(d.specular for d in deposits) + outside - transmitted * mesh.area,
             absorbed=sum(d.absorbed for d in deposits) + medium.sigma_a * float(node_volumes(mesh) @ fluence),
-            exited=float(outflow),
+            exited=0.0,
             ballistic=sum(d.ballistic for d in deposits),
         )
-        return Solution(mesh, medium, fluence, power)
+        solution = Solution(mesh, medium, fluence, ledger, transmitted)
+        return replace(solution, power=replace(ledger, exited=float(mesh.boundary_node_areas @ solution.exitance)))
 
 
 def _refined_until(problem: _Problem, surface: Surface, tolerance: float, most: int) -> Solution:
@@ -158,7 +162,10 @@ def _refined_until(problem: _Problem, surface: Surface, tolerance: float, most: 
     with problem.watch.stage("mesh"):
         base = tetrahedralize(surface)
         problem.report(f"tetrahedralized: {len(base.tetrahedra):,} tetrahedra")
-        mesh, reached = graded(base, surface, grading, fineness, most)
+        mesh, reached = graded(base, surface, grading, fineness, most // FIRST_SHARE)
+        while not reached:
+            fineness *= 1.5
+            mesh, reached = graded(base, surface, grading, fineness, most // FIRST_SHARE)
     solution = problem.solved_on(mesh)
     problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra")
     while reached:

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Deposit, Medium, PencilBeam, PointSource
+from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, solve
+from tetlux.fem.exact import sphere_light
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.loads import load_vector
 from tetlux.meshing import InputError, Surface, TetMesh, slab
@@ -154,3 +155,24 @@ def test_lights_that_cannot_be(make: object, message: str, ball: Surface) -> Non
     assert callable(make)
     with pytest.raises(InputError, match=message):
         make().deposit_in(ball, TISSUE)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_diffuse_light_on_a_ball_against_its_closed_form(eta: float, ball: Surface) -> None:
+    medium = Medium(sigma_a=0.05, sigma_s_prime=1.0, eta=eta)
+    solution = solve(ball, medium, [DiffuseLight(3.0)], tolerance=0.01)
+    transmitted = DiffuseLight(3.0).deposit_in(ball, medium).transmitted_irradiance
+    expected = transmitted * sphere_light.diffuse_exitance(medium, radius=10.0)
+    # Three runs each: the power 0.19 to 0.32 % off, the worst node 1.5 to 1.8 %.
+    assert solution.power.exited / solution.mesh.area == pytest.approx(expected, rel=0.005)
+    assert solution.exitance == pytest.approx(expected, rel=0.03)
+    assert solution.power.incident == pytest.approx(3.0 * 4 * np.pi * 100, rel=0.01)
+    assert abs(solution.power.balance_error) < 1e-9
+    assert solution.error_estimate <= 0.01
+
+
+def test_diffuse_light_that_cannot_be(ball: Surface) -> None:
+    with pytest.raises(InputError, match="irradiance is 0"):
+        DiffuseLight(0.0)
+    with pytest.raises(InputError, match='needs the boundary "exact"'):
+        DiffuseLight(1.0).deposit_in(ball, replace(TISSUE, boundary="classic"))

@@ -25,7 +25,7 @@ class Deposit:
     Parameters
     ----------
     incident : float
-        Power that meets the body, W.
+        Power that meets the body, W; for an irradiance it follows from the mesh's area.
     specular : float
         Power that its surface reflects at once, W.
     absorbed : float
@@ -37,12 +37,14 @@ class Deposit:
     starts, directions, lengths, fluxes : (s, 3), (s, 3), (s,), (s,) ndarray
         Beam segments: start, unit direction, length, and power carried at the start, W. The power fades
         as ``exp(-sigma_t* l)``.
+    irradiance, transmitted_irradiance : float
+        Diffuse light on the outside of the whole surface, and what of it passes to the inside, W/unit².
     resolution : float
         Length near the deposit that a mesh has to resolve, unit.
     warnings : tuple of str
     """
 
-    incident: float
+    incident: float = 0.0
     specular: float = 0.0
     absorbed: float = 0.0
     ballistic: float = 0.0
@@ -52,6 +54,8 @@ class Deposit:
     directions: FloatArray = field(default_factory=_no_vectors)
     lengths: FloatArray = field(default_factory=_no_values)
     fluxes: FloatArray = field(default_factory=_no_values)
+    irradiance: float = 0.0
+    transmitted_irradiance: float = 0.0
     resolution: float = np.inf
     warnings: tuple[str, ...] = ()
 
