@@ -9,6 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.schema import CaseSpec, LightSpec, SurfaceSpec
 from tetlux.fem.lights import DiffuseLight, Light, PencilBeam, PointSource
@@ -37,6 +38,8 @@ class Case:
     outputs : tuple of str
     reading_seconds : float
         Spent on reading and checking the surface.
+    comparison : Comparison, optional
+        Closed forms to hold the run against.
     """
 
     name: str
@@ -47,6 +50,7 @@ class Case:
     tolerance: float
     outputs: tuple[str, ...]
     reading_seconds: float = 0.0
+    comparison: Comparison | None = None
 
 
 def library_folder() -> Path:
@@ -162,14 +166,18 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
         check_size(surface, medium)
     except InputError as error:
         raise located(("surface",), error) from error
-    lights = []
+    lights, deposits = [], []
     for index, light_spec in enumerate(spec.lights):
         try:
             light = _light(light_spec)
-            light.deposit_in(surface, medium)
+            deposits.append(light.deposit_in(surface, medium))
         except InputError as error:
             raise located(("lights", index), error) from error
         lights.append(light)
+    try:
+        comparison = comparison_for(spec.surface, medium, deposits, spec.compare) if spec.compare else None
+    except InputError as error:
+        raise located(("compare",), error) from error
     return Case(
         name=name,
         source=document.path,
@@ -179,6 +187,7 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         reading_seconds=reading_seconds,
+        comparison=comparison,
     )
 
 

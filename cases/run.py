@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tetlux.cases.case import Case
+from tetlux.cases.compare import as_json, compare
+from tetlux.cases.compare_picture import draw_comparison
 from tetlux.cases.picture import Ray, Scene, draw
 from tetlux.cases.summary import summarize
 from tetlux.fem.lights import PencilBeam, PointSource
@@ -20,6 +22,7 @@ from tetlux.meshing.surface import Surface
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 
 
@@ -81,17 +84,26 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> None
             lights=tuple(ray for light in case.lights for ray in _rays(light, case.surface)),
         )
         warnings += draw(scene, folder / FILES["picture"])
+    compared = None
+    if case.comparison is not None:
+        compared = compare(case.comparison, solution)
+        data, image = (folder / name for name in COMPARISON)
+        data.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
+        draw_comparison(compared, case.name, mesh.unit, image)
     now = time.perf_counter()
     seconds = {**solution.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
     seconds["surface"] += case.reading_seconds
-    summary = json.dumps(summarize(case, solution, seconds, warnings), indent=2, allow_nan=False)
+    figures = summarize(case, solution, seconds, warnings)
+    if compared is not None:
+        figures["compare"] = compared.differences
+    summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
 
 
 def _move(folder: Path, target: Path) -> None:
     """Replace an earlier run's results by this one's, never leaving a summary beside another run's files."""
     (target / SUMMARY).unlink(missing_ok=True)
-    for name in FILES.values():
+    for name in (*FILES.values(), *COMPARISON):
         if (folder / name).exists():
             (folder / name).replace(target / name)
         else:

@@ -156,6 +156,7 @@ class LightSpec(Choice):
     diffuse: DiffuseSpec | None = None
 
 
+ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture"]
 SweepValue = Annotated[int, Field(strict=True)] | Number | Annotated[str, Field(strict=True)]
 
@@ -174,6 +175,10 @@ class CaseSpec(Section):
         0.02, description="wanted relative L2 error of the exitance"
     )
     outputs: list[Output] = ["surface", "volume", "picture"]
+    compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
+        None,
+        description="closed forms to compare with: robin, images, dipole for slabs; series for spheres and cylinders",
+    )
     sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
     )

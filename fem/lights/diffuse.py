@@ -40,7 +40,7 @@ class DiffuseLight:
         del surface
         if medium.boundary != "exact":
             raise InputError(
-                'diffuse light needs the boundary "exact"; "classic" has no Fresnel moments to go with it.'
+                'diffuse light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'
             )
         # Reciprocity: from outside passes eta² times the share that passes from inside, 1 - 2 C1.
         c1, _ = moments(medium.eta)

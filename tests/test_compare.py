@@ -1,0 +1,115 @@
+"""Runs held against closed forms."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tetlux.cases.case import Case, load_cases
+from tetlux.cases.compare import compare, source_model
+from tetlux.cases.run import run_case
+from tetlux.fem import Medium, Solution, solve
+from tetlux.meshing import InputError
+
+SLAB = """\
+surface: {slab: {width: 60, depth: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights:
+  - pencil: {origin: [3, 0, 10], direction: [0, 0, -1], power: 2.0}
+tolerance: 0.1
+outputs: []
+compare: [robin, images, dipole]
+"""
+CYLINDER = """\
+surface: {cylinder: {radius: 5, height: 40, center: [1, 2, 3]}}
+medium: {sigma_a: 0.05, sigma_s_prime: 1.0, eta: 1.3}
+lights:
+  - point: {position: [4, 4, 3]}
+  - pencil: {origin: [20, 2, 5], direction: [-1, 0, 0]}
+tolerance: 0.05
+outputs: []
+compare: [series]
+"""
+
+
+def load(tmp_path: Path, text: str) -> Case:
+    (tmp_path / "body.yaml").write_text(text)
+    return load_cases(tmp_path / "body.yaml")[0]
+
+
+def test_a_slab_meets_the_robin_solution_and_not_the_dipole(tmp_path: Path) -> None:
+    folder = run_case(load(tmp_path, SLAB), tmp_path / "out")
+    assert sorted(p.name for p in folder.iterdir()) == ["compare.json", "compare.png", "summary.json"]
+    data = json.loads((folder / "compare.json").read_text())
+    differences = data["differences"]
+    # Five runs: 0.0129 to 0.0148.
+    assert differences["robin"]["l2"] < 0.02
+    assert "discretisation" in differences["robin"]["meaning"]
+    assert differences["images"]["l2"] > 0.25
+    assert differences["dipole"]["l2"] > 0.25
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["compare"]["robin"] == {k: differences["robin"][k] for k in ("l2", "largest", "at")}
+    lengths = {len(data["along"]), len(data["fem"]), *(len(v) for v in data["closed_forms"].values())}
+    assert len(lengths) == 1
+    assert (np.diff(data["along"]) >= 0).all()
+    # Near the entry, at a distance of one and of five, as the half-space has it (the slab is thick enough there).
+    scale = 2 * (1 - (0.4 / 2.4) ** 2) / 1.01
+    for distance, robin, dipole in ((1.0, 2.37356e-2, 3.0013e-2), (5.0, 1.42241e-3, 1.2099e-3)):
+        for name, value in (("robin", robin), ("dipole", dipole)):
+            drawn = np.exp(np.interp(distance, data["along"], np.log(data["closed_forms"][name])))
+            assert drawn == pytest.approx(scale * value, rel=0.04)
+    with Image.open(folder / "compare.png") as image:
+        assert image.size == (1400, 1200)
+
+
+def test_a_cylinder_meets_its_series(tmp_path: Path) -> None:
+    case = load(tmp_path, CYLINDER)
+    assert case.comparison is not None
+    solution = solve(case.surface, case.medium, case.lights, tolerance=0.05)
+    found = compare(case.comparison, solution)
+    # Five runs: 0.0092 to 0.0116.
+    assert found.differences["series"]["l2"] < 0.02
+
+
+def test_a_wrong_exitance_is_seen(ball_solution: Solution, tmp_path: Path) -> None:
+    text = SLAB.replace("slab: {width: 60, depth: 10}", "sphere: {radius: 10}").replace(
+        "robin, images, dipole", "series"
+    )
+    text = text.replace(
+        "pencil: {origin: [3, 0, 10], direction: [0, 0, -1], power: 2.0}", "point: {position: [0, 0, 9.0099]}"
+    )
+    comparison = load(tmp_path, text).comparison
+    assert comparison is not None
+    right = compare(comparison, ball_solution).differences["series"]
+    wrong = compare(comparison, replace(ball_solution, fluence=1.1 * ball_solution.fluence)).differences["series"]
+    assert right["l2"] < 0.02
+    assert wrong["l2"] == pytest.approx(0.1, abs=0.02)
+    assert wrong["largest"] > 0.1
+
+
+def test_the_source_model_is_given_a_figure() -> None:
+    assert "changes the exitance by" in source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "[robin, images, dipole]",
+            "[series]",
+            r'line 7: compare: "series" is no closed form',
+        ),
+        ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*there is none for a torus"),
+        ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms here are those of point sources"),
+        ("[robin, images, dipole]", "[guess]", r"compare\[0\]: .*'guess'"),
+    ],
+)
+def test_what_has_no_closed_form_is_refused(old: str, new: str, message: str, tmp_path: Path) -> None:
+    text = SLAB.replace(old, new)
+    if "torus" in new:
+        text = text.replace("origin: [3, 0, 10]", "origin: [9, 0, 10]")
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, text)
