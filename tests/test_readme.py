@@ -45,7 +45,13 @@ def test_every_key_of_the_case_file_is_explained() -> None:
     keys = set(re.findall(r"`([a-z_.\[\]]+)`", README))
     for name in CaseSpec.model_fields:
         assert any(key == name or key.startswith((f"{name}.", f"{name}[")) for key in keys), name
-    for section, prefix in (("SurfaceSpec", "surface."), ("MediumSpec", "medium."), ("PencilSpec", "lights[].pencil.")):
+    for section, prefix in (
+        ("SurfaceSpec", "surface."),
+        ("MediumSpec", "medium."),
+        ("PencilSpec", "lights[].pencil."),
+        ("PointSpec", "lights[].point."),
+        ("DiffuseSpec", "lights[].diffuse."),
+    ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
             assert f"{prefix}{name}" in keys, f"{prefix}{name}"
 
