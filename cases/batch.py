@@ -1,9 +1,12 @@
 """Several case files, one after the other: all are checked before the first is run."""
 
+import os
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
 
 from tetlux.cases.case import Case, find_case_file, load_cases
 from tetlux.cases.run import run_case
@@ -22,6 +25,8 @@ def load_all(requests: Sequence[str]) -> list[Case]:
     seen: dict[str, Path] = {}
     for case in cases:
         if case.name in seen:
+            if seen[case.name] == case.source:
+                raise InputError(f"{case.source} is given twice; give it once.")
             raise InputError(
                 f'{seen[case.name]} and {case.source} both make a case named "{case.name}"; give one another name.'
             )
@@ -41,14 +46,28 @@ def check_all(requests: Sequence[str]) -> int:
             continue
         surface = cases[0].surface
         runs = "" if len(cases) == 1 else f"{len(cases)} runs, "
-        print(f"{request}: right; {runs}{len(surface.faces):,} triangles, {surface.diagonal:.4g} {surface.unit} across")
+        size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
+        print(f"{request}: right; {runs}{len(surface.faces):,} triangles, {size} {surface.unit}")
         for note in (*surface.repairs, *surface.warnings):
             print(f"  {note}")
     return 2 if wrong else 0
 
 
+def check_writable(out: Path) -> None:
+    """Refuse a folder that results cannot be written to, before anything is solved for it.
+
+    Raises
+    ------
+    InputError
+    """
+    existing = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK):
+        raise InputError(f"results cannot be written to {out}; choose another folder with --out.")
+
+
 def run_all(cases: Sequence[Case], out: Path) -> int:
     """Run cases, with a line for each stage; 0 if all ran, 1 if some failed."""
+    check_writable(out)
     failed = 0
     for number, case in enumerate(cases, 1):
         print(f"[{number}/{len(cases)}] {case.name}", flush=True)

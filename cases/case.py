@@ -2,6 +2,7 @@
 
 import copy
 import itertools
+import math
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.validity import check_size
 from tetlux.meshing import shapes
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.read import read_surface
+from tetlux.meshing.read import SUFFIXES, read_surface
 from tetlux.meshing.surface import Surface
 
 
@@ -67,6 +68,8 @@ def find_case_file(request: str) -> Path:
     if not path.exists() and path.name == request and not path.suffix:
         known = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
         raise InputError(f"{request} is neither a file nor one of the cases that ship: {known}.")
+    if path.suffix.lower() in SUFFIXES:
+        raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
     return path
 
 
@@ -93,6 +96,21 @@ def load_cases(path: Path) -> list[Case]:
     return cases
 
 
+# What pydantic says in words of Python's, by the beginning of its error's kind.
+PLAIN = {
+    "model_": "expected keys and values",
+    "dict_": "expected keys and values",
+    "list_": "expected a list",
+    "tuple_": "expected a list of three numbers",
+    "string_pattern": "a name is of letters, digits, spaces and any of . + = , - _ and begins with a letter or digit",
+    "string_type": "expected text",
+    "too_short": "give at least one",
+    "too_long": "expected a list of three numbers",
+    "float_type": "expected a number",
+}
+MOST_RUNS = 20_000
+
+
 def _validated(document: Document, data: dict[str, Any]) -> CaseSpec:
     try:
         return CaseSpec.model_validate(data)
@@ -102,14 +120,24 @@ def _validated(document: Document, data: dict[str, Any]) -> CaseSpec:
         context = first.get("ctx", {})
         if first["type"] == "unknown_key":
             key = (*key, context["key"])
-        raise document.error(key, _sentence(first["type"], first["msg"], first.get("input"))) from failure
+        raise document.error(
+            key, _sentence(first["type"], first["msg"], first.get("input"), key[-1] if key else "")
+        ) from failure
 
 
-def _sentence(kind: str, message: str, given: object) -> str:
-    if kind == "missing":
+def _sentence(kind: str, message: str, given: object, last: str | int) -> str:
+    if kind == "missing" and not isinstance(last, int):
         return "this key is missing; the case needs it."
     text = message[0].lower() + message[1:]
+    if kind == "missing" and isinstance(last, int):
+        return "expected a list of three numbers."
+    text = text.replace("input should be greater", "expected a number greater").replace(
+        "input should be less", "expected a number less"
+    )
     text = text.replace("input should be", "expected").replace("a valid number", "a number")
+    for start, plain in PLAIN.items():
+        if kind.startswith(start):
+            text = plain
     if kind in ("unknown_key", "one_of", "scale"):
         return f"{text}."
     shown = repr(given)
@@ -121,6 +149,12 @@ def _swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[st
     if not spec.sweep:
         return [(None, document.data, {})]
     runs: list[tuple[str | None, dict[str, Any], dict[Key, int]]] = []
+    for key, listed in spec.sweep.items():
+        if len(set(map(repr, listed))) < len(listed):
+            raise document.error(("sweep", key), "a value stands here twice; give each once.")
+    count = math.prod(len(listed) for listed in spec.sweep.values())
+    if count > MOST_RUNS:
+        raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
     for values in itertools.product(*spec.sweep.values()):
         data = copy.deepcopy(document.data)
         del data["sweep"]

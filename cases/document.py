@@ -66,11 +66,11 @@ def read_document(path: Path) -> Document:
     InputError
         If it is missing, unreadable, no YAML, or something else than a mapping.
     """
-    if not path.exists():
-        raise InputError(f"{path} does not exist; check the path of the case file.")
-    if not path.is_file():
-        raise InputError(f"{path} is not a file; give a YAML case file.")
     try:
+        if not path.exists():
+            raise InputError(f"{path} does not exist; check the path of the case file.")
+        if not path.is_file():
+            raise InputError(f"{path} is not a file; give a YAML case file.")
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise InputError(f"{path} is {size / 1e6:.0f} MB; a case file is a few lines of YAML.")

@@ -54,18 +54,22 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None) -> Path:
     solution = solve(case.surface, case.medium, case.lights, tolerance=case.tolerance, report=report)
     target = out / case.name
     try:
-        target.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=target) as folder:
-            _write(case, solution, Path(folder), started)
+        out.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".partial-", dir=out) as folder:
+            warnings = _write(case, solution, Path(folder), started)
+            target.mkdir(parents=True, exist_ok=True)
             _move(Path(folder), target)
     except OSError as error:
         raise RunError(
             f"results cannot be written to {target}: {error.strerror or error}; choose another folder with --out."
         ) from error
+    for warning in warnings:
+        report(f"note: {warning}")
     return target
 
 
-def _write(case: Case, solution: Solution, folder: Path, started: float) -> None:
+def _write(case: Case, solution: Solution, folder: Path, started: float) -> list[str]:
+    """Write all files of a run into a folder, and return its warnings."""
     writing = time.perf_counter()
     mesh = solution.mesh
     warnings = list(solution.warnings)
@@ -98,6 +102,7 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> None
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
+    return warnings
 
 
 def _move(folder: Path, target: Path) -> None:

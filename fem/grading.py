@@ -17,6 +17,9 @@ from tetlux.meshing.tetmesh import TetMesh
 DECAY_LENGTHS = 1.5
 # Where a body is hundreds of decay lengths across, its far side is dark, and stays this coarse.
 COARSEST_SHARE = 1 / 24
+# The fewest tetrahedra for an L2 error have edges that grow like (M l^1.5)^(-2/7) with a falling exitance M,
+# and M falls like exp(-sigma_tr r)/r³. Taken to its end this leaves nothing to see in the dark: stop at this factor.
+COARSER_IN_THE_DARK = 2.0
 # A line is as good as points this many resolutions apart.
 SPACING = 0.5
 
@@ -33,6 +36,8 @@ class Grading:
         Length that has to be resolved at each, unit.
     longest : float
         Upper bound of the length that edges are measured in, unit.
+    sigma_tr, extrapolation_length : float
+        Of the medium, 1/unit and unit.
     skin : float
         Length to be resolved all over the surface, unit; infinite where no light falls on all of it.
     """
@@ -40,19 +45,26 @@ class Grading:
     sources: FloatArray
     resolution: FloatArray
     longest: float
+    sigma_tr: float
+    extrapolation_length: float
     skin: float = np.inf
 
     def lengths(self, mesh: TetMesh) -> FloatArray:
         """The length that light changes over in each tetrahedron, (m,), unit."""
         centroids = mesh.points[mesh.tetrahedra].mean(axis=1)
+        depth, _ = cKDTree(mesh.boundary_points).query(centroids)
         lengths = np.full(len(centroids), self.longest)
+        dim = np.ones(len(centroids))
         if len(self.sources):
             distance, nearest = cKDTree(self.sources).query(centroids)
-            lengths = np.minimum(lengths, np.maximum(distance, self.resolution[nearest]))
-        if self.skin < self.longest:
-            depth, _ = cKDTree(mesh.boundary_points).query(centroids)
-            lengths = np.minimum(lengths, np.maximum(depth, self.skin))
-        return lengths
+            near = self.resolution[nearest]
+            distance = np.maximum(distance, near)
+            lengths = np.minimum(lengths, distance)
+            decay = np.exp(np.minimum(2 / 7 * self.sigma_tr * (distance - near), 1.0))
+            dim = np.minimum((distance / near) ** (3 / 7) * decay, COARSER_IN_THE_DARK)
+        lengths = np.minimum(lengths * dim, np.maximum(depth, self.skin))
+        # Towards the surface the fluence itself falls, by (zb + depth)/length, and its curvature does not.
+        return np.asarray(np.sqrt(lengths * np.minimum(lengths, self.extrapolation_length + depth)))
 
 
 def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Grading:
@@ -74,6 +86,8 @@ def grading_for(deposits: list[Deposit], medium: Medium, surface: Surface) -> Gr
         np.vstack(sources),
         np.concatenate(resolutions),
         longest=max(min(DECAY_LENGTHS * decay, surface.diagonal), COARSEST_SHARE * surface.diagonal),
+        sigma_tr=medium.sigma_tr,
+        extrapolation_length=medium.extrapolation_length,
         skin=2.0 * decay if any(d.irradiance for d in deposits) else np.inf,
     )
 
@@ -103,4 +117,8 @@ def graded(mesh: TetMesh, surface: Surface, grading: Grading, fineness: float, m
             return mesh, True
         if len(mesh.tetrahedra) + int(marked.sum()) > most:
             return mesh, False
-        mesh = refine(mesh, marked, surface)
+        finer = refine(mesh, marked, surface)
+        # Neighbours are split along with what was marked.
+        if len(finer.tetrahedra) > most:
+            return mesh, False
+        mesh = finer

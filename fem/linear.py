@@ -33,7 +33,7 @@ class MultigridSolver:
         np.random.seed(0)  # noqa: NPY002
         try:
             self._preconditioner = pyamg.smoothed_aggregation_solver(
-                csr_matrix(matrix), max_coarse=500
+                csr_matrix(matrix), max_coarse=300, coarse_solver="splu"
             ).aspreconditioner()
         finally:
             np.random.set_state(state)  # noqa: NPY002

@@ -3,6 +3,8 @@
 Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from tetlux.fem.fresnel import moments
@@ -10,6 +12,9 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.tetmesh import TetMesh
+
+# How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
+SLACK = 1e-9
 
 
 def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
@@ -61,57 +66,65 @@ def _add_segment(
     """A fading beam, integrated in closed form over every tetrahedron that it passes."""
     scattering, cosine = medium.delta_eddington
     extinction = medium.sigma_a + scattering
-    total = flux * scattering / extinction * -np.expm1(-extinction * length)
-    cells, enter, leave, slopes = _passed(mesh, start, direction, length)
-    if len(cells) == 0:
-        _add_points(load, mesh, start[None], np.array([total]))
-        return
-    step = leave - enter
+    stretches = _passed(mesh, start, direction, length)
+    step = stretches.leave - stretches.enter
     x = extinction * step
-    carried = flux * scattering * np.exp(-extinction * enter)
+    carried = flux * scattering * np.exp(-extinction * stretches.enter)
     mean = carried * step * _phi1(x)
-    first = carried * step**2 * _phi2(x)
+    inside = stretches.cells >= 0
+    cells, slopes, enter = stretches.cells[inside], stretches.slopes[inside], stretches.enter[inside]
     at_entry = mesh.barycentric(start + enter[:, None] * direction, cells)
-    q0 = mean[:, None] * at_entry + first[:, None] * slopes
-    q1 = cosine / medium.sigma_t_prime * mean[:, None] * slopes
-    # The chord in the mesh misses the path in the body by the facets' sagitta; the power must not.
-    np.add.at(load, mesh.tetrahedra[cells], (q0 + q1) * (total / mean.sum()))
+    q0 = mean[inside, None] * at_entry + (carried * step**2 * _phi2(x))[inside, None] * slopes
+    q1 = cosine / medium.sigma_t_prime * mean[inside, None] * slopes
+    np.add.at(load, mesh.tetrahedra[cells], q0 + q1)
+    # Between the surface and the mesh's facets the path may lie outside the mesh: to the nearest nodes with it.
+    middle = start + 0.5 * (stretches.enter + stretches.leave)[:, None] * direction
+    _add_points(load, mesh, middle[~inside], mean[~inside])
 
 
-def _passed(
-    mesh: TetMesh, start: FloatArray, direction: FloatArray, length: float
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray]:
-    """The tetrahedra along a segment, each stretch of it given to one of them.
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """A segment cut where it passes from tetrahedron to tetrahedron.
 
-    Returns
-    -------
+    Attributes
+    ----------
     cells : (s,) ndarray
+        The tetrahedron of each stretch, -1 outside the mesh.
     enter, leave : (s,) ndarray
         Along the segment.
     slopes : (s, 4) ndarray
         Derivatives of the barycentric coordinates along it.
     """
+
+    cells: IntArray
+    enter: FloatArray
+    leave: FloatArray
+    slopes: FloatArray
+
+
+def _passed(mesh: TetMesh, start: FloatArray, direction: FloatArray, length: float) -> _Stretches:
+    """The tetrahedra along a segment, each stretch of it given to one of them."""
     near = np.flatnonzero(_near_segment(mesh, start, direction, length))
-    if len(near) == 0:
-        none = np.zeros(0)
-        return near, none, none, np.zeros((0, 4))
     base = mesh.barycentric(np.broadcast_to(start, (len(near), 3)), near)
-    slope = mesh.barycentric(np.broadcast_to(start + direction, (len(near), 3)), near) - base
+    slope = mesh.barycentric(np.broadcast_to(start + length * direction, (len(near), 3)), near) - base
+    slope /= length
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = -base / slope
-    enter = np.where(slope > 0, root, -np.inf).max(axis=1).clip(min=0.0)
-    leave = np.where(slope < 0, root, np.inf).min(axis=1).clip(max=length)
-    # A coordinate that does not change must be positive all along.
-    never = ((slope == 0) & (base < 0)).any(axis=1)
-    hit = (leave > enter) & ~never
-    near, enter, leave, slope = near[hit], enter[hit], leave[hit], slope[hit]
-    # A path along a face or an edge runs in several tetrahedra at once: each stretch counts once.
-    cuts = np.unique(np.concatenate([enter, leave]))
+        root = -(base + SLACK) / slope
+    enter = np.where(slope > 0, root, -np.inf).max(axis=1, initial=-np.inf).clip(min=0.0)
+    leave = np.where(slope < 0, root, np.inf).min(axis=1, initial=np.inf).clip(max=length)
+    hit = (leave > enter) & ~((slope == 0) & (base < -SLACK)).any(axis=1)
+    near, base, slope = near[hit], base[hit], slope[hit]
+    cuts = np.unique(np.concatenate([[0.0, length], enter[hit], leave[hit]]))
     middle = 0.5 * (cuts[1:] + cuts[:-1])
-    holds = (enter[None] < middle[:, None]) & (middle[:, None] < leave[None])
-    covered = holds.any(axis=1)
-    owner = holds.argmax(axis=1)[covered]
-    return near[owner], cuts[:-1][covered], cuts[1:][covered], slope[owner]
+    owner = np.full(len(middle), -1)
+    if len(near):
+        # A path along a face or an edge runs in several tetrahedra at once: the one it is deepest in has it.
+        depth = (base[None] + middle[:, None, None] * slope[None]).min(axis=2)
+        best = depth.argmax(axis=1)
+        owner = np.where(depth.max(axis=1) >= -2.0 * SLACK, best, -1)
+    slopes = slope[owner] if len(near) else np.zeros((len(middle), 4))
+    cells = np.where(owner >= 0, near[owner] if len(near) else -1, -1)
+    return _Stretches(cells, cuts[:-1], cuts[1:], slopes)
 
 
 def _near_segment(mesh: TetMesh, start: FloatArray, direction: FloatArray, length: float) -> BoolArray:

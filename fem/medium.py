@@ -55,14 +55,14 @@ class Medium:
             value = getattr(self, name)
             if value is not None and value < 0:
                 raise InputError(f"{name} is {value:g}; a coefficient cannot be negative.")
-        if self.eta <= 0:
-            raise InputError(f"eta is {self.eta:g}; a refractive index is greater than 0.")
+        if not 0.1 <= self.eta <= 10:
+            raise InputError(f"eta is {self.eta:g}; give a refractive index between 0.1 and 10.")
         if self.boundary not in ("exact", "classic"):
             raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".')
         self._check_scattering()
-        if self.sigma_t_prime <= 0:
+        if self.reduced_scattering <= 0:
             raise InputError(
-                "the medium neither scatters nor absorbs, and light does not diffuse through a void; "
+                "the medium does not scatter, and light does not diffuse through a void; "
                 "give a scattering coefficient greater than 0."
             )
         if self.boundary == "classic":

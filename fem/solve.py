@@ -22,6 +22,10 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # Edges in units of the grading's length, on the first mesh.
 FIRST_FINENESS = 0.7
+# A mesh is finer than another if it has this many times its tetrahedra.
+LEAST_GROWTH = 2.0
+# A fluence below zero by less than this share of its maximum is not worth a sentence.
+NEGLIGIBLE_DIP = 1e-6
 # The first mesh may use this part of the tetrahedra allowed, so that a second one can tell its error.
 FIRST_SHARE = 8
 # From mesh to mesh the fineness changes by no more and no less than these factors.
@@ -94,8 +98,8 @@ def solve(
     Notes
     -----
     The estimate compares two meshes: exitance converges at second order in the mesh's fineness c, so that
-    ``e_fine = |M_fine - M_coarse| r/(1 - r)`` with ``r = (c_fine/c_coarse)²``. It knows the error of the mesh,
-    not that of the diffusion approximation.
+    ``e_fine = |M_fine - M_coarse| r/(1 - r)`` with ``r = (c_fine/c_coarse)²``, measured at the surface where the
+    light leaves. It knows the error of the mesh, not that of the diffusion approximation.
     """
     if not 1e-4 <= tolerance < 1:
         raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
@@ -121,6 +125,16 @@ def solve(
                 f"the tolerance of {tolerance:g} was not met: the estimated error is "
                 f"{solution.error_estimate:.2g} at the limit of {most_tetrahedra:,} tetrahedra."
             )
+    if solution.power.exited == 0.0:
+        warnings.append(
+            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed."
+        )
+    lowest = float(solution.fluence.min())
+    if lowest < -NEGLIGIBLE_DIP * float(solution.fluence.max()):
+        warnings.append(
+            f"the fluence dips below zero, to {lowest / float(solution.fluence.max()):.1e} of its largest value, where "
+            "tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
+        )
     watch.seconds["total"] = time.perf_counter() - started
     return replace(solution, seconds=dict(watch.seconds), warnings=list(dict.fromkeys(warnings)))
 
@@ -169,21 +183,35 @@ def _refined_until(problem: _Problem, surface: Surface, tolerance: float, most: 
     solution = problem.solved_on(mesh)
     problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra")
     while reached:
+        fineness *= factor
         with problem.watch.stage("mesh"):
-            mesh, reached = graded(mesh, surface, grading, fineness * factor, most)
+            mesh, reached = graded(mesh, surface, grading, fineness, most)
+        if len(mesh.tetrahedra) < LEAST_GROWTH * len(solution.mesh.tetrahedra):
+            # Not a finer mesh yet, and two that are alike tell nothing.
+            factor = STEP_LIMITS[0]
+            continue
         finer = problem.solved_on(mesh)
-        estimate = difference(finer, solution) * factor**2 / (1.0 - factor**2)
+        shrunk = min(lit_size(finer) / lit_size(solution), 0.8)
+        estimate = difference(finer, solution) * shrunk / (1.0 - shrunk)
         solution = replace(finer, error_estimate=estimate)
         problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {estimate:.2%}")
-        if estimate <= tolerance:
+        if not estimate > tolerance:
             break
-        fineness *= factor
         factor = float(np.clip(0.95 * np.sqrt(tolerance / estimate), *STEP_LIMITS))
     return solution
+
+
+def lit_size(solution: Solution) -> float:
+    """Mean squared size of the tetrahedra that light leaves through, unit²."""
+    mesh = solution.mesh
+    weights = mesh.boundary_areas * (solution.exitance[mesh.boundary_triangles] ** 2).mean(axis=1)
+    return float(weights @ mesh.volumes[mesh.boundary_cells] ** (2 / 3) / weights.sum()) if weights.any() else 1.0
 
 
 def difference(fine: Solution, coarse: Solution) -> float:
     """Relative L2 difference of two exitances over the surface of the finer one's mesh."""
     weights = fine.mesh.boundary_node_areas
     gap = fine.exitance - coarse.exitance_at(fine.mesh.boundary_points)
-    return float(np.sqrt((weights @ gap**2) / (weights @ fine.exitance**2)))
+    size = float(weights @ fine.exitance**2)
+    # Where no light leaves at all, there is nothing to be wrong about.
+    return float(np.sqrt(weights @ gap**2 / size)) if size > 0 else 0.0

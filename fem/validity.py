@@ -24,7 +24,7 @@ def check_size(surface: Surface, medium: Medium) -> None:
         return
     size = "small" if across < SMALLEST_BODY else "large"
     raise InputError(
-        f"{surface.name} is {surface.diagonal:.3g} {surface.unit} across, which is {across:.2g} mean free paths "
+        f"{surface.name} is {surface.diagonal:.3g} {surface.unit} from corner to corner, {across:.2g} mean free paths "
         f"of {medium.mean_free_path:.3g} {surface.unit}: absurdly {size} for diffusion; check the unit, the scale "
         f"of the surface, and that coefficients are in 1/{surface.unit}."
     )
@@ -33,13 +33,15 @@ def check_size(surface: Surface, medium: Medium) -> None:
 def warnings_for(surface: Surface, medium: Medium) -> list[str]:
     """Plain sentences on where the diffusion approximation itself is off, with figures.
 
-    The figures are radiative transfer against diffusion: a half-space under a wide beam, by reduced albedo.
+    The figures are of diffusion against Monte Carlo: slabs under a wide beam, by reduced albedo and index, as
+    ``python -m tests.tables.diffusion_against_monte_carlo`` prints them.
     """
     found = []
     if medium.albedo < LOW_ALBEDO:
         found.append(
             f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for: expect "
-            "reflectances too high by 3 % at 0.9 and 7 % at 0.5, and more close to the light."
+            "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at an "
+            "index of 1.4, and by more close to the light."
         )
     # The mean chord of a body is 4 V/S (Cauchy).
     thickness = 4.0 * surface.volume / surface.area / medium.mean_free_path

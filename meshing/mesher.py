@@ -14,6 +14,8 @@ from tetlux.meshing.repair import bodies
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
+# The command that fills input.npz of its working directory.
+MESHER: tuple[str, ...] = (sys.executable, "-m", "tetlux.meshing._mesher_process")
 # How far fTetWild may stray from the surface, as a share of the diagonal: three times its default, and
 # several times quicker; what it strays is taken back when the boundary nodes are moved onto the surface.
 EPSILON = 3e-3
@@ -108,7 +110,7 @@ def _run_pytetwild(
         )
         try:
             done = subprocess.run(
-                [sys.executable, "-m", "tetlux.meshing._mesher_process"],
+                MESHER,
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
@@ -155,13 +157,14 @@ def _check_against(mesh: TetMesh, surface: Surface, epsilon: float) -> None:
     """Refuse a mesh that is not the body of the surface."""
     # The envelope may shift the whole boundary by epsilon; self-intersecting input overlaps itself.
     slack = 0.02 + 2.0 * epsilon * surface.diagonal * surface.area / surface.volume
-    # A surface that crosses itself counts what overlaps twice, and the mesh is of the union.
-    overlap = 0.3 if any("crosses itself" in w or "lies inside" in w for w in surface.warnings) else 0.0
+    # A surface that crosses itself counts what overlaps more than once, and the mesh is of the union.
+    overlaps = any("crosses itself" in w or "lies inside" in w for w in surface.warnings)
+    lowest = -0.9 if overlaps else -slack
     for quantity, change in (
         ("volume", mesh.volume / surface.volume - 1.0),
         ("area", mesh.area / surface.area - 1.0),
     ):
-        if abs(change) > slack + overlap:
+        if not lowest <= change <= slack:
             raise RunError(
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
                 f"the mesher's envelope of {epsilon * surface.diagonal:.3g} {surface.unit}: give a smaller epsilon."

@@ -6,6 +6,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 
+# A line closer to a triangle's plane than this, by the sine of the angle, runs along it.
+PARALLEL = 1e-9
+
 
 class ClosestPoint:
     """Nearest point of a triangle soup, by VTK's static cell locator (about 10 µs a point).
@@ -127,5 +130,5 @@ def cross_segments(
         q = np.cross(s, edge1)
         v = np.einsum("ij,ij->i", directions, q) * inverse
         t = np.einsum("ij,ij->i", edge2, q) * inverse
-        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (np.abs(determinant) > 1e-12 * size)
+        hit = (u >= -slack) & (v >= -slack) & (u + v <= 1.0 + slack) & (np.abs(determinant) > PARALLEL * size)
     return np.where(hit, t, np.nan), np.column_stack([u, v])

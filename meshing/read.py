@@ -36,13 +36,13 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0) -> S
     path = Path(path)
     if not np.isfinite(scale) or scale <= 0:
         raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder; give a surface file ({', '.join(SUFFIXES)}).")
-    if not path.exists():
-        raise InputError(f"{path} does not exist; check the path of the surface file.")
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(f'{path}: "{path.suffix}" files are not read; give one of {", ".join(SUFFIXES)}.')
     try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder; give a surface file ({', '.join(SUFFIXES)}).")
+        if not path.exists():
+            raise InputError(f"{path} does not exist; check the path of the surface file.")
+        if path.suffix.lower() not in SUFFIXES:
+            raise InputError(f'{path}: "{path.suffix}" files are not read; give one of {", ".join(SUFFIXES)}.')
         if path.stat().st_size == 0:
             raise InputError(f"{path} is empty; give a closed triangle mesh.")
         points, faces = _load(path)

@@ -6,14 +6,16 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
-from tetlux.meshing.surface import UNITS, Surface, signed_volume
+from tetlux.meshing.surface import UNITS, Surface, signed_volume, triangle_areas
 
 # Vertices nearer than this share of the diagonal are one: text formats round at about 1e-7.
 MERGE_TOLERANCE = 1e-7
 # A hole wider than this share of the diagonal is a missing part, and closing it would invent a shape.
 LARGEST_HOLE = 0.05
-# Below this share of diagonal³ a body has no inside.
+# A body whose thickness, 2 V/A, is below this share of its diagonal has no inside.
 FLAT = 1e-7
+# In whatever unit.
+LONGEST = 1e30
 
 
 def surface_from_arrays(
@@ -53,7 +55,7 @@ def surface_from_arrays(
     points, faces = _closed(points, faces, name, repairs, warnings)
     faces = _oriented(points, faces, name, repairs, warnings)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    if signed_volume(points, faces) < FLAT * diagonal**3:
+    if 2.0 * signed_volume(points, faces) <= FLAT * diagonal * float(triangle_areas(points, faces)[1].sum()):
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     crossing = count_self_intersections(points, faces)
     if crossing:
@@ -62,8 +64,12 @@ def surface_from_arrays(
 
 
 def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
-    vertices = np.array(points, dtype=np.float64)
-    triangles = np.array(faces, dtype=np.int64)
+    """Arrays of the right shape that hold finite vertices, all of them used."""
+    try:
+        vertices = np.array(points, dtype=np.float64)
+        triangles = np.array(faces, dtype=np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{name}: points and faces must be arrays of numbers.") from error
     if vertices.size == 0:
         raise InputError(f"{name}: the mesh is empty; give a closed triangle mesh.")
     if triangles.size == 0:
@@ -75,16 +81,22 @@ def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> t
         )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InputError(f"{name}: a triangle names a vertex that does not exist; the file is damaged.")
+    # Vertices that no triangle uses are no part of the surface, wherever they are.
+    used, triangles = np.unique(triangles, return_inverse=True)
+    vertices, triangles = vertices[used], triangles.reshape(-1, 3)
     bad = int((~np.isfinite(vertices)).any(axis=1).sum())
     if bad:
         raise InputError(
             f"{name}: {bad} of {len(vertices)} vertices are not finite (NaN or infinity); repair the file."
         )
+    largest = float(np.abs(vertices).max())
+    if not 1 / LONGEST <= largest <= LONGEST:
+        raise InputError(f"{name}: coordinates reach {largest:g}, absurdly far or near; check the scale and the unit.")
     return vertices, triangles
 
 
 def _merged(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[FloatArray, IntArray]:
-    """Coincident vertices made one; collapsed and repeated triangles removed; unused vertices dropped."""
+    """Coincident vertices made one; collapsed and repeated triangles removed."""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     cell = max(MERGE_TOLERANCE * diagonal, np.finfo(float).tiny)
     _, first, inverse = np.unique(
@@ -99,14 +111,25 @@ def _merged(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Fl
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     if not distinct.all():
         repairs.append(f"removed {int((~distinct).sum())} triangles without area.")
-    faces = faces[distinct]
-    if len(faces):
-        _, keep = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
-        if len(keep) < len(faces):
-            repairs.append(f"removed {len(faces) - len(keep)} triangles given twice.")
-        faces = faces[np.sort(keep)]
+    faces = _single(faces[distinct], repairs)
     used, compact = np.unique(faces, return_inverse=True)
     return points[used], compact.reshape(faces.shape)
+
+
+def _single(faces: IntArray, repairs: list[str]) -> IntArray:
+    """One of triangles given twice; none of a pair back to back, which is a wall inside the body."""
+    if len(faces) == 0:
+        return faces
+    order = np.argsort(faces, axis=1)
+    ordered = np.take_along_axis(faces, order, axis=1)
+    # A permutation of three is even if it is a rotation.
+    even = (order[:, 1] - order[:, 0]) % 3 == 1
+    _, first, inverse = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
+    facing = np.bincount(inverse.reshape(-1), np.where(even, 1, -1))
+    keep = np.sort(first[facing != 0])
+    if len(keep) < len(faces):
+        repairs.append(f"removed {len(faces) - len(keep)} triangles given twice.")
+    return faces[keep]
 
 
 def _closed(
@@ -120,7 +143,7 @@ def _closed(
         if width > LARGEST_HOLE * diagonal:
             at = ", ".join(f"{x:.4g}" for x in points[loop].mean(axis=0))
             raise InputError(
-                f"{name}: the surface is open: a hole {width:.4g} wide around ({at}), and {len(loops)} in all; "
+                f"{name}: the surface is open: a hole {width:.4g} wide around ({at}), of {len(loops)} in all; "
                 "close it in a mesh editor (holes up to 5 % of the body's size are closed here)."
             )
         centre = len(points)
@@ -128,7 +151,7 @@ def _closed(
         fan = [[b, a, centre] for a, b in zip(loop, np.roll(loop, -1), strict=True)]
         faces = np.vstack([faces, np.array(fan, dtype=np.int64)])
     if loops:
-        repairs.append(f"closed {len(loops)} small holes.")
+        repairs.append(f"closed {len(loops)} small {'hole' if len(loops) == 1 else 'holes'}.")
     _, counts = np.unique(np.sort(_directed_edges(faces), axis=1), axis=0, return_counts=True)
     if (counts % 2).any():
         raise InputError(
@@ -178,37 +201,49 @@ def boundary_loops(faces: IntArray) -> list[IntArray]:
 
 def _oriented(points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]) -> IntArray:
     """Consistent winding within each body, and every body outward; cavities are refused."""
-    edges = _directed_edges(faces)
-    # An edge between two triangles of like winding is walked once each way.
-    if len(np.unique(edges, axis=0)) < len(edges):
+    if not _consistent(faces):
         import trimesh  # noqa: PLC0415
 
         mesh = trimesh.Trimesh(points, faces, process=False)
         trimesh.repair.fix_winding(mesh)
         faces = np.asarray(mesh.faces, dtype=np.int64)
+        if not _consistent(faces):
+            raise InputError(f"{name}: the surface has no inside and outside (like a Klein bottle); repair it.")
         repairs.append("made the winding of the triangles consistent.")
     body = bodies(len(points), faces)
     parts = [faces[body == i] for i in range(int(body.max()) + 1)]
+    inward = [signed_volume(points, part) < 0 for part in parts]
     result = faces.copy()
+    outer = len(parts)
     for i, part in enumerate(parts):
-        inward = signed_volume(points, part) < 0
-        inside = any(
-            abs(winding_number(points, other, points[part[0, :1]])[0]) > 0.5
+        around = [
+            j
             for j, other in enumerate(parts)
-            if j != i and _box_within(points[part], points[other])
-        )
-        if inside and inward:
+            if j != i
+            and _box_within(points[part], points[other])
+            and abs(winding_number(points, other, points[part[0, :1]])[0]) > 0.5
+        ]
+        if any(inward[i] != inward[j] for j in around):
             raise InputError(
                 f"{name}: there is a cavity inside the body, and cavities are not supported; remove the inner surface."
             )
-        if inside:
+        if around:
+            outer -= 1
             warnings.append(f"body {i + 1} of {len(parts)} lies inside another and changes nothing.")
-        if inward:
+        if inward[i]:
             result[body == i] = part[:, ::-1]
             repairs.append("turned an inside-out surface outward.")
-    if len(parts) > 1:
-        warnings.append(f"the surface consists of {len(parts)} bodies; light does not pass between them.")
+    if outer > 1:
+        warnings.append(f"the surface consists of {outer} bodies; light does not pass between those that are apart.")
     return result
+
+
+def _consistent(faces: IntArray) -> bool:
+    """Whether each edge between two triangles is walked once each way."""
+    edges = _directed_edges(faces)
+    _, inverse, counts = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    pairs = edges[counts[inverse.reshape(-1)] == 2]
+    return len(np.unique(pairs, axis=0)) == len(pairs)
 
 
 def _box_within(inner: FloatArray, outer: FloatArray) -> bool:
@@ -244,7 +279,7 @@ def count_self_intersections(points: FloatArray, faces: IntArray) -> int:
     apart = (faces[face][:, :, None] != edges[edge][:, None, :]).all(axis=(1, 2))
     edge, face = edge[apart], face[apart]
     start = points[edges[edge, 0]]
-    # Touching is not crossing, and in tessellated planes it is the rule.
+    # An edge that ends on a triangle touches it; one that passes through its rim crosses the surface.
     margin = 1e-6
-    t, _ = cross_segments(start, points[edges[edge, 1]] - start, points[faces[face]], slack=-margin)
+    t, _ = cross_segments(start, points[edges[edge, 1]] - start, points[faces[face]], slack=1e-9)
     return len(np.unique(face[(t > margin) & (t < 1.0 - margin)]))

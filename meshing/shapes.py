@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import IntArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.repair import LONGEST, surface_from_arrays
 from tetlux.meshing.surface import Surface
 
 
@@ -14,6 +14,8 @@ def _positive(**lengths: float) -> None:
     for name, value in lengths.items():
         if not math.isfinite(value) or value <= 0:
             raise InputError(f"{name} is {value:g}; give a length greater than 0.")
+        if not 1 / LONGEST <= value <= LONGEST:
+            raise InputError(f"{name} is {value:g}, absurdly small or large; check the unit.")
 
 
 def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm") -> Surface:

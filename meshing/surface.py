@@ -98,6 +98,29 @@ class Surface:
         order = np.argsort(distances[faces], kind="stable")
         return distances[faces[order]], faces[order]
 
+    def exit(self, origin: FloatArray, direction: FloatArray) -> tuple[float, int] | None:
+        """Where a ray from inside leaves the body.
+
+        Parts of the surface that lie inside the body (overlaps, shells within) are passed.
+
+        Returns
+        -------
+        tuple of float and int, or None
+            Distance along the unit vector `direction`, and the face; None if the ray meets no surface.
+        """
+        distances, faces = self.crossings(origin, direction)
+        outward = np.sign(self.normals[faces] @ direction)
+        # A ray through an edge meets two triangles at once: they count once.
+        same = np.zeros(len(faces), dtype=bool)
+        same[1:] = (np.diff(distances) < 1e-9 * self.diagonal) & (outward[1:] == outward[:-1])
+        distances, faces, outward = distances[~same], faces[~same], outward[~same]
+        # How deep inside the ray still is after each crossing: beyond the last one it is outside.
+        depth_after = outward[::-1].cumsum()[::-1] - outward
+        leaves = np.flatnonzero((outward > 0) & (depth_after <= 0))
+        if len(leaves) == 0:
+            return None
+        return float(distances[leaves[0]]), int(faces[leaves[0]])
+
 
 def signed_volume(points: FloatArray, faces: IntArray) -> float:
     """Volume enclosed by outward oriented triangles (divergence theorem), negative if they face inward."""

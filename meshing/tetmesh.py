@@ -61,8 +61,8 @@ class TetMesh:
         return float(self.volumes.sum())
 
     @cached_property
-    def boundary_faces(self) -> IntArray:
-        """Boundary triangles (b, 3), outward oriented, as node numbers."""
+    def _boundary(self) -> tuple[IntArray, IntArray]:
+        """Faces that belong to one tetrahedron only, (f, 3), and that tetrahedron, (f,)."""
         faces = self.tetrahedra[:, _FACES].reshape(-1, 3)
         key = np.sort(faces, axis=1)
         count = len(self.points)
@@ -73,7 +73,17 @@ class TetMesh:
         single = np.ones(len(faces), dtype=bool)
         single[order[1:][same]] = False
         single[order[:-1][same]] = False
-        return faces[single]
+        return faces[single], np.flatnonzero(single) // 4
+
+    @property
+    def boundary_faces(self) -> IntArray:
+        """Boundary triangles (f, 3), outward oriented, as node numbers."""
+        return self._boundary[0]
+
+    @property
+    def boundary_cells(self) -> IntArray:
+        """The tetrahedron behind each boundary triangle, (f,)."""
+        return self._boundary[1]
 
     @cached_property
     def boundary_nodes(self) -> IntArray:
@@ -179,6 +189,9 @@ class TetMesh:
         weights = np.full((len(queries), 4), np.nan)
         left = np.arange(len(queries))
         tried = 0
+        # Far from the origin coordinates carry fewer digits of a tetrahedron.
+        size = float(self.volumes.min()) ** (1 / 3)
+        slack = 1e-10 + 16.0 * np.finfo(float).eps * float(np.abs(self.points).max()) / size
         for wanted in (8, 64, 512, len(self.tetrahedra)):
             count = min(wanted, len(self.tetrahedra))
             if len(left) == 0 or count == tried:
@@ -187,7 +200,7 @@ class TetMesh:
             distance, near = np.asarray(found[0]), np.asarray(found[1], dtype=np.int64)
             for column in near.T:
                 inner = self.barycentric(queries[left], column)
-                hit = (inner.min(axis=1) >= -1e-10) & (cells[left] < 0)
+                hit = (inner.min(axis=1) >= -slack) & (cells[left] < 0)
                 cells[left[hit]] = column[hit]
                 weights[left[hit]] = inner[hit]
             # No tetrahedron reaches farther from its centroid than three quarters of its longest edge.

@@ -109,7 +109,7 @@ def at(line: int) -> str:
         (
             "[0, 0, 2], direction",
             "[0, 2], direction",
-            at(9) + r"lights\[0\]\.pencil\.origin\[2\]: this key is missing",
+            at(9) + r"lights\[0\]\.pencil\.origin\[2\]: expected a list of three",
         ),
         ("direction: [0, 0, -1]", "direction: [0, 0, 1]", at(9) + r"lights\[0\]: the beam .* misses the body"),
         (
@@ -122,7 +122,7 @@ def at(line: int) -> str:
         ("width: 6, depth: 1", "width: 0.02, depth: 0.01", "absurdly small for diffusion; check the unit"),
         ("width: 6, depth: 1", "width: 6e6, depth: 1e6", "absurdly large for diffusion; check the unit"),
         ("outputs: [surface]", "outputs: [film]", at(13) + r"outputs\[0\]: .*'film'"),
-        ("tolerance: 0.05", "tolerance: 2", at(12) + "tolerance: expected less than 1, but found 2"),
+        ("tolerance: 0.05", "tolerance: 2", at(12) + "tolerance: expected a number less than 1, but found 2"),
         ("name: plate", "name: ../plate", at(1) + "name: "),
         ("outputs: [surface]", "outputs: [surface", "line 14: not valid YAML"),
         ("outputs: [surface]", "sweep: {medium.etta: [1]}", "unknown key"),
@@ -131,6 +131,13 @@ def at(line: int) -> str:
             "sweep: {media.eta: [1]}",
             at(13) + r"sweep\.media\.eta: .*is no key of this case",
         ),
+        ("outputs: [surface]", "sweep: {medium.eta: [1.4, 1.4]}", "a value stands here twice"),
+        (
+            "outputs: [surface]",
+            f"sweep: {{medium.eta: {list(range(1, 201))}, tolerance: {list(range(1, 201))}}}",
+            "makes 40,000 runs",
+        ),
+        ("{slab: {width: 6, depth: 1}}", "3", r"surface: expected keys and values, but found 3"),
         ("outputs: [surface]", "sweep: {medium.eta: []}", at(13) + r"sweep\.medium\.eta"),
         ("outputs: [surface]", "sweep: {medium.eta: [-1]}", at(13) + r"medium\.eta: eta is -1"),
         ("name: plate", "name: !!python/object/apply:os.system ['true']", "line 1: not valid YAML"),
@@ -199,7 +206,7 @@ def test_check_says_what_is_right_and_what_is_not(tmp_path: Path, capsys: pytest
     good.write_text(GOOD)
     bad.write_text(GOOD.replace("eta: 1.4", "eta: -1"))
     assert main(["check", str(good)]) == 0
-    assert "good.yaml: right; 12 triangles, 8.544 cm across" in capsys.readouterr().out
+    assert "good.yaml: right; 12 triangles, 6 x 6 x 1 cm" in capsys.readouterr().out
     assert main(["check", str(bad), str(good)]) == 2
     printed = capsys.readouterr()
     assert "medium.eta: eta is -1" in printed.err

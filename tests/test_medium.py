@@ -63,6 +63,8 @@ def test_delta_eddington_keeps_the_reduced_coefficient() -> None:
     assert scattering == pytest.approx(10 * (1 - 0.81))
     assert scattering * (1 - cosine) == pytest.approx(1.0)
     assert Medium(sigma_a=0.02, sigma_s_prime=1.3, eta=1.4).delta_eddington == (1.3, 0.0)
+    # Without a forward peak there is nothing to take out.
+    assert Medium(sigma_a=0.02, sigma_s=2.0, g=-0.3, eta=1.4).delta_eddington == (2.0, -0.3)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +73,7 @@ def test_delta_eddington_keeps_the_reduced_coefficient() -> None:
         ({"sigma_a": -0.1, "sigma_s_prime": 1.0, "eta": 1.4}, "sigma_a is -0.1"),
         ({"sigma_a": 0.1, "sigma_s_prime": -1.0, "eta": 1.4}, "sigma_s_prime is -1"),
         ({"sigma_a": math.nan, "sigma_s_prime": 1.0, "eta": 1.4}, "sigma_a is nan"),
-        ({"sigma_a": 0.1, "sigma_s_prime": 1.0, "eta": 0.0}, "eta is 0"),
+        ({"sigma_a": 0.1, "sigma_s_prime": 1.0, "eta": 0.0}, "eta is 0; give a refractive index between 0.1 and 10"),
         ({"sigma_a": 0.1, "eta": 1.4}, "scattering is missing"),
         ({"sigma_a": 0.1, "sigma_s": 1.0, "eta": 1.4}, "g is missing"),
         ({"sigma_a": 0.1, "sigma_s": 1.0, "g": 1.0, "eta": 1.4}, "g is 1"),
@@ -79,6 +81,7 @@ def test_delta_eddington_keeps_the_reduced_coefficient() -> None:
         ({"sigma_a": 0.1, "sigma_s": 1.0, "sigma_s_prime": 1.0, "eta": 1.4}, "sigma_s is given together"),
         ({"sigma_a": 0.1, "g": 0.5, "sigma_s_prime": 1.0, "eta": 1.4}, "g is given together"),
         ({"sigma_a": 0.0, "sigma_s_prime": 0.0, "eta": 1.4}, "void"),
+        ({"sigma_a": 1.0, "sigma_s": 0.0, "g": 0.5, "eta": 1.4}, "does not scatter"),
         ({"sigma_a": 0.1, "sigma_s_prime": 1.0, "eta": 0.8, "boundary": "classic"}, "refractive indices of 1"),
         ({"sigma_a": 0.1, "sigma_s_prime": 1.0, "eta": 1.4, "boundary": "best"}, 'boundary is "best"'),
     ],

@@ -1,7 +1,6 @@
 """Runs: what they write, whole or not at all."""
 
 import json
-import os
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -70,7 +69,7 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     assert channel["fluence"]["max"] > 2 * 2.948 * channel["exitance"]["max"]
     assert 0 < channel["error_estimate"] <= 0.1
     assert set(summary["seconds"]) == {"surface", "mesh", "assemble", "solve", "write", "total"}
-    assert summary["warnings"] == []
+    assert all("without PyVista" in warning for warning in summary["warnings"])
     assert summary["versions"]["tetlux"]
 
 
@@ -83,6 +82,14 @@ def test_the_surface_and_volume_files_hold_the_solution(finished: Path) -> None:
     volume = meshio.read(finished / "volume.vtu")
     assert volume.point_data["fluence"].max() == pytest.approx(summary["channels"][0]["fluence"]["max"])
     assert len(read_mesh(finished / "volume.vtu").tetrahedra) == summary["mesh"]["tetrahedra"]
+
+
+def test_warnings_are_printed_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "dark.yaml").write_text(QUICK.replace("sigma_a: 0.01", "sigma_a: 0.5") + "outputs: []\n")
+    assert main(["run", str(tmp_path / "dark.yaml"), "--out", str(tmp_path / "out")]) == 0
+    assert "note: the reduced albedo is 0.667" in capsys.readouterr().out
+    summary = json.loads((tmp_path / "out" / "dark" / "summary.json").read_text())
+    assert "the reduced albedo is 0.667" in summary["warnings"][0]
 
 
 def test_progress_is_printed_for_each_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,7 +121,7 @@ def test_a_fault_while_writing_leaves_no_half_result(
     monkeypatch.setattr(run, "write_mesh", full)
     with pytest.raises(RunError, match="No space left on device; choose another folder"):
         run_case(case, tmp_path / "out")
-    assert list((tmp_path / "out" / "ball").iterdir()) == []
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_failing_case_does_not_stop_the_others(
@@ -147,9 +154,12 @@ def test_a_working_directory_without_write_permission_is_enough(
     assert list(locked.iterdir()) == []
 
 
-@pytest.mark.skipif(os.name != "posix", reason="needs file permissions")
-def test_an_output_folder_that_cannot_be_made(case: Case, tmp_path: Path) -> None:
+def test_an_output_folder_that_cannot_be_made(case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("in the way")
+    assert main(["run", str(case.source), "--out", str(tmp_path / "file" / "out")]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "choose another folder with --out" in printed.err
     with pytest.raises(RunError, match="results cannot be written to"):
         run_case(replace(case, outputs=()), tmp_path / "file")
 

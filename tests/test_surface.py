@@ -100,7 +100,7 @@ def test_duplicates_and_collapsed_triangles_go(cube: tuple[FloatArray, IntArray]
 def test_small_holes_are_closed(ball: Surface, missing: list[int]) -> None:
     surface = surface_from_arrays(ball.points, np.delete(ball.faces, missing, axis=0))
     assert surface.volume == pytest.approx(ball.volume, rel=1e-4)
-    assert "small holes" in surface.repairs[0]
+    assert "small hole" in surface.repairs[0]
 
 
 def test_a_missing_side_is_refused_with_its_place(cube: tuple[FloatArray, IntArray]) -> None:
@@ -114,6 +114,10 @@ def test_self_intersection_is_counted() -> None:
     surface = surface_from_arrays(np.vstack([a.points, b.points]), np.vstack([a.faces, b.faces + 8]))
     assert any("crosses itself" in w for w in surface.warnings)
     assert any("2 bodies" in w for w in surface.warnings)
+    # Mirror images cross edge on edge.
+    a, b = sphere(6.0, subdivisions=2), sphere(6.0, subdivisions=2, center=(5.0, 0.0, 0.0))
+    surface = surface_from_arrays(np.vstack([a.points, b.points]), np.vstack([a.faces, b.faces + len(a.points)]))
+    assert any("crosses itself" in w for w in surface.warnings)
 
 
 def test_a_cavity_is_refused() -> None:
@@ -132,8 +136,8 @@ def test_a_cavity_is_refused() -> None:
         (np.zeros((4, 3)), [[0, 1, 2, 3]], "shape"),
         (np.eye(4, 3), [[0, 1, 9]], "does not exist"),
         (np.eye(4, 3), [[0, 1, -1]], "does not exist"),
-        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]], [[0, 1, 2]], "not finite"),
-        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.inf]], [[0, 1, 2]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]], [[0, 1, 3]], "not finite"),
+        ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.inf]], [[0, 1, 3]], "not finite"),
         (np.eye(4, 3), [[0, 1, 2]], "at least four"),
     ],
 )
@@ -200,3 +204,73 @@ def test_shapes_refuse_impossible_lengths(make: object, message: str) -> None:
     assert callable(make)
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_vertices_that_no_triangle_uses_do_not_count(ball: Surface) -> None:
+    far = np.vstack([ball.points, [[1e8, 0, 0], [np.nan, 0, 0]]])
+    surface = surface_from_arrays(far, ball.faces)
+    assert (surface.volume, surface.repairs) == (ball.volume, ())
+
+
+def test_a_wall_between_two_bodies_goes() -> None:
+    """Two boxes that share a side, each with its own triangles for it."""
+    lower = box((2.0, 2.0, 2.0))
+    # A mirror image has the same diagonal on both sides of the wall.
+    upper = lower.points * [1, 1, -1] + [0, 0, 2]
+    faces = np.vstack([lower.faces, lower.faces[:, ::-1] + 8])
+    surface = surface_from_arrays(np.vstack([lower.points, upper]), faces)
+    assert surface.volume == pytest.approx(16.0)
+    assert len(surface.faces) == 20
+    assert surface.warnings == ()
+
+
+def test_a_klein_bottle_has_no_inside() -> None:
+    count = 12
+    i, j = np.meshgrid(np.arange(count), np.arange(count), indexing="ij")
+    random = np.random.default_rng(0).normal(size=(count * count, 3))
+
+    def node(a: IntArray, b: IntArray) -> IntArray:
+        # Going round the first way turns the second way over.
+        return (a % count) * count + np.where(a >= count, -b, b) % count
+
+    corners = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]
+    a, b, c, d = (x.ravel() for x in corners)
+    with pytest.raises(InputError, match="no inside and outside"):
+        surface_from_arrays(random, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]))
+
+
+def test_a_cavity_is_one_inside_out_too() -> None:
+    outer, inner = sphere(3.0, subdivisions=2), sphere(1.0, subdivisions=2)
+    faces = np.vstack([outer.faces, inner.faces[:, ::-1] + len(outer.points)])[:, ::-1]
+    with pytest.raises(InputError, match="cavity"):
+        surface_from_arrays(np.vstack([outer.points, inner.points]), faces)
+
+
+def test_thin_is_not_flat() -> None:
+    assert box((1e4, 1.0, 1.0)).volume == pytest.approx(1e4)
+    assert box((1e4, 1e4, 0.1)).volume == pytest.approx(1e7)
+
+
+@pytest.mark.parametrize("length", [1e-9, 1e9])
+def test_lengths_from_nano_to_giga(length: float) -> None:
+    assert sphere(length).volume == pytest.approx(length**3 * sphere(1.0).volume)
+
+
+@pytest.mark.parametrize("length", [1e-120, 1e110])
+def test_lengths_beyond_arithmetic(length: float) -> None:
+    with pytest.raises(InputError, match="absurdly"):
+        sphere(length)
+    cube = box((1.0, 1.0, 1.0))
+    with pytest.raises(InputError, match="absurdly"):
+        surface_from_arrays(cube.points * length, cube.faces)
+
+
+def test_a_hole_of_a_twentieth_is_closed_and_one_of_a_fifth_is_not(ball: Surface) -> None:
+    height = ball.points[ball.faces].mean(axis=1)[:, 2]
+    small = surface_from_arrays(ball.points, ball.faces[height < 9.97])
+    assert small.repairs == ("closed 1 small hole.",)
+    with pytest.raises(InputError, match="open"):
+        surface_from_arrays(ball.points, ball.faces[height < 9.5])
+    nudged = ball.points[ball.faces].reshape(-1, 3) * (1 + 1e-5 * (np.arange(3 * len(ball.faces)) % 2)[:, None])
+    with pytest.raises(InputError, match="open"):
+        surface_from_arrays(nudged, np.arange(len(nudged)).reshape(-1, 3))

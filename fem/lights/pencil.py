@@ -14,8 +14,9 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
-# A beam with a radius is this many thin ones, spread evenly over its disc.
-RAYS = 127
+# A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path
+# apart, up to the second number: closer than that, what they deposit runs together.
+RAYS = (127, 2000)
 # What a beam still carries after this many reflections at the inside, or below this share, stays put.
 REFLECTIONS = 64
 NEGLIGIBLE = 1e-12
@@ -64,16 +65,30 @@ class PencilBeam:
         if self.deposit not in ("point", "line"):
             raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".')
 
-    def rays(self) -> tuple[FloatArray, FloatArray]:
-        """Origins (r, 3) of the thin beams that make this one up, and their common unit direction (3,)."""
+    def rays(self, spacing: float = math.inf) -> tuple[FloatArray, FloatArray]:
+        """Thin beams that make this one up.
+
+        Parameters
+        ----------
+        spacing : float
+            Wanted distance between them, unit.
+
+        Returns
+        -------
+        origins : (r, 3) ndarray
+        direction : (3,) ndarray
+            Their common unit direction.
+        """
         origin = as_vector(self.origin, "origin")
         direction = as_vector(self.direction, "direction")
-        direction = direction / np.linalg.norm(direction)
+        direction = direction / np.abs(direction).max()  # its square may be out of range
+        direction /= np.linalg.norm(direction)
         if self.radius == 0:
             return origin[None], direction
         # Vogel's sunflower pattern: equal areas, no two rays on one radius.
-        index = np.arange(RAYS)
-        distance = self.radius * np.sqrt((index + 0.5) / RAYS)
+        count = int(np.clip(np.pi * (self.radius / spacing) ** 2, *RAYS))
+        index = np.arange(count)
+        distance = self.radius * np.sqrt((index + 0.5) / count)
         angle = index * np.pi * (3.0 - np.sqrt(5.0))
         across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
         across /= np.linalg.norm(across)
@@ -90,20 +105,20 @@ class PencilBeam:
             If the beam misses the body or starts inside it.
         """
         origin, direction = as_vector(self.origin, "origin"), self.rays()[1]
-        distances, faces = surface.crossings(origin, direction)
-        self._check_outside(surface, direction, faces)
-        if len(faces) == 0:
+        self._check_outside(surface, origin)
+        distances, _ = _entering(surface, origin, direction)
+        if len(distances) == 0:
             raise self._missed(surface)
         return np.asarray(origin + distances[0] * direction)
 
     def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
-        origins, direction = self.rays()
+        origins, direction = self.rays(spacing=0.5 * medium.mean_free_path)
+        self._check_outside(surface, as_vector(self.origin, "origin"))
         share = self.power / len(origins)
         parts = []
         for origin in origins:
-            distances, faces = surface.crossings(origin, direction)
-            self._check_outside(surface, direction, faces)
+            distances, faces = _entering(surface, origin, direction)
             if len(faces):
                 entry = origin + distances[0] * direction
                 enter = _Entry.through(entry, direction, surface.normals[faces[0]], medium.eta, share)
@@ -119,6 +134,12 @@ class PencilBeam:
                 f"{1 - len(parts) / len(origins):.0%} of the beam's cross-section misses the body; "
                 "incident power counts the rest."
             )
+        apart = self.radius * math.sqrt(math.pi / len(origins)) / medium.mean_free_path
+        if apart > 1.0:
+            warnings.append(
+                f"the beam is so wide that the {len(origins)} thin ones it is made of lie {apart:.2g} mean free paths "
+                "apart: its exitance is spotted close to where it enters."
+            )
         if self.deposit == "line" and self.radius == 0:
             warnings.append(
                 "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
@@ -126,8 +147,8 @@ class PencilBeam:
             )
         return Deposit(**{**vars(deposit), "warnings": tuple(dict.fromkeys(warnings))})
 
-    def _check_outside(self, surface: Surface, direction: FloatArray, faces: IntArray) -> None:
-        if len(faces) and float(surface.normals[faces[0]] @ direction) > 0:
+    def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
+        if surface.contains(origin[None])[0]:
             raise InputError(
                 f"the beam starts inside the body, at {tuple(self.origin)}; move its origin outside, "
                 "or use a point source."
@@ -140,6 +161,13 @@ class PencilBeam:
             f"the beam from {tuple(self.origin)} along {tuple(self.direction)} misses the body, which spans "
             f"{spans} {surface.unit}; change its origin or direction."
         )
+
+
+def _entering(surface: Surface, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
+    """The crossings (distances, faces) at which a ray goes in."""
+    distances, faces = surface.crossings(origin, direction)
+    inward = surface.normals[faces] @ direction < 0
+    return distances[inward], faces[inward]
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +195,8 @@ class _Entry:
 
 def _as_point(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
     mean_free_path = medium.mean_free_path
-    path = _path_length(entry.point, entry.direction, surface)
+    way_out = surface.exit(entry.point, entry.direction)
+    path = way_out[0] if way_out else 0.0
     depth = mean_free_path
     warnings: tuple[str, ...] = ()
     if path < 2.0 * mean_free_path:
@@ -187,11 +216,6 @@ def _as_point(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
     )
 
 
-def _path_length(point: FloatArray, direction: FloatArray, surface: Surface) -> float:
-    distances, _ = surface.crossings(point, direction)
-    return float(distances[0]) if len(distances) else 0.0
-
-
 def _as_line(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
     """Follow the beam to the far side, and back and forth for what that reflects."""
     scattering, _ = medium.delta_eddington
@@ -199,16 +223,17 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
     starts, directions, lengths, fluxes = [], [], [], []
     point, direction, flux, ballistic = entry.point, entry.direction, entry.transmitted, 0.0
     for _ in range(REFLECTIONS):
-        distances, faces = surface.crossings(point, direction)
-        if len(faces) == 0 or flux <= NEGLIGIBLE * entry.incident:
+        way_out = surface.exit(point, direction)
+        if way_out is None or flux <= NEGLIGIBLE * entry.incident:
             break
+        length, face = way_out
         starts.append(point)
         directions.append(direction)
-        lengths.append(float(distances[0]))
+        lengths.append(length)
         fluxes.append(flux)
-        flux *= math.exp(-extinction * distances[0])
-        normal = surface.normals[faces[0]]
-        point = point + distances[0] * direction
+        flux *= math.exp(-extinction * length)
+        normal = surface.normals[face]
+        point = point + length * direction
         cosine = float(direction @ normal)
         reflected = float(reflectance(cosine, medium.eta))
         ballistic += (1.0 - reflected) * flux
