@@ -191,7 +191,8 @@ def _refined_until(problem: _Problem, surface: Surface, tolerance: float, most: 
             factor = STEP_LIMITS[0]
             continue
         finer = problem.solved_on(mesh)
-        shrunk = min(lit_size(finer) / lit_size(solution), 0.8)
+        # A step is never worth more than a halving of the edges: a coarse mesh is not yet of second order.
+        shrunk = float(np.clip(lit_size(finer) / lit_size(solution), 0.25, 0.8))
         estimate = difference(finer, solution) * shrunk / (1.0 - shrunk)
         solution = replace(finer, error_estimate=estimate)
         problem.report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {estimate:.2%}")

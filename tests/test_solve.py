@@ -23,10 +23,10 @@ def exitance_error(solution: Solution, depth: float = TISSUE.mean_free_path) -> 
 
 
 def test_sphere_against_its_series_with_default_settings(ball_solution: Solution) -> None:
-    # Five runs: 0.0107 to 0.0118, with 24,000 tetrahedra.
+    # Six runs: 0.0081 to 0.0114, with 30,000 tetrahedra.
     assert exitance_error(ball_solution) < 0.02
     assert ball_solution.power.exited == pytest.approx(0.79094984, rel=0.005)
-    # The estimate was 1.3 to 1.7 times the error.
+    # The estimate was 1.3 to 2.0 times the error.
     assert 0.5 < ball_solution.error_estimate / exitance_error(ball_solution) < 3
     assert ball_solution.error_estimate <= 0.02
     assert ball_solution.warnings == []
@@ -53,14 +53,26 @@ def test_the_ledger_closes(ball_solution: Solution) -> None:
 @pytest.mark.slow
 def test_a_smaller_tolerance_is_met(ball: Surface) -> None:
     solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 10.0 - TISSUE.mean_free_path))], tolerance=0.01)
-    # Three runs: 0.0050 to 0.0054.
+    # Three runs: 0.0038 to 0.0052.
     assert exitance_error(solution) < 0.01
     assert 0.5 < solution.error_estimate / exitance_error(solution) < 3
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.25)])
+def test_the_estimate_is_honest_elsewhere(depth: float, sigma_a: float, ball: Surface) -> None:
+    """At the centre, without absorption, and in the dark: estimate over true error was 0.4 to 1.7 in three runs."""
+    medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
+    solution = solve(ball, medium, [PointSource((0.0, 0.0, 10.0 - depth))])
+    # 0.0045 to 0.0220.
+    assert exitance_error(solution, depth) < 0.03
+    assert 0.25 < solution.error_estimate / exitance_error(solution, depth) < 3
+
+
 def test_a_tolerance_that_cannot_be_met_is_said(ball: Surface) -> None:
     solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 9.0))], tolerance=0.001, most_tetrahedra=15_000)
-    assert solution.error_estimate > 0.001
+    assert solution.error_estimate > exitance_error(solution, 1.0) / 2
+    assert len(solution.mesh.tetrahedra) <= 15_000
     assert "tolerance of 0.001 was not met" in solution.warnings[-1]
 
 

@@ -265,9 +265,11 @@ def test_lengths_beyond_arithmetic(length: float) -> None:
         surface_from_arrays(cube.points * length, cube.faces)
 
 
-def test_a_hole_of_a_twentieth_is_closed_and_one_of_a_fifth_is_not(ball: Surface) -> None:
+def test_a_hole_of_a_twentieth_is_closed_and_one_of_a_fifth_is_not() -> None:
+    ball = sphere(10.0, subdivisions=5)
     height = ball.points[ball.faces].mean(axis=1)[:, 2]
-    small = surface_from_arrays(ball.points, ball.faces[height < 9.97])
+    round_one = (ball.faces == ball.points[:, 2].argmax()).any(axis=1)
+    small = surface_from_arrays(ball.points, ball.faces[~round_one])
     assert small.repairs == ("closed 1 small hole.",)
     with pytest.raises(InputError, match="open"):
         surface_from_arrays(ball.points, ball.faces[height < 9.5])
