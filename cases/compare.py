@@ -188,7 +188,7 @@ def _slab(
     middle = np.average(sources[:, :2], axis=0, weights=powers)
 
     def where(points: FloatArray) -> BoolArray:
-        return (points[:, 2] > -1e-9 * width) & (np.abs(points[:, :2]).max(axis=1) < 0.5 * width - rim)
+        return np.asarray((points[:, 2] > -1e-9 * width) & (np.abs(points[:, :2]).max(axis=1) < 0.5 * width - rim))
 
     return Comparison(
         "distance from the entry",

@@ -129,7 +129,7 @@ def _single(faces: IntArray, repairs: list[str]) -> IntArray:
     keep = np.sort(first[facing != 0])
     if len(keep) < len(faces):
         repairs.append(f"removed {len(faces) - len(keep)} triangles given twice.")
-    return faces[keep]
+    return np.asarray(faces[keep])
 
 
 def _closed(

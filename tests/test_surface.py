@@ -231,7 +231,7 @@ def test_a_klein_bottle_has_no_inside() -> None:
 
     def node(a: IntArray, b: IntArray) -> IntArray:
         # Going round the first way turns the second way over.
-        return (a % count) * count + np.where(a >= count, -b, b) % count
+        return np.asarray((a % count) * count + np.where(a >= count, -b, b) % count)
 
     corners = [node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]
     a, b, c, d = (x.ravel() for x in corners)
