@@ -15,7 +15,7 @@ from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.schema import CaseSpec, LightSpec, SurfaceSpec
 from tetlux.fem.lights import DiffuseLight, Light, PencilBeam, PointSource
 from tetlux.fem.medium import Medium
-from tetlux.fem.validity import check_size
+from tetlux.fem.validity import check_scattering, check_size
 from tetlux.meshing import shapes
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.read import SUFFIXES, read_surface
@@ -188,6 +188,7 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
 
     try:
         medium = Medium(**spec.medium.model_dump())
+        check_scattering(medium)
     except InputError as error:
         raise located(("medium", *_named_first(str(error), spec.medium.model_dump())), error) from error
     try:

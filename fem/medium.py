@@ -60,11 +60,8 @@ class Medium:
         if self.boundary not in ("exact", "classic"):
             raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".')
         self._check_scattering()
-        if self.reduced_scattering <= 0:
-            raise InputError(
-                "the medium does not scatter, and light does not diffuse through a void; "
-                "give a scattering coefficient greater than 0."
-            )
+        if self.sigma_t_prime <= 0:
+            raise InputError("the medium neither scatters nor absorbs; give a coefficient greater than 0.")
         if self.boundary == "classic":
             boundary_factor_classic(self.eta)
 

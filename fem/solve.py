@@ -14,7 +14,7 @@ from tetlux.fem.linear import MultigridSolver
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power, Solution
-from tetlux.fem.validity import check_size, warnings_for
+from tetlux.fem.validity import check_scattering, check_size, warnings_for
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.surface import Surface
@@ -111,6 +111,7 @@ def solve(
     started = time.perf_counter()
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
+        check_scattering(medium)
         check_size(surface, medium)
         deposits = [light.deposit_in(surface, medium) for light in lights]
     problem = _Problem(medium, deposits, mass, watch, report)

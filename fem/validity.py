@@ -11,6 +11,20 @@ LOW_ALBEDO = 0.9
 THIN = 4.0
 
 
+def check_scattering(medium: Medium) -> None:
+    """Refuse a medium that light passes without being scattered.
+
+    Raises
+    ------
+    InputError
+    """
+    if medium.reduced_scattering <= 0:
+        raise InputError(
+            "the medium does not scatter, and light does not diffuse through a void; "
+            "give a scattering coefficient greater than 0."
+        )
+
+
 def check_size(surface: Surface, medium: Medium) -> None:
     """Refuse a body that cannot be of the unit its coefficients are in.
 

@@ -125,6 +125,7 @@ def at(line: int) -> str:
         ("tolerance: 0.05", "tolerance: 2", at(12) + "tolerance: expected a number less than 1, but found 2"),
         ("name: plate", "name: ../plate", at(1) + "name: "),
         ("outputs: [surface]", "outputs: [surface", "line 14: not valid YAML"),
+        ("sigma_s_prime: 10", "sigma_s_prime: 0", at(4) + "medium: the medium does not scatter"),
         ("outputs: [surface]", "sweep: {medium.etta: [1]}", "unknown key"),
         (
             "outputs: [surface]",

@@ -59,7 +59,7 @@ def test_a_smaller_tolerance_is_met(ball: Surface) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.25)])
+@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.15)])
 def test_the_estimate_is_honest_elsewhere(depth: float, sigma_a: float, ball: Surface) -> None:
     """At the centre, without absorption, and in the dark: estimate over true error was 0.4 to 1.7 in three runs."""
     medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
@@ -199,5 +199,7 @@ def test_limits_of_diffusion_are_said(ball_mesh: TetMesh) -> None:
 def test_requests_that_make_no_sense(ball: Surface) -> None:
     with pytest.raises(InputError, match="no light"):
         solve(ball, TISSUE, [])
+    with pytest.raises(InputError, match="does not scatter, and light does not diffuse through a void"):
+        solve(ball, Medium(sigma_a=1.0, sigma_s=0.0, g=0.5, eta=1.4), [PointSource((0.0, 0.0, 0.0))])
     with pytest.raises(InputError, match="tolerance is 0"):
         solve(ball, TISSUE, [PointSource((0.0, 0.0, 0.0))], tolerance=0.0)
