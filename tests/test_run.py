@@ -85,7 +85,9 @@ def test_the_surface_and_volume_files_hold_the_solution(finished: Path) -> None:
 
 
 def test_warnings_are_printed_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "dark.yaml").write_text(QUICK.replace("sigma_a: 0.01", "sigma_a: 0.15") + "outputs: []\n")
+    (tmp_path / "dark.yaml").write_text(
+        QUICK.replace("sigma_a: 0.01", "sigma_a: 0.15").replace("0.1\n", "0.9\n") + "outputs: []\n"
+    )
     assert main(["run", str(tmp_path / "dark.yaml"), "--out", str(tmp_path / "out")]) == 0
     assert "note: the reduced albedo is 0.87" in capsys.readouterr().out
     summary = json.loads((tmp_path / "out" / "dark" / "summary.json").read_text())

@@ -59,7 +59,7 @@ def test_a_smaller_tolerance_is_met(ball: Surface) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.15)])
+@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.05)])
 def test_the_estimate_is_honest_elsewhere(depth: float, sigma_a: float, ball: Surface) -> None:
     """At the centre, without absorption, and in the dark: estimate over true error was 0.4 to 1.7 in three runs."""
     medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
