@@ -123,9 +123,9 @@ def solve(
         solution = _refined_until(problem, surface, tolerance, most_tetrahedra)
         if not solution.error_estimate <= tolerance:
             known = np.isfinite(solution.error_estimate)
-            estimate = f"the estimated error is {solution.error_estimate:.2g}" if known else "the error is not known"
+            found = f"the estimated error is {solution.error_estimate:.2g}" if known else "the error is not known"
             warnings.append(
-                f"the tolerance of {tolerance:g} was not met: {estimate} at the limit of {most_tetrahedra:,} tetrahedra."
+                f"the tolerance of {tolerance:g} was not met: {found}, at the limit of {most_tetrahedra:,} tetrahedra."
             )
     if solution.power.exited == 0.0:
         warnings.append(
