@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from tetlux.fem.lights import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import BoolArray, FloatArray
-from tetlux.meshing.errors import InputError
+from tetlux.meshing.errors import InputError, RunError
 
 FOR_SHAPES: dict[str, tuple[ClosedForm, ...]] = {
     "slab": ("robin", "images", "dipole"),
@@ -25,12 +25,15 @@ MEANINGS: dict[ClosedForm, str] = {
     "robin": "the same equation and boundary on the infinite slab, solved exactly: the difference is discretisation",
     "images": "the slab with fluence zero on extrapolated planes (Contini 1997): beyond discretisation, the difference "
     "is the boundary model",
-    "dipole": "the published dipole, a half-space with fluence zero on an extrapolated plane (Farrell 1992): beyond "
-    "discretisation, the difference is the boundary model and the slab's other face",
+    "dipole": "the dipole, a half-space with fluence zero on an extrapolated plane (Farrell 1992), with this medium's "
+    "A (classic for the published curve): beyond discretisation, the difference is the boundary model and the slab's "
+    "other face",
     "series": "the same equation and boundary, solved exactly: the difference is discretisation",
 }
 # Relative differences are taken where the closed form is above this share of its largest value.
 FLOOR = 1e-6
+# Below this an exitance is lost to arithmetic, W/unit².
+DARK = 1e-200
 
 Field = Callable[[FloatArray], FloatArray]
 
@@ -51,6 +54,8 @@ class Comparison:
         Exitance at points (n, 3) by each closed form, W/unit².
     note : str
         What all of them leave out.
+    single_valued : bool
+        Whether the coordinate alone determines the exitance, so that closed forms are lines over it.
     """
 
     coordinate: str
@@ -58,6 +63,7 @@ class Comparison:
     where: Callable[[FloatArray], BoolArray]
     forms: dict[ClosedForm, Field]
     note: str
+    single_valued: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +85,7 @@ class Compared:
     forms: dict[ClosedForm, FloatArray]
     differences: dict[ClosedForm, dict[str, float]]
     note: str
+    single_valued: bool
 
 
 def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], names: list[ClosedForm]) -> Comparison:
@@ -102,16 +109,33 @@ def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], 
     sources = np.vstack([d.points for d in deposits])
     powers = np.concatenate([d.powers for d in deposits])
     if shape.slab:
-        return _slab(shape.slab.width, shape.slab.depth, medium, sources, powers, names)
-    if shape.sphere:
-        return _sphere(shape.sphere.radius, np.asarray(shape.sphere.center), medium, sources, powers)
-    assert shape.cylinder is not None
-    spec = shape.cylinder
-    return _cylinder(spec.radius, spec.height, np.asarray(spec.center), medium, sources, powers)
+        found = _slab(shape.slab.width, shape.slab.depth, medium, sources, powers, names)
+        sample = np.array([[0.0, 0.0, 0.0]])
+    elif shape.sphere:
+        center, radius = np.asarray(shape.sphere.center), shape.sphere.radius
+        found = _sphere(radius, center, medium, sources, powers)
+        sample = center[None] + [radius, 0.0, 0.0]
+    else:
+        assert shape.cylinder is not None
+        center, radius = np.asarray(shape.cylinder.center), shape.cylinder.radius
+        found = _cylinder(radius, shape.cylinder.height, center, medium, sources, powers)
+        sample = center[None] + [radius, 0.0, 0.0]
+    # A closed form that cannot be had for this source says so now, not after the run.
+    for form in found.forms.values():
+        form(sample)
+    from_beam = any(d.specular > 0 or d.absorbed > 0 for d in deposits)
+    note = "All use the same sources, isotropic points."
+    return replace(found, note=f"{note} {source_model(medium)}" if from_beam else note)
 
 
 def compare(comparison: Comparison, solution: Solution) -> Compared:
-    """Hold a solution against closed forms at its boundary nodes."""
+    """Hold a solution against closed forms at its boundary nodes.
+
+    Raises
+    ------
+    RunError
+        If there is nothing to compare: no node where the closed forms hold, or no light at them.
+    """
     points = solution.mesh.boundary_points
     here = np.flatnonzero(comparison.where(points))
     along = comparison.along(points[here])
@@ -121,15 +145,22 @@ def compare(comparison: Comparison, solution: Solution) -> Compared:
     forms = {name: form(points[here]) for name, form in comparison.forms.items()}
     differences = {}
     for name, truth in forms.items():
+        largest = float(truth.max(initial=0.0))
+        if not largest > DARK:
+            raise RunError(
+                f'compare: the closed form "{name}" has no light at the nodes where it holds; leave compare out.'
+            )
         counted = truth > FLOOR * truth.max()
         relative = np.where(counted, exitance / np.where(counted, truth, 1.0) - 1.0, 0.0)
         worst = int(np.abs(relative).argmax())
         differences[name] = {
-            "l2": float(math.sqrt(weights @ (exitance - truth) ** 2 / (weights @ truth**2))),
+            "l2": float(math.sqrt(weights @ ((exitance - truth) / largest) ** 2 / (weights @ (truth / largest) ** 2))),
             "largest": float(relative[worst]),
             "at": float(along[worst]),
         }
-    return Compared(comparison.coordinate, along, exitance, forms, differences, comparison.note)
+    return Compared(
+        comparison.coordinate, along, exitance, forms, differences, comparison.note, comparison.single_valued
+    )
 
 
 def source_model(medium: Medium) -> str:
@@ -139,9 +170,8 @@ def source_model(medium: Medium) -> str:
     line = half_space.pencil_exitance(medium, rho=rho)
     change = math.sqrt((rho @ (line - point) ** 2) / (rho @ point**2))
     return (
-        "All use the same source model, isotropic points. For a pencil beam on a half-space of this medium, light that "
-        f"fades along a line (delta-Eddington) instead changes the exitance by {change:.1%} in L2, between one and ten "
-        "mean free paths from the entry."
+        "A pencil beam that fades along a line (delta-Eddington) instead would change the exitance of a half-space of "
+        f"this medium by {change:.1%} in L2, between one and ten mean free paths from the entry."
     )
 
 
@@ -183,20 +213,32 @@ def _slab(
         "images": summed(lambda depth, rho: slab.extrapolated_flux(medium, thickness=thickness, depth=depth, rho=rho)),
         "dipole": summed(lambda depth, rho: dipole.flux(medium, depth=depth, rho=rho)),
     }
-    # What the rim takes has faded by exp(-4) there and back.
-    rim = min(2.0 / medium.sigma_tr if medium.sigma_tr > 0 else np.inf, 0.25 * width)
-    middle = np.average(sources[:, :2], axis=0, weights=powers)
+    # Light spreads along the slab like its slowest mode; what the rim takes has faded by exp(-4) there and back.
+    decay = math.hypot(medium.sigma_tr, math.pi / (thickness + 2.0 * medium.extrapolation_length))
+    rim = 2.0 / decay
+    _check_room("rim", 0.5 * width - rim, np.abs(sources[:, :2]).max(), rim)
+    first = sources[0, :2]
 
     def where(points: FloatArray) -> BoolArray:
         return np.asarray((points[:, 2] > -1e-9 * width) & (np.abs(points[:, :2]).max(axis=1) < 0.5 * width - rim))
 
     return Comparison(
-        "distance from the entry",
-        lambda points: np.hypot(*(points[:, :2] - middle).T),
+        "distance from the source along the face",
+        lambda points: np.hypot(*(points[:, :2] - first).T),
         where,
         {name: forms[name] for name in names},
-        source_model(medium),
+        "",
+        single_valued=len(np.unique(sources[:, :2].round(9), axis=0)) == 1,
     )
+
+
+def _check_room(side: str, room: float, farthest: float, margin: float) -> None:
+    """Refuse a source so near to the end of the body that the endless one of the closed form is another body."""
+    if farthest > room:
+        raise InputError(
+            f"the light is deposited less than {margin:.3g} from the body's {side}, where the endless one of the closed "
+            "form is another; move the light, make the body larger, or leave compare out."
+        )
 
 
 def _sphere(radius: float, center: FloatArray, medium: Medium, sources: FloatArray, powers: FloatArray) -> Comparison:
@@ -224,7 +266,8 @@ def _sphere(radius: float, center: FloatArray, medium: Medium, sources: FloatArr
         lambda points: np.degrees(angle(points, sources[0])),
         lambda points: np.ones(len(points), dtype=bool),
         {"series": series},
-        source_model(medium),
+        "",
+        single_valued=len(sources) == 1,
     )
 
 
@@ -247,7 +290,9 @@ def _cylinder(
             )
         return total
 
-    end = min(2.0 / medium.sigma_tr if medium.sigma_tr > 0 else np.inf, 0.25 * height)
+    # As for the slab; 2.405 is the first zero of J_0.
+    end = 2.0 / math.hypot(medium.sigma_tr, 2.405 / (radius + medium.extrapolation_length))
+    _check_room("end", 0.5 * height - end, np.abs(sources[:, 2] - center[2]).max(), end)
 
     def where(points: FloatArray) -> BoolArray:
         x = points - center
@@ -258,5 +303,6 @@ def _cylinder(
         lambda points: np.linalg.norm(points - sources[0], axis=1),
         where,
         {"series": series},
-        source_model(medium),
+        "",
+        single_valued=len(sources) == 1 and float(np.hypot(*(sources[0] - center)[:2])) < 1e-9 * radius,
     )

@@ -34,7 +34,10 @@ def draw_comparison(compared: Compared, title: str, unit: str, path: Path) -> No
             compared.along,
             truth,
             color=COLORS[name],
+            linestyle="-" if compared.single_valued else "",
             linewidth=1.6,
+            marker="" if compared.single_valued else ".",
+            markersize=1.5,
             label=f"{name}: L2 difference {difference['l2']:.1%}",
         )
         counted = truth > FLOOR * truth.max()

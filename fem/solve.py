@@ -80,7 +80,8 @@ def solve(
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, see `tetlux.fem.forms.system_matrix`.
     most_tetrahedra : int
-        Where refinement stops even if the tolerance is not met; the solution then carries a warning.
+        Where refinement stops even if the tolerance is not met; the solution then carries a warning. The
+        mesher's own mesh, of some thousands, is the least.
     report : callable
         Called with a line of text as each stage ends.
 
@@ -106,6 +107,8 @@ def solve(
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     if isinstance(body, TetMesh):
+        if mesh is not None:
+            raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
         mesh = body
     watch = Stopwatch()
     started = time.perf_counter()

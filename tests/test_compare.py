@@ -12,7 +12,7 @@ from tetlux.cases.case import Case, load_cases
 from tetlux.cases.compare import compare, source_model
 from tetlux.cases.run import run_case
 from tetlux.fem import Medium, Solution, solve
-from tetlux.meshing import InputError
+from tetlux.meshing import InputError, RunError
 
 SLAB = """\
 surface: {slab: {width: 60, depth: 10}}
@@ -91,7 +91,7 @@ def test_a_wrong_exitance_is_seen(ball_solution: Solution, tmp_path: Path) -> No
 
 
 def test_the_source_model_is_given_a_figure() -> None:
-    assert "changes the exitance by" in source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
+    assert "would change the exitance" in source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
 
 
 @pytest.mark.parametrize(
@@ -104,6 +104,11 @@ def test_the_source_model_is_given_a_figure() -> None:
         ),
         ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*there is none for a torus"),
         ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms here are those of point sources"),
+        (
+            "origin: [3, 0, 10]",
+            "origin: [29, 0, 10]",
+            "compare: the light is deposited less than 7.01 from the body's rim",
+        ),
         ("[robin, images, dipole]", "[guess]", r"compare\[0\]: .*'guess'"),
     ],
 )
@@ -113,3 +118,17 @@ def test_what_has_no_closed_form_is_refused(old: str, new: str, message: str, tm
         text = text.replace("origin: [3, 0, 10]", "origin: [9, 0, 10]")
     with pytest.raises(InputError, match=message):
         load(tmp_path, text)
+
+
+def test_where_no_light_arrives_there_is_nothing_to_compare(ball_solution: Solution, tmp_path: Path) -> None:
+    text = SLAB.replace("slab: {width: 60, depth: 10}", "sphere: {radius: 10}").replace(
+        "[robin, images, dipole]", "[series]"
+    )
+    text = text.replace(
+        "pencil: {origin: [3, 0, 10], direction: [0, 0, -1], power: 2.0}", "point: {position: [0, 0, 0]}"
+    )
+    comparison = load(tmp_path, text.replace("sigma_a: 0.01", "sigma_a: 500")).comparison
+    assert comparison is not None
+    with pytest.raises(RunError, match="has no light at the nodes"):
+        compare(comparison, ball_solution)
+    assert comparison.note == "All use the same sources, isotropic points."

@@ -201,5 +201,12 @@ def test_requests_that_make_no_sense(ball: Surface) -> None:
         solve(ball, TISSUE, [])
     with pytest.raises(InputError, match="does not scatter, and light does not diffuse through a void"):
         solve(ball, Medium(sigma_a=1.0, sigma_s=0.0, g=0.5, eta=1.4), [PointSource((0.0, 0.0, 0.0))])
+    with pytest.raises(InputError, match="a mesh is given twice"):
+        solve(
+            block((1, 1, 1), (9.0, 9.0, 9.0)),
+            TISSUE,
+            [PointSource((0.0, 0.0, -1.0))],
+            mesh=block((1, 1, 1), (9.0, 9.0, 9.0)),
+        )
     with pytest.raises(InputError, match="tolerance is 0"):
         solve(ball, TISSUE, [PointSource((0.0, 0.0, 0.0))], tolerance=0.0)
