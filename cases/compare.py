@@ -236,8 +236,8 @@ def _check_room(side: str, room: float, farthest: float, margin: float) -> None:
     """Refuse a source so near to the end of the body that the endless one of the closed form is another body."""
     if farthest > room:
         raise InputError(
-            f"the light is deposited less than {margin:.3g} from the body's {side}, where the endless one of the closed "
-            "form is another; move the light, make the body larger, or leave compare out."
+            f"the light is deposited less than {margin:.3g} from the body's {side}, where the endless one of the "
+            "closed form is another; move the light, make the body larger, or leave compare out."
         )
 
 
