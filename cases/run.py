@@ -1,7 +1,6 @@
 """One run: solve a case and write what it asks for, whole or not at all."""
 
 import json
-import shutil
 import tempfile
 import time
 from collections.abc import Callable
@@ -73,7 +72,7 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> list
     writing = time.perf_counter()
     mesh = solution.mesh
     warnings = list(solution.warnings)
-    boundary = Surface(mesh.boundary_points, mesh.boundary_triangles, mesh.unit, case.name)
+    boundary = mesh.surface
     if "surface" in case.outputs:
         write_surface(boundary, folder / FILES["surface"], {"exitance": solution.exitance})
     if "volume" in case.outputs:
@@ -113,7 +112,7 @@ def _move(folder: Path, target: Path) -> None:
             (folder / name).replace(target / name)
         else:
             (target / name).unlink(missing_ok=True)
-    shutil.move(folder / SUMMARY, target / SUMMARY)
+    (folder / SUMMARY).replace(target / SUMMARY)
 
 
 def _rays(light: object, surface: Surface) -> tuple[Ray, ...]:

@@ -34,19 +34,17 @@ class Section(BaseModel):
 
 
 class Choice(Section):
-    """A mapping that holds exactly one of its keys."""
+    """A mapping that holds exactly one of the keys that have no default."""
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "Choice":
-        given = [name for name in type(self).model_fields if getattr(self, name) is not None]
+        kinds = [name for name, field in type(self).model_fields.items() if field.default is None]
+        given = [name for name in kinds if getattr(self, name) is not None]
         if len(given) != 1:
             raise PydanticCustomError(
                 "one_of",
                 "give exactly one of {known}, not {given}",
-                {
-                    "known": ", ".join(type(self).model_fields),
-                    "given": " and ".join(given) if given else "none",
-                },
+                {"known": ", ".join(kinds), "given": " and ".join(given) if given else "none"},
             )
         return self
 
@@ -88,7 +86,7 @@ class TorusSpec(Section):
     center: Vector3 = (0.0, 0.0, 0.0)
 
 
-class SurfaceSpec(Section):
+class SurfaceSpec(Choice):
     """The body: a surface file, or one built-in shape."""
 
     file: str | None = Field(None, description="surface file, relative to the case file")
@@ -100,15 +98,7 @@ class SurfaceSpec(Section):
     torus: TorusSpec | None = None
 
     @model_validator(mode="after")
-    def _one_body(self) -> "SurfaceSpec":
-        kinds = [name for name in type(self).model_fields if name != "scale"]
-        given = [name for name in kinds if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise PydanticCustomError(
-                "one_of",
-                "give exactly one of {known}, not {given}",
-                {"known": ", ".join(kinds), "given": " and ".join(given) if given else "none"},
-            )
+    def _scale_of_a_file(self) -> "SurfaceSpec":
         if self.file is None and self.scale != 1.0:
             raise PydanticCustomError("scale", "scale belongs to a file; give the shape its own lengths")
         return self

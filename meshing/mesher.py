@@ -158,8 +158,7 @@ def _check_against(mesh: TetMesh, surface: Surface, epsilon: float) -> None:
     # The envelope may shift the whole boundary by epsilon; self-intersecting input overlaps itself.
     slack = 0.02 + 2.0 * epsilon * surface.diagonal * surface.area / surface.volume
     # A surface that crosses itself counts what overlaps more than once, and the mesh is of the union.
-    overlaps = any("crosses itself" in w or "lies inside" in w for w in surface.warnings)
-    lowest = -0.9 if overlaps else -slack
+    lowest = -0.9 if surface.overlaps else -slack
     for quantity, change in (
         ("volume", mesh.volume / surface.volume - 1.0),
         ("area", mesh.area / surface.area - 1.0),

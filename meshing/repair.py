@@ -53,14 +53,15 @@ def surface_from_arrays(
     if np.ptp(points, axis=0).min() == 0:
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     points, faces = _closed(points, faces, name, repairs, warnings)
-    faces = _oriented(points, faces, name, repairs, warnings)
+    faces, nested = _oriented(points, faces, name, repairs, warnings)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     if 2.0 * signed_volume(points, faces) <= FLAT * diagonal * float(triangle_areas(points, faces)[1].sum()):
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     crossing = count_self_intersections(points, faces)
     if crossing:
         warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
-    return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings))
+    overlaps = nested or crossing > 0
+    return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings), overlaps)
 
 
 def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
@@ -199,8 +200,13 @@ def boundary_loops(faces: IntArray) -> list[IntArray]:
     return loops
 
 
-def _oriented(points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]) -> IntArray:
-    """Consistent winding within each body, and every body outward; cavities are refused."""
+def _oriented(
+    points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]
+) -> tuple[IntArray, bool]:
+    """Consistent winding within each body, and every body outward; and whether one lies within another.
+
+    Cavities are refused.
+    """
     if not _consistent(faces):
         import trimesh  # noqa: PLC0415
 
@@ -235,7 +241,7 @@ def _oriented(points: FloatArray, faces: IntArray, name: str, repairs: list[str]
             repairs.append("turned an inside-out surface outward.")
     if outer > 1:
         warnings.append(f"the surface consists of {outer} bodies; light does not pass between those that are apart.")
-    return result
+    return result, outer < len(parts)
 
 
 def _consistent(faces: IntArray) -> bool:

@@ -36,6 +36,9 @@ class Surface:
     name : str
     repairs, warnings : tuple of str
         What was mended when it was read, and what was left that a user should know.
+    overlaps : bool
+        Whether it crosses itself or holds a body within another, so that `volume` and `area` count parts of
+        the body more than once.
     """
 
     points: FloatArray
@@ -44,6 +47,7 @@ class Surface:
     name: str = "surface"
     repairs: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
+    overlaps: bool = False
 
     @cached_property
     def normals(self) -> FloatArray:

@@ -1,7 +1,7 @@
 """A pencil beam: it meets the surface, refracts, and is scattered along its path."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -145,7 +145,7 @@ class PencilBeam:
                 "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
                 "or read its exitance a mean free path away."
             )
-        return Deposit(**{**vars(deposit), "warnings": tuple(dict.fromkeys(warnings))})
+        return replace(deposit, warnings=tuple(dict.fromkeys(warnings)))
 
     def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
         if surface.contains(origin[None])[0]:
