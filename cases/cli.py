@@ -1,4 +1,4 @@
-"""The command line: ``tetlux run``, ``tetlux check``, ``tetlux schema``."""
+"""The command line: ``tetlux run``, ``tetlux check``, ``tetlux chart``, ``tetlux schema``."""
 
 import argparse
 import json
@@ -56,6 +56,12 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("cases", nargs="+", metavar="CASE")
     check.set_defaults(command=_check)
 
+    chart = commands.add_parser("chart", help="measure methods against each other: error, seconds, unknowns")
+    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: slab sphere torus hare, which ship")
+    chart.add_argument("--out", type=Path, default=Path("chart"), metavar="DIR", help="default: chart")
+    chart.add_argument("--quick", action="store_true", help="a few coarse runs of each method only")
+    chart.set_defaults(command=_chart)
+
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
     schema.set_defaults(command=_schema)
     return parser
@@ -71,6 +77,12 @@ def _check(options: argparse.Namespace) -> int:
     from tetlux.cases.batch import check_all  # noqa: PLC0415
 
     return check_all(options.cases)
+
+
+def _chart(options: argparse.Namespace) -> int:
+    from tetlux.cases.chart import DEFAULT_CASES, chart  # noqa: PLC0415
+
+    return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
 
 
 def _schema(_: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ from tetlux.cases.summary import summarize
 from tetlux.fem.lights import PencilBeam, PointSource
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
+from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.files import write_mesh, write_surface
@@ -72,16 +73,16 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> list
     writing = time.perf_counter()
     mesh = solution.mesh
     warnings = list(solution.warnings)
-    boundary = mesh.surface
+    surface, exitance = surface_exitance(solution)
     if "surface" in case.outputs:
-        write_surface(boundary, folder / FILES["surface"], {"exitance": solution.exitance})
+        write_surface(surface, folder / FILES["surface"], {"exitance": exitance})
     if "volume" in case.outputs:
         write_mesh(mesh, folder / FILES["volume"], {"fluence": solution.fluence})
     if "picture" in case.outputs:
         scene = Scene(
-            points=boundary.points,
-            triangles=boundary.faces,
-            exitance=solution.exitance,
+            points=surface.points,
+            triangles=surface.faces,
+            exitance=exitance,
             unit=mesh.unit,
             title=case.name,
             lights=tuple(ray for light in case.lights for ray in _rays(light, case.surface)),
@@ -96,7 +97,7 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> list
     now = time.perf_counter()
     seconds = {**solution.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
     seconds["surface"] += case.reading_seconds
-    figures = summarize(case, solution, seconds, warnings)
+    figures = summarize(case, solution, exitance, seconds, warnings)
     if compared is not None:
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)

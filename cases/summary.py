@@ -7,13 +7,16 @@ from typing import Any
 
 from tetlux.cases.case import Case
 from tetlux.fem.solution import Solution
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "pyvista", "trimesh")
 
 
-def summarize(case: Case, solution: Solution, seconds: dict[str, float], warnings: list[str]) -> dict[str, Any]:
-    """The summary of a run as plain data; lengths in the case's unit, power in W."""
+def summarize(
+    case: Case, solution: Solution, exitance: FloatArray, seconds: dict[str, float], warnings: list[str]
+) -> dict[str, Any]:
+    """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
     mesh, power = solution.mesh, solution.power
     estimate = solution.error_estimate
     return {
@@ -43,9 +46,9 @@ def summarize(case: Case, solution: Solution, seconds: dict[str, float], warning
                     "balance_error": power.balance_error,
                 },
                 "exitance": {
-                    "min": float(solution.exitance.min()),
-                    "max": float(solution.exitance.max()),
-                    "mean": float(mesh.boundary_node_areas @ solution.exitance / mesh.area),
+                    "min": float(exitance.min()),
+                    "max": float(exitance.max()),
+                    "mean": power.exited / mesh.area,
                 },
                 "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
                 "error_estimate": estimate if math.isfinite(estimate) else None,

@@ -3,7 +3,8 @@
 from tetlux.fem.lights import Deposit, DiffuseLight, Light, PencilBeam, PointSource
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power, Solution
-from tetlux.fem.solve import solve
+from tetlux.fem.solve import solve, solve_each
+from tetlux.fem.system import System
 
 __all__ = [
     "Deposit",
@@ -14,5 +15,7 @@ __all__ = [
     "PointSource",
     "Power",
     "Solution",
+    "System",
     "solve",
+    "solve_each",
 ]

@@ -9,18 +9,19 @@ boundary ``E.n = phi/(2A)``. The boundary term of Q1 cancels against that of the
 ``E = Q1/sigma_t' - D grad phi`` and is left out on purpose. The right-hand side is in `tetlux.fem.loads`.
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 from skfem import Basis, BilinearForm, ElementTetP1, FacetBasis, MeshTet1
 from skfem.helpers import dot, grad
 
+from tetlux.fem.assembly import Mass, system_matrix
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tetmesh import TetMesh
 
-Mass = Literal["lumped", "consistent"]
+__all__ = ["Mass", "absorption", "diffusion", "exitance", "node_volumes", "system_matrix", "weak_form_matrix"]
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.
 _CORNERS_OF_TETRAHEDRON = (np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), np.full(4, 1 / 24))
@@ -45,7 +46,7 @@ def exitance(phi: Any, v: Any, w: Any) -> Any:
     return phi * v / (2.0 * w.A)
 
 
-def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
+def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
     """The matrix of the left-hand side.
 
     Parameters
@@ -79,5 +80,4 @@ def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_a
 
 def node_volumes(mesh: TetMesh) -> FloatArray:
     """``∫ v`` of every node's hat function, (n,): weights that sum to the volume."""
-    weights = np.repeat(mesh.volumes / 4.0, 4)
-    return np.asarray(np.bincount(mesh.tetrahedra.ravel(), weights, minlength=len(mesh.points)), dtype=np.float64)
+    return mesh.node_volumes

@@ -3,18 +3,14 @@
 Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.fem.paths import CellTree
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tetmesh import TetMesh
-
-# How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
-SLACK = 1e-9
 
 
 def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
@@ -32,106 +28,59 @@ def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
         Of points and segments, sums to the scattered power that they hold, W, to rounding.
     """
     load = np.zeros(len(mesh.points))
-    if len(deposit.points):
-        _add_points(load, mesh, deposit.points, deposit.powers)
-    for start, direction, length, flux in zip(
-        deposit.starts, deposit.directions, deposit.lengths, deposit.fluxes, strict=True
-    ):
-        _add_segment(load, mesh, medium, start, direction, float(length), float(flux))
+    if len(deposit.points) or len(deposit.starts):
+        tree = CellTree(mesh)
+        line, points, powers = _line_load(mesh, tree, medium, deposit)
+        load += line
+        # Points go with what is left of the lines.
+        points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
+        load += _point_load(mesh, tree, points, powers)
     if deposit.transmitted_irradiance:
         _, c2 = moments(medium.eta)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
     return load
 
 
-def _add_points(load: FloatArray, mesh: TetMesh, points: FloatArray, powers: FloatArray) -> None:
-    cells, weights = mesh.locate(points)
+def _point_load(mesh: TetMesh, tree: CellTree, points: FloatArray, powers: FloatArray) -> FloatArray:
+    cells, weights = tree.locate(points)
     inside = cells >= 0
-    np.add.at(load, mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside])
+    load = _summed(mesh, mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside])
     if not inside.all():
         # Between the surface and the mesh's facets, a hair outside the mesh.
         _, faces, corner = mesh.closest_boundary(points[~inside])
-        np.add.at(load, mesh.boundary_faces[faces], powers[~inside, None] * corner)
+        load += _summed(mesh, mesh.boundary_faces[faces], powers[~inside, None] * corner)
+    return load
 
 
-def _add_segment(
-    load: FloatArray,
-    mesh: TetMesh,
-    medium: Medium,
-    start: FloatArray,
-    direction: FloatArray,
-    length: float,
-    flux: float,
-) -> None:
-    """A fading beam, integrated in closed form over every tetrahedron that it passes."""
+def _line_load(
+    mesh: TetMesh, tree: CellTree, medium: Medium, deposit: Deposit
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Fading beams, integrated in closed form over every tetrahedron that they pass.
+
+    Between the surface and the mesh's facets they may lie outside the mesh: of each such stretch the middle and its
+    power are returned besides the load, as points.
+    """
     scattering, cosine = medium.delta_eddington
     extinction = medium.sigma_a + scattering
-    stretches = _passed(mesh, start, direction, length)
-    step = stretches.leave - stretches.enter
-    x = extinction * step
-    carried = flux * scattering * np.exp(-extinction * stretches.enter)
-    mean = carried * step * _phi1(x)
-    inside = stretches.cells >= 0
-    cells, slopes, enter = stretches.cells[inside], stretches.slopes[inside], stretches.enter[inside]
-    at_entry = mesh.barycentric(start + enter[:, None] * direction, cells)
-    q0 = mean[inside, None] * at_entry + (carried * step**2 * _phi2(x))[inside, None] * slopes
-    q1 = cosine / medium.sigma_t_prime * mean[inside, None] * slopes
-    np.add.at(load, mesh.tetrahedra[cells], q0 + q1)
-    # Between the surface and the mesh's facets the path may lie outside the mesh: to the nearest nodes with it.
-    middle = start + 0.5 * (stretches.enter + stretches.leave)[:, None] * direction
-    _add_points(load, mesh, middle[~inside], mean[~inside])
+    load = np.zeros(len(mesh.points))
+    points, powers = [np.zeros((0, 3))], [np.zeros(0)]
+    for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths):
+        step = part.leave - part.enter
+        x = extinction * step
+        carried = deposit.fluxes[part.paths] * scattering * np.exp(-extinction * part.enter)
+        mean = carried * step * _phi1(x)
+        q0 = mean[:, None] * part.weights + (carried * step**2 * _phi2(x))[:, None] * part.slopes
+        q1 = cosine / medium.sigma_t_prime * mean[:, None] * part.slopes
+        inside = part.cells >= 0
+        load += _summed(mesh, mesh.tetrahedra[part.cells[inside]], (q0 + q1)[inside])
+        outside, middle = part.paths[~inside], 0.5 * (part.enter + part.leave)[~inside]
+        points.append(deposit.starts[outside] + middle[:, None] * deposit.directions[outside])
+        powers.append(mean[~inside])
+    return load, np.concatenate(points), np.concatenate(powers)
 
 
-@dataclass(frozen=True, eq=False)
-class _Stretches:
-    """A segment cut where it passes from tetrahedron to tetrahedron.
-
-    Attributes
-    ----------
-    cells : (s,) ndarray
-        The tetrahedron of each stretch, -1 outside the mesh.
-    enter, leave : (s,) ndarray
-        Along the segment.
-    slopes : (s, 4) ndarray
-        Derivatives of the barycentric coordinates along it.
-    """
-
-    cells: IntArray
-    enter: FloatArray
-    leave: FloatArray
-    slopes: FloatArray
-
-
-def _passed(mesh: TetMesh, start: FloatArray, direction: FloatArray, length: float) -> _Stretches:
-    """The tetrahedra along a segment, each stretch of it given to one of them."""
-    near = np.flatnonzero(_near_segment(mesh, start, direction, length))
-    base = mesh.barycentric(np.broadcast_to(start, (len(near), 3)), near)
-    slope = mesh.barycentric(np.broadcast_to(start + length * direction, (len(near), 3)), near) - base
-    slope /= length
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = -(base + SLACK) / slope
-    enter = np.where(slope > 0, root, -np.inf).max(axis=1, initial=-np.inf).clip(min=0.0)
-    leave = np.where(slope < 0, root, np.inf).min(axis=1, initial=np.inf).clip(max=length)
-    hit = (leave > enter) & ~((slope == 0) & (base < -SLACK)).any(axis=1)
-    near, base, slope = near[hit], base[hit], slope[hit]
-    cuts = np.unique(np.concatenate([[0.0, length], enter[hit], leave[hit]]))
-    middle = 0.5 * (cuts[1:] + cuts[:-1])
-    owner = np.full(len(middle), -1)
-    if len(near):
-        # A path along a face or an edge runs in several tetrahedra at once: the one it is deepest in has it.
-        depth = (base[None] + middle[:, None, None] * slope[None]).min(axis=2)
-        best = depth.argmax(axis=1)
-        owner = np.where(depth.max(axis=1) >= -2.0 * SLACK, best, -1)
-    slopes = slope[owner] if len(near) else np.zeros((len(middle), 4))
-    cells = np.where(owner >= 0, near[owner] if len(near) else -1, -1)
-    return _Stretches(cells, cuts[:-1], cuts[1:], slopes)
-
-
-def _near_segment(mesh: TetMesh, start: FloatArray, direction: FloatArray, length: float) -> BoolArray:
-    centre = mesh.points[mesh.tetrahedra[:, 0]] - start
-    along = np.clip(centre @ direction, 0.0, length)
-    distance = np.linalg.norm(centre - along[:, None] * direction, axis=1)
-    return np.asarray(distance <= mesh.longest_edges)
+def _summed(mesh: TetMesh, nodes: IntArray, shares: FloatArray) -> FloatArray:
+    return np.asarray(np.bincount(nodes.ravel(), shares.ravel(), minlength=len(mesh.points)), dtype=np.float64)
 
 
 def _phi1(x: FloatArray) -> FloatArray:

@@ -7,7 +7,9 @@ import numpy as np
 
 from tetlux.fem.fresnel import moments
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray
+from tetlux.fem.subtraction import Patch
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 
@@ -49,23 +51,29 @@ class Solution:
     Attributes
     ----------
     mesh : TetMesh
+    surface : Surface
+        What the mesh stands for: exitance at points is taken to this.
     medium : Medium
     fluence : (n,) ndarray
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
+    patches : tuple of Patch
+        Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.subtraction`.
     transmitted_irradiance : float
         Diffuse light that passed to the inside, W/unit².
     error_estimate : float
-        Estimated relative L2 error of the exitance; nan if there was one mesh only.
+        Estimated relative L2 error of the exitance: see `tetlux.fem.estimate`.
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
     """
 
     mesh: TetMesh
+    surface: Surface
     medium: Medium
     fluence: FloatArray
     power: Power
+    patches: tuple[Patch, ...] = ()
     transmitted_irradiance: float = 0.0
     error_estimate: float = np.nan
     seconds: dict[str, float] = field(default_factory=dict)
@@ -78,11 +86,14 @@ class Solution:
         ``M = phi/(2A)``; under diffuse light ``M = E_t + E.n``, where the boundary condition makes
         ``E.n = (phi - 4 E_t/(1 - 2 C1))/(2A)``.
         """
-        exitance = self.fluence[self.mesh.boundary_nodes] / (2.0 * self.medium.boundary_factor)
+        return self._exitance_of(self.fluence[self.mesh.boundary_nodes])
+
+    def _exitance_of(self, fluence: FloatArray) -> FloatArray:
+        exitance = fluence / (2.0 * self.medium.boundary_factor)
         if self.transmitted_irradiance:
             _, c2 = moments(self.medium.eta)
             exitance = exitance + self.transmitted_irradiance * (1.0 - 2.0 / (1.0 + 3.0 * c2))
-        return exitance
+        return np.asarray(exitance)
 
     def exitance_at(self, points: FloatArray) -> FloatArray:
         """Exitance at the points of the surface nearest to given points.
@@ -96,12 +107,28 @@ class Solution:
         (q,) ndarray
             W/unit².
         """
-        queries = np.asarray(points, dtype=float).reshape(-1, 3)
+        queries, _ = self.surface.project(np.asarray(points, dtype=float).reshape(-1, 3))
+        return self.exitance_on(queries)
+
+    def exitance_on(self, queries: FloatArray) -> FloatArray:
+        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         _, face, weights = self.mesh.closest_boundary(queries)
-        return np.asarray((weights * self.exitance[self.mesh.boundary_triangles[face]]).sum(axis=1))
+        cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
+        return self._exitance_of(self._interpolated(queries, cells, corners, weights))
+
+    def _interpolated(
+        self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray
+    ) -> FloatArray:
+        """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
+        fluence = (weights * self.fluence[nodes]).sum(axis=1)
+        for patch in self.patches:
+            inside = patch.cells[cells]
+            guess = patch.charges.fluence(points[inside])
+            fluence[inside] += guess - (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
+        return np.asarray(fluence)
 
     def fluence_at(self, points: FloatArray) -> FloatArray:
-        """Fluence at given points, linear within each tetrahedron.
+        """Fluence at given points.
 
         Parameters
         ----------
@@ -112,5 +139,17 @@ class Solution:
         (q,) ndarray
             W/unit²; nan outside the body.
         """
-        cells, weights = self.mesh.locate(np.asarray(points, dtype=float).reshape(-1, 3))
-        return np.asarray((weights * self.fluence[self.mesh.tetrahedra[cells]]).sum(axis=1))
+        queries = np.asarray(points, dtype=float).reshape(-1, 3)
+        cells, weights = self.mesh.locate(queries)
+        lost = np.flatnonzero(cells < 0)
+        if len(lost):
+            # Between the facets and the surface that they stand for, the nearest tetrahedron goes on.
+            lost = lost[self.surface.contains(queries[lost])]
+            cells[lost] = self.mesh.boundary_cells[self.mesh.closest_boundary(queries[lost])[1]]
+            weights[lost] = self.mesh.barycentric(queries[lost], cells[lost])
+        fluence = np.full(len(queries), np.nan)
+        found = cells >= 0
+        fluence[found] = self._interpolated(
+            queries[found], cells[found], self.mesh.tetrahedra[cells[found]], weights[found]
+        )
+        return fluence

@@ -1,19 +1,48 @@
-"""How far a mesh's boundary is from the surface it stands for."""
+"""How far two surfaces are from each other, and a mesh's boundary from the surface it stands for."""
 
 import numpy as np
 
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
+# Places of a surface at which the distance to another is measured, at 4 µs each. Surfaces that have more
+# vertices than this are far finer than what they are compared with, and a part of them tells as much.
+SAMPLES = 8_000
 
-def surface_deviation(mesh: TetMesh, surface: Surface) -> float:
-    """Two-sided distance between a mesh's boundary and a surface, unit.
 
-    The largest of the distances from the boundary's nodes and the middles of its triangles to the
-    surface, and from the surface's vertices to the boundary: the Hausdorff distance, sampled there.
+def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) -> float:
+    """Largest distance from either surface to the other, unit: the Hausdorff distance, sampled.
+
+    Parameters
+    ----------
+    first, second : Surface
+    samples : int
+        How many places of each surface are looked at, at most: vertices first, then the middles of edges and
+        of triangles; evenly chosen where there are more.
     """
-    middles = mesh.points[mesh.boundary_faces].mean(axis=1)
-    samples = np.vstack([mesh.boundary_points, middles])
-    to_surface = np.linalg.norm(surface.closest(samples)[0] - samples, axis=1).max()
-    to_mesh = np.linalg.norm(mesh.closest_boundary(surface.points)[0] - surface.points, axis=1).max()
-    return float(max(to_surface, to_mesh))
+    return max(_farthest(first, second, samples), _farthest(second, first, samples))
+
+
+def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = SAMPLES) -> float:
+    """Two-sided distance between a mesh's boundary and a surface, unit."""
+    return two_sided_distance(mesh.surface, surface, samples)
+
+
+def _farthest(source: Surface, target: Surface, samples: int) -> float:
+    queries = _places(source, samples)
+    return float(np.linalg.norm(target.closest(queries)[0] - queries, axis=1).max())
+
+
+def _places(surface: Surface, count: int) -> FloatArray:
+    corners = surface.points[surface.faces]
+    between = np.vstack([corners.mean(axis=1), *(0.5 * (corners[:, i] + corners[:, i - 1]) for i in range(3))])
+    vertices = _evenly(surface.points, count)
+    return np.vstack([vertices, _evenly(between, count - len(vertices))])
+
+
+def _evenly(points: FloatArray, count: int) -> FloatArray:
+    """`count` of the points at even steps of their numbers, or all if there are no more."""
+    if len(points) <= count:
+        return points
+    return points[np.arange(count) * len(points) // max(count, 1)]

@@ -1,27 +1,47 @@
 """From a closed surface to tetrahedra: pytetwild (fTetWild) behind a guard."""
 
+import importlib.util
+import json
+import math
+import os
 import subprocess
 import sys
 import tempfile
+import time
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.errors import InputError, RunError
+from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.repair import bodies
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
-# The command that fills input.npz of its working directory.
-MESHER: tuple[str, ...] = (sys.executable, "-m", "tetlux.meshing._mesher_process")
-# How far fTetWild may stray from the surface, as a share of the diagonal: three times its default, and
-# several times quicker; what it strays is taken back when the boundary nodes are moved onto the surface.
-EPSILON = 3e-3
-# At 30 it is a third quicker, and about one mesh in two holds slivers of quality below 0.02; at 10 the worst
-# seen on spheres, tori, slabs, cylinders and figures was 0.13.
-STOP_ENERGY = 10.0
+# The command that fills input.npz of its working directory; -S, since it is told where modules are.
+MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
+# Default deviation: this share of the diagonal, or of the body's mean thickness 2 V/A if that is less.
+DEVIATION = 0.01
+DEVIATION_OF_THICKNESS = 0.25
+# What fTetWild's envelope gets of the deviation; the proxy gets the rest. Time goes with the proxy's triangles
+# and, more steeply, with the inverse of the envelope.
+ENVELOPE = 0.55
+# Default edge length, as a share of the diagonal: longer ones make fewer tetrahedra and take no less time.
+EDGE_LENGTH = 1.0 / 12.0
+# At 14 it is a tenth quicker and the worst quality half of that at 10; at 30 three times quicker, and slivers
+# below 0.02 in most meshes.
+STOP_ENERGY = 9.5
+# A mesh whose boundary is farther from the surface than so many deviations has lost a part.
+LOST = 2.5
+# Places at which that is looked for: a lost part is larger than a triangle.
+LOOKS = 3_000
+# How much finer the second attempt is, if the first one's mesh is not the body of the surface.
+SECOND = 0.3
 # Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
 DEBRIS = 1e-3
 
@@ -30,13 +50,16 @@ def tetrahedralize(
     surface: Surface,
     *,
     edge_length: float | None = None,
-    epsilon: float = EPSILON,
+    deviation: float | None = None,
+    epsilon: float | None = None,
     stop_energy: float = STOP_ENERGY,
     time_limit: float = 600.0,
+    cache: bool | Path = True,
 ) -> TetMesh:
     """Fill a closed surface with tetrahedra.
 
-    pytetwild runs in a process of its own. Its boundary nodes are moved onto `surface` afterwards.
+    The surface is decimated within a measured distance, pytetwild fills that in a process of its own, and the
+    boundary nodes are moved onto `surface` itself. Meshes are remembered.
 
     Parameters
     ----------
@@ -44,12 +67,18 @@ def tetrahedralize(
     edge_length : float, optional
         Wanted edge length, unit; a twelfth of the bounding box's diagonal if not given. Thin parts get
         shorter edges where the shape needs them.
-    epsilon : float
-        Largest distance between the surface and fTetWild's boundary, as a share of the diagonal.
+    deviation : float, optional
+        How far the mesher's boundary may stray from `surface` before its nodes are moved back, unit. If not
+        given, what follows from `epsilon`, or else a hundredth of the diagonal, and less for thin bodies.
+    epsilon : float, optional
+        fTetWild's share of that: the largest distance between the surface that it is given and its boundary,
+        as a share of the diagonal. 0.55 of `deviation` if not given.
     stop_energy : float
         fTetWild's AMIPS energy at which a tetrahedron is good enough; 3 is a regular one.
     time_limit : float
         Seconds until the mesher is stopped.
+    cache : bool or Path
+        Whether meshes are looked up and kept in the user's cache directory, or another directory for them.
 
     Returns
     -------
@@ -58,7 +87,7 @@ def tetrahedralize(
     Raises
     ------
     InputError
-        If `edge_length`, `epsilon` or `time_limit` is not positive.
+        If `edge_length`, `deviation`, `epsilon`, `stop_energy` or `time_limit` is not positive.
     RunError
         If the mesher crashes, takes too long, or returns something that is not this body.
 
@@ -66,26 +95,94 @@ def tetrahedralize(
     -----
     fTetWild (Hu et al. 2020) is not deterministic: two runs differ in the last per cent of the nodes.
     """
-    wanted = surface.diagonal / 12.0 if edge_length is None else edge_length
-    for name, value in (("edge_length", wanted), ("epsilon", epsilon), ("time_limit", time_limit)):
-        if not np.isfinite(value) or value <= 0:
+    for name, value in (
+        ("edge_length", edge_length),
+        ("deviation", deviation),
+        ("epsilon", epsilon),
+        ("stop_energy", stop_energy),
+        ("time_limit", time_limit),
+    ):
+        if value is not None and not 0 < value < math.inf:
             raise InputError(f"{name} is {value:g}; give a number greater than 0.")
+    size = surface.diagonal
+    wanted = EDGE_LENGTH * size if edge_length is None else edge_length
+    if deviation is None:
+        thickness = 2.0 * surface.volume / surface.area
+        by_default = min(DEVIATION * size, DEVIATION_OF_THICKNESS * thickness)
+        deviation = by_default if epsilon is None else epsilon * size / ENVELOPE
+    envelope = ENVELOPE * deviation if epsilon is None else epsilon * size
+    directory = None if cache is False else cache_directory() if cache is True else cache
+    key = ""
+    if directory is not None:
+        key = mesh_key(
+            surface,
+            edge_length=wanted,
+            deviation=deviation,
+            envelope=envelope,
+            stop_energy=stop_energy,
+            pytetwild=version("pytetwild"),
+            fast_simplification=version("fast-simplification"),
+        )
+        known = remembered_mesh(key, directory, surface.unit)
+        if known is not None:
+            return known
+    mesh = _made(surface, wanted, deviation, envelope, stop_energy, time_limit)
+    if directory is not None:
+        remember_mesh(key, directory, mesh)
+    return mesh
+
+
+def _made(
+    surface: Surface, edge_length: float, deviation: float, envelope: float, stop_energy: float, time_limit: float
+) -> TetMesh:
+    """A mesh that is the body of the surface; if the first one is not, a second one, closer to the surface."""
+    end = time.monotonic() + time_limit
+
+    def attempt(share: float) -> TetMesh:
+        coarse = proxy(surface, share * (1.0 - ENVELOPE) * deviation)
+        return _filled(surface, coarse, edge_length, share * envelope, stop_energy, end - time.monotonic(), time_limit)
+
+    try:
+        mesh = attempt(1.0)
+        _check_against(mesh, surface, deviation)
+        lost = surface_deviation(mesh, surface, LOOKS) > LOST * deviation
+    except _NotTheBodyError:
+        lost = True
+    if lost:
+        mesh = attempt(SECOND)
+        _check_against(mesh, surface, SECOND * deviation)
+    return mesh
+
+
+class _NotTheBodyError(RunError):
+    """The mesher's mesh is another body than the surface's; a closer one may not be."""
+
+
+def _filled(
+    surface: Surface,
+    coarse: Surface,
+    edge_length: float,
+    envelope: float,
+    stop_energy: float,
+    seconds: float,
+    time_limit: float,
+) -> TetMesh:
+    """Tetrahedra in a proxy of the surface, their boundary nodes on the surface."""
     # Unit size, about the origin: fTetWild's tolerances are absolute in places.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     points, tetrahedra = _run_pytetwild(
-        (surface.points - origin) / size,
-        surface.faces,
-        edge_length=wanted / size,
-        epsilon=epsilon,
+        (coarse.points - origin) / size,
+        coarse.faces,
+        edge_length=edge_length / size,
+        # fTetWild measures by the diagonal of what it is given.
+        epsilon=envelope / coarse.diagonal,
         stop_energy=stop_energy,
+        seconds=seconds,
         time_limit=time_limit,
         name=surface.name,
     )
     points, tetrahedra = _cleaned(points, tetrahedra, surface)
-    mesh = TetMesh(points * size + origin, tetrahedra, surface.unit)
-    mesh = moved_to_surface(mesh, surface)
-    _check_against(mesh, surface, epsilon)
-    return mesh
+    return moved_to_surface(TetMesh(points * size + origin, tetrahedra, surface.unit), surface)
 
 
 def _run_pytetwild(
@@ -95,6 +192,7 @@ def _run_pytetwild(
     edge_length: float,
     epsilon: float,
     stop_energy: float,
+    seconds: float,
     time_limit: float,
     name: str,
 ) -> tuple[FloatArray, IntArray]:
@@ -110,19 +208,21 @@ def _run_pytetwild(
         )
         try:
             done = subprocess.run(
-                MESHER,
+                [*MESHER, _whereabouts()],
                 cwd=folder,
+                # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
                 stdin=subprocess.DEVNULL,
                 capture_output=True,
                 text=True,
                 errors="replace",
-                timeout=time_limit,
+                timeout=max(seconds, 0.0),
                 check=False,
             )
         except subprocess.TimeoutExpired as error:
             raise RunError(
                 f"{name}: the mesher was stopped after {time_limit:g} s; give a surface with fewer triangles, "
-                "or a longer time limit."
+                "a larger deviation, or a longer time limit."
             ) from error
         result = Path(folder) / "output.npz"
         if done.returncode != 0 or not result.exists():
@@ -133,6 +233,16 @@ def _run_pytetwild(
             )
         with np.load(result) as data:
             return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
+
+
+def _whereabouts() -> str:
+    """What `_mesher_process` is told: where modules are (an editable install may know it by a hook only)."""
+    spec = importlib.util.find_spec("pytetwild")
+    folder = (spec.submodule_search_locations or [""])[0] if spec else ""
+    places = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
+    # Relative ones are relative to another working directory.
+    paths = [place for place in dict.fromkeys(places) if Path(place).is_absolute()]
+    return json.dumps({"paths": paths, "pytetwild": folder, "parent": os.getpid()})
 
 
 def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface) -> tuple[FloatArray, IntArray]:
@@ -153,10 +263,11 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface) -> tupl
     return points[used], compact.reshape(tetrahedra.shape)
 
 
-def _check_against(mesh: TetMesh, surface: Surface, epsilon: float) -> None:
+def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     """Refuse a mesh that is not the body of the surface."""
-    # The envelope may shift the whole boundary by epsilon; self-intersecting input overlaps itself.
-    slack = 0.02 + 2.0 * epsilon * surface.diagonal * surface.area / surface.volume
+    # Boundary nodes are on the surface, but for those few that could not get there; chords cut through what is
+    # thin and round, by the deviation at most.
+    slack = 0.02 + deviation * surface.area / surface.volume
     # A surface that crosses itself counts what overlaps more than once, and the mesh is of the union.
     lowest = -0.9 if surface.overlaps else -slack
     for quantity, change in (
@@ -164,14 +275,14 @@ def _check_against(mesh: TetMesh, surface: Surface, epsilon: float) -> None:
         ("area", mesh.area / surface.area - 1.0),
     ):
         if not lowest <= change <= slack:
-            raise RunError(
+            raise _NotTheBodyError(
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
-                f"the mesher's envelope of {epsilon * surface.diagonal:.3g} {surface.unit}: give a smaller epsilon."
+                f"the mesher's deviation of {deviation:.3g} {surface.unit}: give a smaller deviation."
             )
     wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:
-        raise RunError(
+        raise _NotTheBodyError(
             f"{surface.name}: the mesh fell into {parts} parts where the surface has {wanted}; "
-            "give a smaller epsilon, or thicken the narrowest part."
+            "give a smaller deviation, or thicken the narrowest part."
         )

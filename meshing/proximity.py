@@ -1,5 +1,6 @@
 """Where is the surface? Nearest points, insides and rays, for a soup of triangles."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 
 # A line closer to a triangle's plane than this, by the sine of the angle, runs along it.
 PARALLEL = 1e-9
+# Pairs of boxes handled at once: tens of megabytes.
+PORTION = 1 << 18
 
 
 class ClosestPoint:
@@ -59,13 +62,62 @@ class ClosestPoint:
             faces[i] = int(face)
         return nearest, faces
 
-    def faces_near_segment(self, start: list[float], end: list[float]) -> list[int]:
-        """Faces whose bounding boxes a segment meets."""
-        from vtkmodules.vtkCommonCore import vtkIdList  # noqa: PLC0415
 
-        found = vtkIdList()
-        self._locator.FindCellsAlongLine(start, end, 0.0, found)
-        return [found.GetId(i) for i in range(found.GetNumberOfIds())]
+def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Pairs of boxes that touch or overlap, each pair once.
+
+    Boxes are sorted along a Morton curve, which makes a binary tree of boxes round neighbours; pairs of tree
+    nodes are opened level by level, whole levels at a time.
+
+    Parameters
+    ----------
+    low, high : (n, 3) ndarray
+        Corners of the boxes.
+
+    Yields
+    ------
+    first, second : (p,) ndarray
+        Numbers of the boxes, in portions that bound the memory.
+    """
+    order = np.argsort(_morton_code(0.5 * (low + high)))
+    depth = int(len(order) - 1).bit_length()
+    padding = (0, (1 << depth) - len(order))
+    # Padded with boxes that overlap nothing.
+    lows = [np.pad(x[order], padding, constant_values=np.inf) for x in low.T]
+    highs = [np.pad(x[order], padding, constant_values=-np.inf) for x in high.T]
+    levels = [(lows, highs)]
+    for _ in range(depth):
+        lows = [np.minimum(x[0::2], x[1::2]) for x in lows]
+        highs = [np.maximum(x[0::2], x[1::2]) for x in highs]
+        levels.append((lows, highs))
+    todo = [(depth, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
+    while todo:
+        level, i, j = todo.pop()
+        if level == 0:
+            apart = i != j
+            yield order[i[apart]], order[j[apart]]
+        elif len(i) > PORTION:
+            half = len(i) // 2
+            todo += [(level, i[:half], j[:half]), (level, i[half:], j[half:])]
+        else:
+            lows, highs = levels[level - 1]
+            i, j = 2 * i, 2 * j
+            # A node paired with itself: its second child with its first is its first with its second.
+            other = i != j
+            i, j = np.concatenate([i, i, i + 1, i[other] + 1]), np.concatenate([j, j + 1, j + 1, j[other]])
+            for lowest, highest in zip(lows, highs, strict=True):
+                keep = (lowest[i] <= highest[j]) & (lowest[j] <= highest[i])
+                i, j = i[keep], j[keep]
+            todo.append((level - 1, i, j))
+
+
+def _morton_code(points: FloatArray) -> IntArray:
+    """Place of each point along a space-filling curve, (n,): the bits of its three coordinates, interleaved."""
+    size = float(np.ptp(points, axis=0).max())
+    code = ((points - points.min(axis=0)) * (1023.0 / size if size > 0 else 0.0)).astype(np.int64)
+    for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        code = (code | code << shift) & mask
+    return np.asarray(code[:, 0] | code[:, 1] << 1 | code[:, 2] << 2)
 
 
 def winding_number(points: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
 
 UNITS = ("nm", "um", "mm", "cm", "m", "in")
@@ -39,6 +40,9 @@ class Surface:
     overlaps : bool
         Whether it crosses itself or holds a body within another, so that `volume` and `area` count parts of
         the body more than once.
+    crease_angle : float
+        Triangles that bend by less than this at their common edge, in degrees, are parts of one smooth surface,
+        and `on_curve` is where it is; 0 means the triangles themselves.
     """
 
     points: FloatArray
@@ -48,6 +52,7 @@ class Surface:
     repairs: tuple[str, ...] = field(default=())
     warnings: tuple[str, ...] = field(default=())
     overlaps: bool = False
+    crease_angle: float = 30.0
 
     @cached_property
     def normals(self) -> FloatArray:
@@ -76,6 +81,34 @@ class Surface:
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         """Nearest points of the surface (q, 3) and the faces they lie on (q,), for queries (q, 3)."""
         return self._closest(queries)
+
+    @cached_property
+    def _patches(self) -> CurvedPatches:
+        return CurvedPatches(self.points, self.faces, self.normals, self.crease_angle)
+
+    def on_curve(self, faces: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The smooth surface above points of its triangles.
+
+        Parameters
+        ----------
+        faces : (q,) ndarray
+        points : (q, 3) ndarray
+            On these faces.
+
+        Returns
+        -------
+        points : (q, 3) ndarray
+        normals : (q, 3) ndarray
+            Outward unit normals of the smooth surface there.
+        """
+        if self.crease_angle <= 0 or len(faces) == 0:
+            return points, self.normals[faces]
+        return self._patches(faces, barycentric_of(points, self.points[self.faces[faces]]))
+
+    def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The smooth surface's points (q, 3) and normals (q, 3) nearest to queries (q, 3), by the nearest triangle."""
+        nearest, faces = self.closest(queries)
+        return self.on_curve(faces, nearest)
 
     def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Whether each of the queries (q, 3) lies inside."""
@@ -124,6 +157,17 @@ class Surface:
         if len(leaves) == 0:
             return None
         return float(distances[leaves[0]]), int(faces[leaves[0]])
+
+
+def barycentric_of(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Barycentric coordinates (q, 3) of points (q, 3) on triangles (q, 3, 3)."""
+    u, v, w = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
+    normal = np.cross(u, v)
+    scale = np.einsum("ij,ij->i", normal, normal)
+    scale = np.where(scale > 0, scale, 1.0)
+    second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
+    third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
+    return np.column_stack([1.0 - second - third, second, third])
 
 
 def signed_volume(points: FloatArray, faces: IntArray) -> float:

@@ -1,19 +1,24 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.blocks import grouped, in_blocks, once
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint
 from tetlux.meshing.surface import Surface, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+# The edges of the face opposite each corner.
+EDGES_OF_FACES = np.array([[3, 4, 5], [1, 2, 5], [0, 2, 4], [0, 1, 3]])
+# Corners of a tetrahedron's edges, in the order of `TetMesh.tetrahedron_edges`.
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,29 +66,74 @@ class TetMesh:
         return float(self.volumes.sum())
 
     @cached_property
+    def _edges(self) -> tuple[IntArray, IndexArray]:
+        nodes, keys = len(self.points), np.empty((6, len(self.tetrahedra)), dtype=np.uint64)
+
+        def fill(block: slice) -> None:
+            corners = np.ascontiguousarray(self.tetrahedra[block].T)
+            for edge, (i, j) in enumerate(EDGES):
+                low, high = np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])
+                keys[edge, block] = low * nodes + high
+
+        in_blocks(fill, len(self.tetrahedra))
+        unique, inverse = grouped(keys.reshape(-1))
+        return np.stack(np.divmod(unique.view(np.int64), nodes), axis=1), inverse.reshape(6, -1).T
+
+    @property
+    def edges(self) -> IntArray:
+        """Edges as node numbers (e, 2), the smaller first, in ascending order."""
+        return self._edges[0]
+
+    @cached_property
+    def edge_lengths(self) -> FloatArray:
+        """Length of each edge, (e,), unit."""
+        first, second = self.points[self.edges.T]
+        return np.asarray(np.linalg.norm(second - first, axis=1))
+
+    @property
+    def tetrahedron_edges(self) -> IndexArray:
+        """The edges of each tetrahedron, (m, 6), between the corners 01, 02, 03, 12, 13 and 23."""
+        return self._edges[1]
+
+    @cached_property
     def _boundary(self) -> tuple[IntArray, IntArray]:
-        """Faces that belong to one tetrahedron only, (f, 3), and that tetrahedron, (f,)."""
-        faces = self.tetrahedra[:, _FACES].reshape(-1, 3)
-        key = np.sort(faces, axis=1)
-        count = len(self.points)
-        # One integer a face sorts several times faster than three.
-        flat = (key[:, 0] * count + key[:, 1]).astype(np.int64)
-        order = np.lexsort((key[:, 2], flat))
-        same = (flat[order][1:] == flat[order][:-1]) & (key[order][1:, 2] == key[order][:-1, 2])
-        single = np.ones(len(faces), dtype=bool)
-        single[order[1:][same]] = False
-        single[order[:-1][same]] = False
-        return faces[single], np.flatnonzero(single) // 4
+        """Faces that belong to one tetrahedron only, as ``4 tetrahedron + face``, and their corners (f, 3)."""
+        nodes, keys = len(self.points), np.empty((len(self.tetrahedra), 4), dtype=np.uint64)
+        # Three node numbers fit 64 bits up to here; beyond, the first two give way to the number of their pair.
+        small = nodes <= 2_600_000
+        pairs = np.empty((0 if small else len(keys), 4), dtype=np.uint64)
+
+        def fill(block: slice) -> None:
+            corners = np.ascontiguousarray(self.tetrahedra[block].T)
+            for face, (i, j, k) in enumerate(_FACES):
+                a, b, c = corners[i], corners[j], corners[k]
+                low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+                pair = low * nodes + (a + b + c - low - high)
+                if small:
+                    keys[block, face] = pair * nodes + high
+                else:
+                    keys[block, face], pairs[block, face] = high, pair
+
+        in_blocks(fill, len(keys))
+        if not small:
+            keys += (grouped(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
+        places = once(keys.reshape(-1))
+        return places, self.tetrahedra[places[:, None] // 4, _FACES[places % 4]]
 
     @property
     def boundary_faces(self) -> IntArray:
         """Boundary triangles (f, 3), outward oriented, as node numbers."""
-        return self._boundary[0]
+        return self._boundary[1]
 
     @property
     def boundary_cells(self) -> IntArray:
         """The tetrahedron behind each boundary triangle, (f,)."""
-        return self._boundary[1]
+        return self._boundary[0] // 4
+
+    @property
+    def boundary_edges(self) -> IndexArray:
+        """The three edges of each boundary triangle, (f, 3)."""
+        return np.asarray(self.tetrahedron_edges[self.boundary_cells[:, None], EDGES_OF_FACES[self._boundary[0] % 4]])
 
     @cached_property
     def boundary_nodes(self) -> IntArray:
@@ -113,9 +163,24 @@ class TetMesh:
     @cached_property
     def boundary_node_areas(self) -> FloatArray:
         """A third of the area of the triangles around each boundary node, (b,): weights that sum to `area`."""
-        weights = np.repeat(self.boundary_areas / 3.0, 3)
-        sums = np.bincount(self.boundary_triangles.ravel(), weights, minlength=len(self.boundary_nodes))
-        return np.asarray(sums, dtype=np.float64)
+        return self.to_boundary_nodes(self.boundary_areas)
+
+    def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
+        """Sums (b,) at boundary nodes of what boundary triangles (f,) give to their corners, a third to each."""
+        nodes, weights = self.boundary_triangles.ravel(), np.repeat(shares / 3.0, 3)
+        return np.asarray(np.bincount(nodes, weights, minlength=len(self.boundary_nodes)), dtype=np.float64)
+
+    @cached_property
+    def node_volumes(self) -> FloatArray:
+        """A quarter of the volume of the tetrahedra around each node, (n,): weights that sum to `volume`."""
+        return self.to_nodes(self.volumes)
+
+    def to_nodes(self, shares: FloatArray) -> FloatArray:
+        """Sums (n,) at nodes of what tetrahedra (m,) give to their corners, a quarter to each."""
+        sums = np.zeros(len(self.points))
+        for corner in self.tetrahedra.T:
+            sums += np.bincount(corner, shares / 4.0, minlength=len(sums))
+        return sums
 
     @cached_property
     def area(self) -> float:
@@ -130,20 +195,31 @@ class TetMesh:
     @cached_property
     def longest_edges(self) -> FloatArray:
         """Longest edge of each tetrahedron, (m,), unit."""
-        corners = self.points[self.tetrahedra]
-        lengths = [np.linalg.norm(corners[:, i] - corners[:, j], axis=1) for i, j in _EDGES]
-        return np.asarray(np.maximum.reduce(lengths))
+        result = np.empty(len(self.tetrahedra))
+
+        def fill(block: slice, corners: FloatArray) -> None:
+            squares = [dot(side, side) for side in (corners[j] - corners[i] for i, j in EDGES)]
+            result[block] = np.sqrt(np.maximum.reduce(squares))
+
+        over_corners(fill, self.points, self.tetrahedra)
+        return result
 
     @cached_property
     def quality(self) -> FloatArray:
         """Shape of each tetrahedron, (m,): three inradii over the circumradius, 1 regular, 0 flat."""
-        corners = self.points[self.tetrahedra]
-        u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
-        uu, vv, ww = (np.einsum("ij,ij->i", x, x)[:, None] for x in (u, v, w))
-        moment = uu * np.cross(v, w) + vv * np.cross(w, u) + ww * np.cross(u, v)
-        circumradius = np.linalg.norm(moment, axis=1) / (12.0 * self.volumes)
-        area = sum(triangle_areas(self.points, self.tetrahedra[:, f])[1] for f in _FACES)
-        return np.asarray(9.0 * self.volumes / area / circumradius)
+        result = np.empty(len(self.tetrahedra))
+
+        def fill(block: slice, corners: FloatArray) -> None:
+            u, v, w = corners[1:] - corners[0]
+            vw, wu, uv = cross(v, w), cross(w, u), cross(u, v)
+            volume = dot(u, vw) / 6.0
+            moment = dot(u, u) * vw + dot(v, v) * wu + dot(w, w) * uv
+            circumradius = np.sqrt(dot(moment, moment)) / (12.0 * volume)
+            area = 0.5 * sum(np.sqrt(dot(n, n)) for n in (vw, wu, uv, vw + wu + uv))
+            result[block] = 9.0 * volume / area / circumradius
+
+        over_corners(fill, self.points, self.tetrahedra)
+        return result
 
     @cached_property
     def _closest(self) -> ClosestPoint:
@@ -161,7 +237,14 @@ class TetMesh:
 
     @cached_property
     def _centroids(self) -> cKDTree:
-        return cKDTree(self.points[self.tetrahedra].mean(axis=1))
+        centroids = np.empty((len(self.tetrahedra), 3))
+
+        def fill(block: slice, corners: FloatArray) -> None:
+            centroids[block] = corners.mean(axis=0).T
+
+        over_corners(fill, self.points, self.tetrahedra)
+        # Centroids lie evenly enough without the medians that a balanced tree takes its time for.
+        return cKDTree(centroids, balanced_tree=False, compact_nodes=False)
 
     def barycentric(self, queries: FloatArray, cells: IntArray) -> FloatArray:
         """Barycentric coordinates of query i in tetrahedron ``cells[i]``, (q, 4)."""
@@ -212,5 +295,40 @@ class TetMesh:
 
 def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
     """Signed volumes (m,) of tetrahedra (m, 4)."""
-    a, b, c, d = (points[tetrahedra[:, i]] for i in range(4))
-    return np.asarray(np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0)
+    result = np.empty(len(tetrahedra))
+
+    def fill(block: slice, corners: FloatArray) -> None:
+        u, v, w = corners[1:] - corners[0]
+        result[block] = dot(u, cross(v, w)) / 6.0
+
+    over_corners(fill, points, tetrahedra)
+    return result
+
+
+def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray, tetrahedra: IntArray) -> None:
+    """Call ``work(block, corners)`` for blocks of tetrahedra, on all cores.
+
+    Parameters
+    ----------
+    work : callable
+        Gets a slice of ``range(m)`` and the corners there: (4, 3, b), corner, coordinate, tetrahedron.
+    points : (n, 3) ndarray
+    tetrahedra : (m, 4) ndarray
+    """
+    coordinates = np.ascontiguousarray(points.T)
+
+    def work_on(block: slice) -> None:
+        nodes = np.ascontiguousarray(tetrahedra[block].T)
+        work(block, np.stack([[axis[corner] for axis in coordinates] for corner in nodes]))
+
+    in_blocks(work_on, len(tetrahedra))
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Cross products (3, b) of vectors (3, b): NumPy's own is several times slower."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Dot products (b,) of vectors (3, b)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

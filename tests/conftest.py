@@ -1,5 +1,7 @@
 """Bodies and meshes that several tests share."""
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 from skfem import MeshTet1
@@ -8,6 +10,14 @@ from tetlux.fem import Medium, PointSource, Solution, solve
 from tetlux.meshing import Surface, TetMesh, sphere, tetrahedralize
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _own_mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests read and write no mesh of the user's cache."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TETLUX_CACHE_DIR", str(tmp_path_factory.mktemp("meshes")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -20,9 +20,10 @@ from skfem.refdom import RefTet, RefTri
 from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.forms import system_matrix
-from tetlux.fem.grading import graded, grading_for
+from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.linear import MultigridSolver
 from tetlux.fem.solve import solve
+from tetlux.fem.sources import Subtract
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing import sphere as sphere_surface
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -167,7 +168,7 @@ class Body:
         if self.inflow is not None:
             load += integrals_with_hats(mesh.points, mesh.boundary_faces, mesh.boundary_areas, self.inflow)
         fluence = MultigridSolver(system_matrix(mesh, medium)).solve(load)
-        return Solution(mesh, medium, fluence, Power(1.0, 0.0, 0.0, 1.0, 0.0))
+        return Solution(mesh, mesh.surface, medium, fluence, Power(1.0, 0.0, 0.0, 1.0, 0.0))
 
     def measured(self, level: int) -> Row:
         """Errors of fluence in the volume and of exitance on the surface, each point held to the true one."""
@@ -457,25 +458,27 @@ def torus_mesh(major: float, minor: float, n: int) -> TetMesh:
 
 
 class TrueSphere(Surface):
-    """A triangulated sphere whose nearest points are those of the sphere itself."""
+    """A triangulated sphere that stands for the sphere itself."""
 
-    def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
-        radius = np.linalg.norm(self.points[0])
-        nearest = queries * (radius / np.linalg.norm(queries, axis=1, keepdims=True))
-        return nearest, np.zeros(len(queries), dtype=np.int64)
+    def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:
+        normals = queries / np.linalg.norm(queries, axis=1, keepdims=True)
+        return normals * np.linalg.norm(self.points[0]), normals
 
 
 # Point sources, on meshes graded towards them
 
 
-def point_in_a_ball(finenesses: Sequence[float] = (1.0, 0.5, 0.25)) -> Table:
-    """A point one mean free path below the pole of a ball of radius 10, against the ball's series."""
+def point_in_a_ball(finenesses: Sequence[float], subtract: Subtract) -> Table:
+    """A point one mean free path below the pole of a ball of radius 10, against the ball's series.
+
+    Edges are `finenesses` times the distance from the source.
+    """
     medium = Coefficients(0.01, 1.0, 1.4).medium
     radius, height = 10.0, 10.0 - 1.0 / 1.01
     coarse = sphere_surface(radius)
     surface = TrueSphere(coarse.points, coarse.faces)
     light = PointSource((0.0, 0.0, height))
-    grading = grading_for([light.deposit_in(coarse, medium)], medium, coarse)
+    lit = lit_points([light.deposit_in(coarse, medium)], medium)
 
     def truth(x: FloatArray) -> FloatArray:
         gamma = np.arctan2(np.hypot(x[..., 0], x[..., 1]), x[..., 2])
@@ -483,13 +486,13 @@ def point_in_a_ball(finenesses: Sequence[float] = (1.0, 0.5, 0.25)) -> Table:
 
     rows = []
     for fineness in finenesses:
-        mesh, _ = graded(ball_mesh(radius, 4), surface, grading, fineness, 1_000_000)
-        solution = solve(mesh, medium, [light])
+        mesh = graded_towards(ball_mesh(radius, 4), surface, *lit, 1_000_000, longest=fineness)
+        solution = solve(surface, medium, [light], mesh=mesh, subtract=subtract)
         error = relative_error(
             mesh.boundary_points, mesh.boundary_triangles, mesh.boundary_areas, solution.exitance, truth
         )
         rows.append(Row.on(mesh, {"exitance": error, "exited power": abs(solution.power.exited / 0.79094984 - 1.0)}))
-    return Table("point source in a sphere, graded mesh", rows)
+    return Table(f"point source in a sphere, graded mesh, {subtract} subtracted", rows)
 
 
 # A point one mean free path below the face z = 0 of a plate so wide and thick that it is a half-space to
@@ -608,7 +611,8 @@ def main() -> None:
     """Print all tables."""
     for body in BODIES.values():
         print(body().table())
-    print(point_in_a_ball())
+    print(point_in_a_ball((1.0, 0.5, 0.25), "nothing"))
+    print(point_in_a_ball((1.0, 0.5, 0.25), "half-space"))
     print(dipole_and_robin())
 
 

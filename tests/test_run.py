@@ -52,8 +52,8 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
         "case": "ball", "unit": "mm", "model": "fem", "tolerance": 0.1,
     }  # fmt: skip
     assert set(summary["mesh"]) == {"nodes", "tetrahedra", "volume", "area", "surface_deviation", "min_quality"}
-    assert summary["mesh"]["volume"] == pytest.approx(4 / 3 * np.pi * 1000, rel=0.02)
-    assert 0 < summary["mesh"]["surface_deviation"] < 0.15
+    assert summary["mesh"]["volume"] == pytest.approx(4 / 3 * np.pi * 1000, rel=0.05)
+    assert 0 < summary["mesh"]["surface_deviation"] < 0.4
     (channel,) = summary["channels"]
     assert channel["name"] == "all"
     assert channel["sigma_tr"] == pytest.approx(0.174069, rel=1e-5)

@@ -23,10 +23,10 @@ def exitance_error(solution: Solution, depth: float = TISSUE.mean_free_path) -> 
 
 
 def test_sphere_against_its_series_with_default_settings(ball_solution: Solution) -> None:
-    # Six runs: 0.0081 to 0.0114, with 30,000 tetrahedra.
-    assert exitance_error(ball_solution) < 0.02
+    # Ten runs: 0.0031 to 0.0049, with 5,000 to 6,000 tetrahedra, and the power 0.0017 to 0.0031 off.
+    assert exitance_error(ball_solution) < 0.01
     assert ball_solution.power.exited == pytest.approx(0.79094984, rel=0.005)
-    # The estimate was 1.3 to 2.0 times the error.
+    assert len(ball_solution.mesh.tetrahedra) < 12_000
     assert 0.5 < ball_solution.error_estimate / exitance_error(ball_solution) < 3
     assert ball_solution.error_estimate <= 0.02
     assert ball_solution.warnings == []
@@ -46,34 +46,39 @@ def test_the_ledger_closes(ball_solution: Solution) -> None:
     power = ball_solution.power
     assert abs(power.balance_error) < 1e-9
     assert power.absorbed + power.exited == pytest.approx(1.0, abs=1e-9)
-    mesh = ball_solution.mesh
-    assert mesh.boundary_node_areas @ ball_solution.exitance == pytest.approx(power.exited, rel=1e-12)
+    # What exits is the integral of the exitance: here by 40,000 points on the true sphere.
+    gamma = np.pi * ((np.arange(40_000) + 0.5) / 40_000) ** 3
+    around = np.arange(40_000) * 2.399963
+    points = 10.0 * np.column_stack(
+        [np.sin(gamma) * np.cos(around), np.sin(gamma) * np.sin(around), np.cos(gamma)]
+    )
+    areas = 200 * np.pi * np.sin(gamma) * 3.0 * np.pi ** (1 / 3) * gamma ** (2 / 3) / 40_000
+    assert areas @ ball_solution.exitance_at(points) == pytest.approx(power.exited, rel=0.01)
 
 
 @pytest.mark.slow
 def test_a_smaller_tolerance_is_met(ball: Surface) -> None:
-    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 10.0 - TISSUE.mean_free_path))], tolerance=0.01)
-    # Three runs: 0.0038 to 0.0052.
-    assert exitance_error(solution) < 0.01
+    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 10.0 - TISSUE.mean_free_path))], tolerance=0.005)
+    assert exitance_error(solution) < 0.005
     assert 0.5 < solution.error_estimate / exitance_error(solution) < 3
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.05)])
+@pytest.mark.parametrize(("depth", "sigma_a"), [(10.0, 0.01), (7.0, 0.0), (1.0, 0.05), (0.1, 0.01)])
 def test_the_estimate_is_honest_elsewhere(depth: float, sigma_a: float, ball: Surface) -> None:
-    """At the centre, without absorption, and in the dark: estimate over true error was 0.4 to 1.7 in three runs."""
+    """At the centre, without absorption, in the dark, and close to the surface."""
     medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
     solution = solve(ball, medium, [PointSource((0.0, 0.0, 10.0 - depth))])
-    # 0.0045 to 0.0220.
-    assert exitance_error(solution, depth) < 0.03
-    assert 0.25 < solution.error_estimate / exitance_error(solution, depth) < 3
+    assert exitance_error(solution, depth) < 0.02
+    # 0.7 to 2.7 in three runs of each.
+    assert 0.5 < solution.error_estimate / exitance_error(solution, depth) < 3
 
 
 def test_a_tolerance_that_cannot_be_met_is_said(ball: Surface) -> None:
-    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 9.0))], tolerance=0.001, most_tetrahedra=15_000)
+    solution = solve(ball, TISSUE, [PointSource((0.0, 0.0, 9.0))], tolerance=0.0005, most_tetrahedra=15_000)
     assert solution.error_estimate > exitance_error(solution, 1.0) / 2
     assert len(solution.mesh.tetrahedra) <= 15_000
-    assert "tolerance of 0.001 was not met" in solution.warnings[-1]
+    assert "tolerance of 0.0005 was not met" in solution.warnings[-1]
 
 
 def test_exitance_converges_at_second_order_on_a_plate() -> None:
@@ -113,8 +118,8 @@ def test_lumping_keeps_the_fluence_positive_where_consistent_mass_does_not() -> 
     dark = Medium(sigma_a=5.0, sigma_s_prime=5.0, eta=1.4)
     mesh = block((6, 6, 6), (6.0, 6.0, 6.0))
     source = [PointSource((0.1, 0.2, -3.1))]
-    lumped = solve(mesh, dark, source).fluence
-    consistent = solve(mesh, dark, source, mass="consistent").fluence
+    lumped = solve(mesh, dark, source, subtract="nothing").fluence
+    consistent = solve(mesh, dark, source, mass="consistent", subtract="nothing").fluence
     assert lumped.min() > -1e-12 * lumped.max()
     assert consistent.min() < -1e-3 * consistent.max()
 
@@ -125,8 +130,9 @@ def test_a_given_mesh_is_used_as_it_is(ball: Surface, ball_mesh: TetMesh) -> Non
     beside = solve(ball, TISSUE, source, mesh=ball_mesh)
     assert alone.mesh is ball_mesh
     assert beside.mesh is ball_mesh
-    assert (alone.fluence == beside.fluence).all()
-    assert math.isnan(alone.error_estimate)
+    # The images of the source are those of the mesh's facets, or of the surface that they stand for.
+    assert alone.fluence == pytest.approx(beside.fluence, rel=0.05)
+    assert alone.error_estimate > exitance_error(alone, 5.0) / 3
 
 
 def test_lights_add_up(ball_mesh: TetMesh) -> None:
@@ -148,7 +154,7 @@ def test_a_pencil_beam_on_a_ball_against_monte_carlo(deposit: str, ball: Surface
     beam = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit=deposit)  # type: ignore[arg-type]
     solution = solve(ball, medium, [beam], tolerance=0.05, most_tetrahedra=60_000)
     expected = {"point": 0.7614, "line": 0.7651}[deposit]
-    assert solution.power.exited == pytest.approx(expected, rel=0.004)
+    assert solution.power.exited == pytest.approx(expected, rel=0.008)
     assert solution.power.specular == pytest.approx(0.0277778, rel=0.01)
     assert abs(solution.power.balance_error) < 1e-9
 

@@ -6,8 +6,21 @@ import numpy as np
 import pytest
 import trimesh
 
-from tetlux.meshing import InputError, Surface, box, cylinder, read_surface, slab, sphere, surface_from_arrays, torus
+from tetlux.meshing import (
+    InputError,
+    Surface,
+    box,
+    cylinder,
+    proximity,
+    read_surface,
+    slab,
+    sphere,
+    surface_from_arrays,
+    torus,
+)
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.proximity import cross_segments, overlapping_boxes
+from tetlux.meshing.repair import count_self_intersections
 
 
 @pytest.fixture
@@ -276,3 +289,34 @@ def test_a_hole_of_a_twentieth_is_closed_and_one_of_a_fifth_is_not() -> None:
     nudged = ball.points[ball.faces].reshape(-1, 3) * (1 + 1e-5 * (np.arange(3 * len(ball.faces)) % 2)[:, None])
     with pytest.raises(InputError, match="open"):
         surface_from_arrays(nudged, np.arange(len(nudged)).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.1, 0.3])
+def test_self_intersections_are_those_of_every_edge_with_every_triangle(roughness: float) -> None:
+    ball = sphere(1.0, subdivisions=2)
+    points = ball.points + np.random.default_rng(0).normal(scale=roughness, size=ball.points.shape)
+    edges = np.vstack([ball.faces[:, [i, (i + 1) % 3]] for i in range(3)])
+    edge, face = (x.ravel() for x in np.meshgrid(np.arange(len(edges)), np.arange(len(ball.faces)), indexing="ij"))
+    apart = (ball.faces[face][:, :, None] != edges[edge][:, None, :]).all(axis=(1, 2))
+    edge, face = edge[apart], face[apart]
+    start = points[edges[edge, 0]]
+    t, _ = cross_segments(start, points[edges[edge, 1]] - start, points[ball.faces[face]])
+    expected = len(np.unique(face[(t > 0) & (t < 1)]))
+    assert (expected > 0) == (roughness > 0)
+    assert count_self_intersections(points, ball.faces) == expected
+
+
+@pytest.mark.parametrize("portion", [1 << 18, 50])
+def test_boxes_that_overlap_are_found_once(portion: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(proximity, "PORTION", portion)
+    random = np.random.default_rng(0)
+    low = random.uniform(size=(300, 3))
+    # Sizes over three orders of magnitude, and some boxes that are points.
+    high = low + 10.0 ** random.uniform(-3, 0, (300, 1)) * random.integers(0, 2, (300, 3))
+    found = [(min(i, j), max(i, j)) for a, b in overlapping_boxes(low, high) for i, j in zip(a, b, strict=True)]
+    touch = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    assert sorted(found) == list(zip(*np.nonzero(np.triu(touch, 1)), strict=True))
+
+
+def test_one_box_overlaps_nothing() -> None:
+    assert [len(i) for i, _ in overlapping_boxes(np.zeros((1, 3)), np.ones((1, 3)))] == [0]

@@ -21,21 +21,22 @@ from tetlux.meshing import (
     tetrahedralize,
     torus,
 )
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.repair import bodies
 
 
 def test_the_mesher_fills_the_body(ball: Surface, ball_mesh: TetMesh) -> None:
     assert (ball_mesh.volumes > 0).all()
-    # Over ten runs the volume was 0.9905 to 0.9925 of the surface's, the worst quality 0.13 to 0.38.
-    assert ball_mesh.volume == pytest.approx(ball.volume, rel=0.015)
-    assert ball_mesh.area == pytest.approx(ball.area, rel=0.01)
-    assert ball_mesh.quality.min() > 0.03
-    assert surface_deviation(ball_mesh, ball) < 4e-3 * ball.diagonal
-    nearest, _ = ball.closest(ball_mesh.boundary_points)
-    on_surface = np.linalg.norm(nearest - ball_mesh.boundary_points, axis=1) < 1e-9
-    assert on_surface.mean() > 0.98
+    # Over ten runs the volume was 0.9757 to 0.9761 of the surface's, the area 0.987, the worst quality 0.27 to
+    # 0.35, the deviation 0.0050 to 0.0053 of the diagonal, and there were 2,475 to 2,500 tetrahedra.
+    assert ball_mesh.volume == pytest.approx(ball.volume, rel=0.03)
+    assert ball_mesh.area == pytest.approx(ball.area, rel=0.02)
+    assert ball_mesh.quality.min() > 0.1
+    assert surface_deviation(ball_mesh, ball) < 8e-3 * ball.diagonal
+    assert 1500 < len(ball_mesh.tetrahedra) < 4000
 
 
 def test_boundary_triangles_face_outward(ball_mesh: TetMesh) -> None:
@@ -135,47 +136,149 @@ def test_a_crash_of_the_mesher_is_an_error_with_advice(monkeypatch: pytest.Monke
     dying = (sys.executable, "-c", "import os; os.kill(os.getpid(), 11)")
     monkeypatch.setattr(mesher, "MESHER", dying)
     with pytest.raises(RunError, match=r"box: the mesher failed \(signal 11\); repair or simplify"):
-        tetrahedralize(box((1.0, 1.0, 1.0)))
+        tetrahedralize(box((1.0, 1.0, 1.0)), cache=False)
 
 
 def test_the_mesher_is_stopped_at_its_time_limit(ball: Surface) -> None:
     with pytest.raises(RunError, match=r"stopped after 0\.05 s"):
-        tetrahedralize(ball, time_limit=0.05)
+        tetrahedralize(ball, time_limit=0.05, cache=False)
 
 
 def test_the_mesher_leaves_nothing_in_the_working_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    tetrahedralize(box((1.0, 1.0, 1.0)), edge_length=0.5)
+    tetrahedralize(box((1.0, 1.0, 1.0)), edge_length=0.5, cache=False)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_mesh_that_is_not_the_body_is_refused(monkeypatch: pytest.MonkeyPatch, ball: Surface) -> None:
     cube = block((2, 2, 2), (1.0, 1.0, 1.0))
     monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (cube.points, cube.tetrahedra))
-    with pytest.raises(RunError, match=r"volume is .* off the surface's"):
-        tetrahedralize(ball)
+    with pytest.raises(RunError, match=r"volume is .* off the surface's.* give a smaller deviation"):
+        tetrahedralize(ball, cache=False)
 
 
-@pytest.mark.parametrize("name", ["edge_length", "epsilon", "time_limit"])
+@pytest.mark.parametrize("name", ["edge_length", "deviation", "epsilon", "stop_energy", "time_limit"])
 def test_the_mesher_refuses_what_it_would_ignore(name: str, ball: Surface) -> None:
     with pytest.raises(InputError, match=f"{name} is -1"):
-        tetrahedralize(ball, **{name: -1.0})
+        tetrahedralize(ball, **{name: -1.0})  # type: ignore[arg-type]
 
 
 def test_importing_meshing_is_light() -> None:
     """What reads no file and draws no picture must not wait for the libraries that do."""
-    heavy = ("pyvista", "trimesh", "pytetwild", "meshio")
+    heavy = ("pyvista", "trimesh", "pytetwild", "meshio", "fast_simplification")
     code = f"import sys, tetlux.meshing; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
 
 def test_boundary_nodes_are_moved_onto_the_surface() -> None:
-    # fTetWild's own boundary is up to 0.003 of the diagonal off a ring, at all of its nodes.
+    # The mesher's boundary is up to a hundredth of the diagonal off a ring, at all of its nodes; on the smooth
+    # ring, the triangles' vertices are as well as on it, and the curve between them.
     ring = torus(4.0, 1.5, segments=48)
-    mesh = tetrahedralize(ring)
-    off = np.linalg.norm(ring.closest(mesh.boundary_points)[0] - mesh.boundary_points, axis=1)
-    assert (off < 1e-9 * ring.diagonal).mean() > 0.95
+    x, y, z = tetrahedralize(ring).boundary_points.T
+    off = np.abs(np.hypot(np.hypot(x, y) - 4.0, z) - 1.5)
+    # Over ten runs: 0.96 to 1.0 of the nodes.
+    assert (off < 2e-4 * ring.diagonal).mean() > 0.9
+
+
+def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
+    """A cube whose nodes are called onto a ball far larger: corners would be drawn out, faces pushed flat."""
+    cube = block((4, 4, 4), (2.0, 2.0, 2.0))
+    target = sphere(2.0, center=(0.0, 0.0, -1.0))
+    moved = moved_to_surface(cube, target)
+    assert moved.volume > 1.1 * cube.volume
+    assert (moved.volumes >= 0.399 * cube.volumes).all()
+    assert (moved.quality >= np.minimum(cube.quality, np.maximum(0.1, 0.4 * cube.quality)) - 1e-9).all()
+
+
+def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPatch) -> None:
+    cube, other = block((4, 4, 4), (1.0, 1.0, 1.0)), block((1, 1, 1), (0.1, 0.1, 0.1))
+    given: list[float] = []
+
+    def run(*_: object, epsilon: float, **__: object) -> tuple[FloatArray, IntArray]:
+        given.append(epsilon)
+        mesh = other if len(given) == 1 else cube
+        return (mesh.points + np.array([0.0, 0.0, 0.5])) / np.sqrt(3), mesh.tetrahedra
+
+    monkeypatch.setattr(mesher, "_run_pytetwild", run)
+    assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
+    assert given[1] == pytest.approx(mesher.SECOND * given[0])
+
+
+def test_a_mesh_that_lost_a_part_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A thin horn is a hundredth of the volume, and of the area little more: only the distance tells."""
+    body, horn = box((4.0, 4.0, 4.0)), box((0.1, 0.1, 1.0), center=(0.0, 0.0, 2.5))
+    both = Surface(
+        np.vstack([body.points, horn.points]), np.vstack([body.faces, horn.faces + len(body.points)]), overlaps=True
+    )
+    mesh = block((4, 4, 4), (4.0, 4.0, 4.0))
+    for surface, runs in ((body, 1), (both, 2)):
+        points = (mesh.points + np.array([0.0, 0.0, 2.0]) - surface.points.mean(axis=0)) / surface.diagonal
+        given: list[float] = []
+
+        def run(
+            *_: object, epsilon: float, points: FloatArray = points, given: list[float] = given, **__: object
+        ) -> tuple[FloatArray, IntArray]:
+            given.append(epsilon)
+            return points, mesh.tetrahedra
+
+        monkeypatch.setattr(mesher, "_run_pytetwild", run)
+        tetrahedralize(surface, cache=False)
+        assert len(given) == runs
+
+
+def test_the_envelope_follows_from_the_deviation_and_the_other_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[tuple[float, float]] = []
+    cube = block((1, 1, 1), (1.0, 1.0, 1.0))
+
+    def make(_: Surface, __: float, deviation: float, envelope: float, *___: float) -> TetMesh:
+        made.append((deviation, envelope))
+        return cube
+
+    monkeypatch.setattr(mesher, "_made", make)
+    unit, plate = box((1.0, 1.0, 1.0)), box((1.0, 1.0, 0.01))
+    tetrahedralize(unit, cache=False)
+    tetrahedralize(plate, cache=False)
+    tetrahedralize(unit, deviation=0.1, cache=False)
+    tetrahedralize(unit, epsilon=0.01, cache=False)
+    tetrahedralize(unit, deviation=0.1, epsilon=0.01, cache=False)
+    diagonal = np.sqrt(3)
+    assert made[0] == pytest.approx((0.01 * diagonal, 0.0055 * diagonal))
+    # Mean thickness, 2 V/A: 0.0098.
+    assert made[1][0] == pytest.approx(0.25 * 0.0098, rel=1e-3)
+    assert made[2] == pytest.approx((0.1, 0.055))
+    assert made[3] == pytest.approx((0.01 * diagonal / 0.55, 0.01 * diagonal))
+    assert made[4] == pytest.approx((0.1, 0.01 * diagonal))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="PR_SET_PDEATHSIG is Linux's")
+def test_the_mesher_dies_with_its_parent() -> None:
+    child = (
+        "import os, time; from tetlux.meshing._mesher_process import _die_with; _die_with(os.getppid());"
+        "print(os.getpid(), flush=True); time.sleep(60)"
+    )
+    parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
+    with subprocess.Popen([sys.executable, "-c", parent], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        pid = int(process.stdout.readline())
+        assert Path(f"/proc/{pid}").exists()
+        process.kill()
+        # Closed when the last process that can write to it is gone.
+        assert process.stdout.read() == ""
+    stat = Path(f"/proc/{pid}/stat")
+    assert not stat.exists() or stat.read_text().split()[2] == "Z"
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_pytetwild_is_loaded_without_pyvista_and_if_need_be_with_it(found: bool) -> None:
+    code = (
+        "import importlib.util, sys; from tetlux.meshing._mesher_process import _without_package;"
+        "folder = importlib.util.find_spec('pytetwild').submodule_search_locations[0];"
+        f"function = _without_package(folder if {found} else '/nowhere');"
+        "print(function.__name__, 'pyvista' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["tetrahedralize", str(not found)]
 
 
 def test_bodies_that_overlap_are_one_and_bodies_apart_are_two() -> None:
@@ -186,7 +289,8 @@ def test_bodies_that_overlap_are_one_and_bodies_apart_are_two() -> None:
         mesh = tetrahedralize(pair)
         assert bodies(len(mesh.points), mesh.tetrahedra).max() + 1 == count
         lens = np.pi * (12 - offset) ** 2 * (offset**2 + 24 * offset) / (12 * offset) if count == 1 else 0.0
-        assert mesh.volume == pytest.approx(2 * a.volume - lens, rel=0.03)
+        # Over ten runs: 0.004 to 0.045 too small.
+        assert mesh.volume == pytest.approx(2 * a.volume - lens, rel=0.07)
 
 
 def test_crumbs_of_the_envelope_are_swept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,4 +299,4 @@ def test_crumbs_of_the_envelope_are_swept(monkeypatch: pytest.MonkeyPatch) -> No
     points = np.vstack([(cube.points + np.array([0.0, 0.0, 0.5])) / np.sqrt(3), crumb])
     cells = np.vstack([cube.tetrahedra, len(cube.points) + np.arange(4)])
     monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (points, cells))
-    assert len(tetrahedralize(box((1.0, 1.0, 1.0))).tetrahedra) == len(cube.tetrahedra)
+    assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)

@@ -1,0 +1,153 @@
+"""The system matrix in closed form: what `tetlux.fem.forms` says, some ten times quicker.
+
+On a tetrahedron of volume V, with N_i the inward normal of the face opposite corner i, as long as twice its area,
+the gradients of the hat functions are ``N_i / (6V)``, so that (Zienkiewicz, Taylor & Zhu, The Finite Element Method,
+7th ed., 6.2)::
+
+    ∫ D grad v_i . grad v_j = D N_i . N_j / (36V)
+    ∫ sigma_a v_i v_j       = sigma_a V (1 + delta_ij)/20,   lumped: delta_ij sigma_a V/4
+    ∮ v_i v_j / (2A)        = area (1 + delta_ij)/12 / (2A), lumped: delta_ij area/3 / (2A)
+
+The gradients sum to zero, so the first is known from its values on the edges: each row sums to zero.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.tetmesh import EDGES, TetMesh, cross, dot, over_corners
+
+Mass = Literal["lumped", "consistent"]
+
+
+def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
+    """The matrix of the left-hand side of the weak form in `tetlux.fem.forms`.
+
+    Several media on one mesh share an `Assembly`.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    medium : Medium
+    mass : {"lumped", "consistent"}
+        How the two terms without derivatives are integrated. Lumped (by the corners) is as accurate at
+        second order, and keeps the fluence from going negative where consistent mass does.
+
+    Returns
+    -------
+    (n, n) csr_array
+        Symmetric, positive definite, indices sorted.
+    """
+    return Assembly(mesh).of(medium, mass)
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """What all matrices on a mesh have in common: their pattern, and the integrals of their hat functions.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    """
+
+    mesh: TetMesh
+
+    def of(self, medium: Medium, mass: Mass = "lumped") -> csr_array:
+        """The matrix of a medium, see `system_matrix`."""
+        return self.matrix(medium.diffusion, medium.sigma_a, 0.5 / medium.boundary_factor, mass)
+
+    def matrix(
+        self,
+        diffusion: float | FloatArray,
+        sigma_a: float | FloatArray,
+        escape: float | FloatArray,
+        mass: Mass = "lumped",
+    ) -> csr_array:
+        """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ escape phi v``.
+
+        Parameters
+        ----------
+        diffusion : float or (m,) ndarray
+            D, of all or of each tetrahedron, unit.
+        sigma_a : float or (m,) ndarray
+            Absorption coefficient, 1/unit.
+        escape : float or (f,) ndarray
+            1/(2A), of all or of each boundary triangle.
+        mass : {"lumped", "consistent"}
+
+        Returns
+        -------
+        (n, n) csr_array
+            It shares its pattern with the others of this assembly.
+        """
+        mesh, nodes = self.mesh, len(self.mesh.points)
+        low, high = mesh.edges.T
+        edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
+        diagonal = -_sums(low, edges, nodes) - _sums(high, edges, nodes)
+        absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
+        diagonal += absorbed
+        diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
+        if mass == "consistent":
+            # Their rows sum to what those of the lumped ones hold on the diagonal.
+            within = np.tile(sigma_a * mesh.volumes / 20.0, 6)
+            across = np.repeat(escape * mesh.boundary_areas / 12.0, 3)
+            coupling = _sums(self._slots, within, len(edges)) + _sums(mesh.boundary_edges, across, len(edges))
+            diagonal -= _sums(low, coupling, nodes) + _sums(high, coupling, nodes)
+            edges = edges + coupling
+        indptr, indices, source = self._pattern
+        return csr_array((np.concatenate([edges, diagonal])[source], indices, indptr), shape=(nodes, nodes))
+
+    @property
+    def _slots(self) -> IndexArray:
+        return self.mesh.tetrahedron_edges.T.reshape(-1)
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        return self._stiffness_of(1.0)
+
+    def _stiffness_of(self, diffusion: float | FloatArray) -> FloatArray:
+        """``∫ D grad v_i . grad v_j`` of the edges (e,)."""
+        mesh = self.mesh
+        values = np.empty((6, len(mesh.tetrahedra)))
+        each = np.broadcast_to(diffusion, len(mesh.tetrahedra))
+
+        def fill(block: slice, corners: FloatArray) -> None:
+            u, v, w = corners[1:] - corners[0]
+            normals = [cross(v, w), cross(w, u), cross(u, v)]
+            scale = each[block] / (6.0 * dot(u, normals[0]))
+            normals.insert(0, -(normals[0] + normals[1] + normals[2]))
+            for edge, (i, j) in enumerate(EDGES):
+                values[edge, block] = scale * dot(normals[i], normals[j])
+
+        over_corners(fill, mesh.points, mesh.tetrahedra)
+        return _sums(self._slots, values, len(mesh.edges))
+
+    @cached_property
+    def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """Row starts (n+1,), columns (z,), and where each entry's value is among edges and diagonal, (z,)."""
+        nodes, (low, high) = len(self.mesh.points), self.mesh.edges.T
+        count = np.arange(len(low), dtype=np.int32)
+        above = np.concatenate([[0], np.cumsum(np.bincount(low, minlength=nodes))])
+        below = np.concatenate([[0], np.cumsum(np.bincount(high, minlength=nodes))])
+        # Edges are sorted by their smaller node; sorted by their larger one they are the other triangle's rows.
+        transposed = csr_array((count, high.astype(np.int32), above.astype(np.int32)), shape=(nodes, nodes)).tocsc()
+        starts = above + below + np.arange(nodes + 1)
+        middle = starts[:-1] + np.diff(below)
+        indices, source = np.empty((2, starts[-1]), dtype=np.int32)
+        place = middle[low] + 1 + count - above[low]
+        indices[place], source[place] = high, count
+        other = high[transposed.data]
+        place = starts[other] + count - below[other]
+        indices[place], source[place] = transposed.indices, transposed.data
+        indices[middle], source[middle] = np.arange(nodes), len(low) + np.arange(nodes)
+        return starts.astype(np.int32), indices, source
+
+
+def _sums(places: IntArray | IndexArray, values: FloatArray, count: int) -> FloatArray:
+    """Sums (count,) of the values that belong to each place."""
+    return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)

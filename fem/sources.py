@@ -1,0 +1,60 @@
+"""What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.medium import Medium
+from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface import Surface
+
+Subtract = Literal["half-space", "free-space", "nothing"]
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """Lights, as a mesh needs them.
+
+    Attributes
+    ----------
+    deposits : tuple of Deposit
+        What each light leaves in the body.
+    charges : tuple of Charges
+        The points among that, where these are subtracted.
+    on_mesh : tuple of Deposit
+        What is left to be put on the nodes.
+    """
+
+    deposits: tuple[Deposit, ...]
+    charges: tuple[Charges, ...]
+    on_mesh: tuple[Deposit, ...]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a user should know of the lights."""
+        return [warning for deposit in self.deposits for warning in deposit.warnings]
+
+
+def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtract: Subtract) -> Sources:
+    """Let lights fall into a body.
+
+    Raises
+    ------
+    InputError
+        If there is no light, or one of them does not go with the body or the medium.
+    """
+    if subtract not in ("half-space", "free-space", "nothing"):
+        raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
+    deposits = tuple(light.deposit_in(surface, medium) for light in lights)
+    whole = Sources(deposits, (), deposits)
+    if subtract == "nothing":
+        return whole
+    images = subtract == "half-space"
+    charges = tuple(charges_of(d.points, d.powers, surface, medium, images=images) for d in deposits if len(d.points))
+    if sum(len(c.positions) for c in charges) > MOST_CHARGES:
+        return whole
+    return Sources(deposits, charges, tuple(replace(d, points=d.points[:0], powers=d.powers[:0]) for d in deposits))

@@ -1,0 +1,350 @@
+"""What is known of a point source in closed form, so that finite elements need not resolve it.
+
+Near a source the fluence is that of a half-space with the Robin boundary (`tetlux.fem.exact.half_space`): the
+source, its mirror image, and a line of sinks above that (Bryan 1890). With the line cut into points, all of it is
+a sum of screened charges ``q e^{-k r}/(4 pi D r)``: one inside the body, the others outside. Whatever their
+strengths, inside the body such a sum G solves the diffusion equation exactly, so nothing is lost by cutting the
+line into few points, or by leaving out those that would come to lie in another part of a body: G then is only a
+poorer guess of the fluence.
+
+Finite elements solve for the rest. G is used on a patch of tetrahedra only, those where it is a good guess, and
+the fluence is ``phi_h = u_h + (G - I_h G)`` there, with ``I_h G`` the linear interpolant: u_h has the fluence's own
+values at the nodes, and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G - I_h G, v)``,
+and ``a(G, v)`` is, by Gauss, the source's own load and integrals over the patch's faces alone.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefTri
+
+from tetlux.fem.forms import Mass
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.loads import load_vector
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+# The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,
+# as far as a share of exp(-REACH) of it.
+PANEL_POINTS = 2
+REACH = 14.0
+# A charge keeps this share of its height above the entry clear of any other part of the body.
+CLEARANCE = 0.5
+# Close to its source fluence grows like 1/r: a node closer than this share of the source's depth, or of a mean free
+# path, shows the fluence at that distance.
+CLOSEST = 0.02
+# A guess that is off by more than this share of itself is not used.
+GOOD_GUESS = 0.5
+# More charges than this cost more than the tetrahedra that they save.
+MOST_CHARGES = 3000
+# Rules for the faces of a patch by their longest edge over the distance to the nearest charge; where that is larger
+# than the last limit, a face is cut in four.
+_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.3, 2), (0.8, 4), (2.0, 8)))
+_CUTS = 12
+# Pairs of a point and a charge that are worked on at once, so that they stay in the processor's cache.
+PAIRS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Charges:
+    """Screened point charges: ``sum_i q_i e^{-k r_i}/(4 pi D r_i)``.
+
+    Parameters
+    ----------
+    positions : (c, 3) ndarray
+        The sources first, inside the body; the others lie outside.
+    strengths : (c,) ndarray
+        W.
+    sources : int
+        How many of them are sources.
+    closest : float
+        Distance that no charge is seen from nearer than, unit.
+    medium : Medium
+    """
+
+    positions: FloatArray
+    strengths: FloatArray
+    sources: int
+    closest: float
+    medium: Medium
+
+    def fluence(self, points: FloatArray) -> FloatArray:
+        """Fluence at points (n, 3), (n,), W/unit²."""
+        return self._at(points, None)
+
+    def fluence_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Fluence (n,), W/unit², and its gradient (n, 3), W/unit³."""
+        gradient = np.empty((len(points), 3))
+        return self._at(points, gradient), gradient
+
+    def _at(self, points: FloatArray, gradient: FloatArray | None) -> FloatArray:
+        """The fluence, with its gradient written to an array if there is one."""
+        k = self.medium.sigma_tr
+        origin = self.positions[0]
+        charges = self.positions - origin
+        strengths = self.strengths / (4.0 * np.pi * self.medium.diffusion)
+        fluence = np.empty(len(points))
+
+        def work(block: slice) -> None:
+            x = points[block] - origin
+            # |x - p|² from |x|² + |p|² - 2 x.p would lose digits close to a charge.
+            distance = np.square(x[:, :1] - charges[:, 0])
+            distance += np.square(x[:, 1:2] - charges[:, 1])
+            distance += np.square(x[:, 2:] - charges[:, 2])
+            np.sqrt(distance, out=distance)
+            np.maximum(distance, self.closest, out=distance)
+            each = np.exp(-k * distance)
+            each /= distance
+            fluence[block] = each @ strengths
+            if gradient is not None:
+                each *= strengths
+                each *= (k + 1.0 / distance) / distance
+                gradient[block] = each @ charges - each.sum(axis=1)[:, None] * x
+
+        in_blocks(work, len(points), max(1, PAIRS // len(charges)))
+        return fluence
+
+
+def charges_of(points: FloatArray, powers: FloatArray, surface: Surface, medium: Medium, *, images: bool) -> Charges:
+    """Point sources and their images, each in the plane that touches the surface nearest to it.
+
+    Parameters
+    ----------
+    points : (s, 3) ndarray
+        Inside the body.
+    powers : (s,) ndarray
+        W.
+    surface : Surface
+    medium : Medium
+    images : bool
+        Without them it is the sources in free space.
+
+    Returns
+    -------
+    Charges
+    """
+    positions, strengths = [points], [powers]
+    feet, normals = surface.project(points)
+    depths = np.linalg.norm(feet - points, axis=1)
+    for foot, normal, depth, power in zip(feet, normals, depths.tolist(), powers.tolist(), strict=True):
+        if images and depth > 0:
+            heights, weights = _image_line(depth, medium.extrapolation_length)
+            line = foot + heights[:, None] * normal
+            clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
+            # Beyond the first charge that comes too close to the body again there may be more of it.
+            clear = np.logical_and.accumulate(clear)
+            positions.append(line[clear])
+            strengths.append(power * weights[clear])
+    closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
+    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium)
+
+
+def _image_line(depth: float, zb: float) -> tuple[FloatArray, FloatArray]:
+    """Heights above the plane and strengths of the images of a unit source: the mirror first, then the sinks."""
+    edges = [0.0, depth]
+    while edges[-1] < REACH * zb:
+        edges.append(min(2.0 * edges[-1] + depth, REACH * zb))
+    low, high = np.array(edges[:-1])[:, None], np.array(edges[1:])[:, None]
+    nodes, weights = np.polynomial.legendre.leggauss(PANEL_POINTS)
+    along = (0.5 * (low + high) + 0.5 * (high - low) * nodes).ravel()
+    sinks = -2.0 / zb * np.exp(-along / zb) * (0.5 * (high - low) * weights).ravel()
+    return depth + np.concatenate([[0.0], along]), np.concatenate([[1.0], sinks])
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """Where on a mesh charges are subtracted.
+
+    Parameters
+    ----------
+    charges : Charges
+    cells : (m,) ndarray of bool
+        The tetrahedra of the patch.
+    at_nodes : (n,) ndarray
+        The charges' fluence at the nodes.
+    """
+
+    charges: Charges
+    cells: BoolArray
+    at_nodes: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class PatchTerms:
+    """What a patch adds to the system and to the ledger.
+
+    Attributes
+    ----------
+    load : (n,) ndarray
+        ``P v(x0) - a(G - I_h G, v)`` over the patch, W.
+    exited, absorbed : float
+        Of ``G - I_h G``, W.
+    """
+
+    load: FloatArray
+    exited: float
+    absorbed: float
+
+
+def whole_patch(mesh: TetMesh, charges: Charges) -> Patch:
+    """A patch that covers all of a mesh."""
+    return Patch(charges, np.ones(len(mesh.tetrahedra), dtype=bool), charges.fluence(mesh.points))
+
+
+def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
+    """Where the charges are a good guess of a fluence (n,) at the nodes, (n,)."""
+    return np.asarray(np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes))
+
+
+def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
+    """The patch of the tetrahedra whose nodes are all good; none if a source is not among them."""
+    cells = good[mesh.tetrahedra].all(axis=1)
+    home, _ = mesh.locate(charges.positions[: charges.sources])
+    if not cells[home[home >= 0]].all():
+        cells = np.zeros(len(cells), dtype=bool)
+    return Patch(charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
+
+
+def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
+    """Good nodes of a mesh, by the nearest node, on a refinement of it."""
+    added = finer.points[len(points) :]
+    if good.all() or len(added) == 0:
+        return np.concatenate([good, np.ones(len(added), dtype=bool)])
+    return np.concatenate([good, good[cKDTree(points).query(added)[1]]])
+
+
+def patch_terms(mesh: TetMesh, medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
+    """Assemble what a patch adds.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    medium : Medium
+    patch : Patch
+    mass : {"lumped", "consistent"}
+        As in the system matrix.
+
+    Returns
+    -------
+    PatchTerms
+    """
+    count = len(mesh.points)
+    charges = patch.charges
+    sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
+    if not patch.cells.any():
+        return PatchTerms(load_vector(mesh, medium, sources), exited=0.0, absorbed=0.0)
+    faces, on_boundary = _faces(mesh, patch.cells)
+    corners = mesh.points[faces]
+    out_of_faces, through = _integrals(corners, charges)
+    robin = 1.0 / (2.0 * medium.boundary_factor)
+
+    def gathered(nodes: IntArray, values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(nodes.ravel(), values.ravel(), minlength=count))
+
+    leaving = robin * out_of_faces * on_boundary[:, None]
+    load = -gathered(faces, through + leaving)
+    # The interpolant's own part: stiffness, absorption and boundary of the patch, times G at the nodes.
+    cells = mesh.tetrahedra[patch.cells]
+    values = patch.at_nodes[cells]
+    hats = hat_gradients(mesh.points[cells])
+    volumes = mesh.volumes[patch.cells]
+    slope = np.einsum("mij,mi->mj", hats, values)
+    stiff = (medium.diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
+    absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    exited = robin * (areas * on_boundary)[:, None] * _mass(patch.at_nodes[faces], mass)
+    load += gathered(cells, stiff + absorbed) + gathered(faces, exited)
+    return PatchTerms(
+        load,
+        exited=float(leaving.sum() - exited.sum()),
+        # Gauss: what the charges absorb in the patch is the sources' power less what flows out through its faces.
+        absorbed=float(sources.powers.sum() + through.sum() - absorbed.sum()),
+    )
+
+
+def _mass(values: FloatArray, mass: Mass) -> FloatArray:
+    """Mass matrices of simplices of size 1 times values at their corners, (m, d + 1)."""
+    corners = values.shape[1]
+    if mass == "lumped":
+        return values / corners
+    return (values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1))
+
+
+def hat_gradients(corners: FloatArray) -> FloatArray:
+    """Gradients of the four hat functions of tetrahedra with corners (m, 4, 3), (m, 4, 3)."""
+    u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
+    a, b, c = np.cross(v, w), np.cross(w, u), np.cross(u, v)
+    six = np.einsum("ij,ij->i", u, a)[:, None]
+    return np.stack([-(a + b + c) / six, a / six, b / six, c / six], axis=1)
+
+
+def _faces(mesh: TetMesh, cells: BoolArray) -> tuple[IntArray, BoolArray]:
+    """The outer faces of a patch, oriented outward, and which of them are of the body's boundary."""
+    if cells.all():
+        return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
+    faces = TetMesh(mesh.points, mesh.tetrahedra[cells], mesh.unit).boundary_faces
+    return faces, np.isin(_keys(faces, len(mesh.points)), _keys(mesh.boundary_faces, len(mesh.points)))
+
+
+def _keys(faces: IntArray, count: int) -> IntArray:
+    """One integer for each triangle, whatever the order of its corners; good for two million nodes."""
+    low, middle, high = np.sort(faces.astype(np.int64), axis=1).T
+    return np.asarray((low * count + middle) * count + high)
+
+
+def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
+    """Integrals over triangles (f, 3, 3) of G and of ``D dG/dn`` against their three hat functions, (f, 3) each."""
+    value, flux = np.zeros((len(corners), 3)), np.zeros((len(corners), 3))
+    tree = cKDTree(charges.positions)
+    # Triangles still to do: which face they are part of, and the barycentric coordinates of their corners in it.
+    owner, place = np.arange(len(corners)), np.broadcast_to(np.eye(3), (len(corners), 3, 3))
+    for cut in range(_CUTS + 1):
+        part = place @ corners[owner]
+        edges = part - part[:, [1, 2, 0]]
+        size = np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1, initial=0.0))
+        near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
+        done = np.zeros(len(part), dtype=bool)
+        for limit, nodes, weights in _RULES:
+            last = limit == _RULES[-1][0] and cut == _CUTS
+            now = ~done & ((near < limit) | last)
+            done |= now
+            _add_rule(value, flux, owner[now], place[now], part[now], nodes, weights, charges)
+        if done.all():
+            break
+        owner, place = np.repeat(owner[~done], 4), _quartered(place[~done])
+    return value, flux
+
+
+def _add_rule(
+    value: FloatArray,
+    flux: FloatArray,
+    owner: IntArray,
+    place: FloatArray,
+    part: FloatArray,
+    nodes: FloatArray,
+    weights: FloatArray,
+    charges: Charges,
+) -> None:
+    if len(owner) == 0:
+        return
+    hats = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]])
+    fluence, gradient = charges.fluence_and_gradient((hats @ part).reshape(-1, 3))
+    normal = np.cross(part[:, 1] - part[:, 0], part[:, 2] - part[:, 0])  # twice the area long
+    area = np.linalg.norm(normal, axis=1)
+    through = charges.medium.diffusion * np.einsum("fqi,fi->fq", gradient.reshape(len(part), -1, 3), normal)
+    tests = hats @ place
+    np.add.at(value, owner, np.einsum("fq,fqi->fi", fluence.reshape(len(part), -1) * area[:, None] * weights, tests))
+    np.add.at(flux, owner, np.einsum("fq,fqi->fi", through * weights, tests))
+
+
+def _quartered(place: FloatArray) -> FloatArray:
+    """Four triangles (4 f, 3, 3) out of each of (f, 3, 3)."""
+    a, b, c = place[:, 0], place[:, 1], place[:, 2]
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

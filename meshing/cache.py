@@ -1,0 +1,103 @@
+"""Meshes remembered: files in the user's cache directory, named by all that shapes a mesh."""
+
+import contextlib
+import hashlib
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+# To be raised whenever the code makes other meshes of the same settings, or writes them otherwise.
+FORMAT = 1
+# Bytes; the entries that were used longest ago go first.
+LIMIT = 1_000_000_000
+# Seconds after which a half-written file was left by a process that died.
+ABANDONED = 86_400.0
+
+
+def cache_directory() -> Path:
+    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches."""
+    own = os.environ.get("TETLUX_CACHE_DIR")
+    if own:
+        return Path(own)
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif os.name == "nt":
+        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    else:
+        # The XDG specification: relative paths are to be ignored.
+        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        base = given if given.is_absolute() else Path.home() / ".cache"
+    return base / "tetlux"
+
+
+def mesh_key(surface: Surface, **settings: float | str) -> str:
+    """A name for the mesh that these settings make of a surface: a hash of its content and of them."""
+    shape = [surface.points.shape, surface.faces.shape, surface.crease_angle, surface.overlaps]
+    digest = hashlib.blake2b(json.dumps([FORMAT, shape, sorted(settings.items())]).encode(), digest_size=20)
+    digest.update(surface.points.astype("<f8").tobytes())
+    digest.update(surface.faces.astype("<i8").tobytes())
+    return digest.hexdigest()
+
+
+def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
+    """The mesh of that name, or None if there is none, or none that can be used."""
+    path = _entry(key, directory)
+    try:
+        # Opened here: np.load leaves a file that is cut off open.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            points, tetrahedra = data["points"], data["tetrahedra"]
+            if str(data["key"]) != key or (points.dtype, tetrahedra.dtype) != (np.float64, np.int64):
+                return None
+        mesh = TetMesh(points, tetrahedra, unit)
+    except Exception:  # whatever a foreign, cut or damaged file can make its reader raise: it is a miss
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(path)
+    return mesh
+
+
+def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
+    """Keep a mesh under that name; do nothing where files cannot be written."""
+    with contextlib.suppress(OSError):
+        directory.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=directory, suffix=".part", delete=False) as file:
+            part = Path(file.name)
+            try:
+                np.savez(file, points=mesh.points, tetrahedra=mesh.tetrahedra, key=np.array(key))
+            except BaseException:
+                part.unlink()
+                raise
+        # Other processes see the whole entry or none.
+        part.replace(_entry(key, directory))
+        _make_room(directory)
+
+
+def _entry(key: str, directory: Path) -> Path:
+    return directory / f"{key}.npz"
+
+
+def _make_room(directory: Path) -> None:
+    """Remove what was used longest ago beyond the limit, and what dead processes left half-written."""
+    found = []
+    for path in directory.iterdir():
+        with contextlib.suppress(OSError):  # another process may be removing it too
+            status = path.stat()
+            if path.suffix == ".npz":
+                found.append((status.st_mtime, status.st_size, path))
+            elif path.suffix == ".part" and status.st_mtime < time.time() - ABANDONED:
+                path.unlink()
+    total = sum(size for _, size, _ in found)
+    for _, size, path in sorted(found, key=lambda entry: entry[0]):
+        if total <= LIMIT:
+            break
+        with contextlib.suppress(OSError):
+            path.unlink()
+        total -= size

@@ -1,0 +1,116 @@
+"""The curved surface that triangles stand for: where it is smooth, each becomes a cubic patch.
+
+A triangle mesh of a round body lies inside it, by ``h²/8R`` for edges h and radius R, and light that enters a
+mean free path deep notices: on a sphere of 5,120 triangles and ten mean free paths radius the exitance of the
+flat triangles is off by 0.4 %. Patches through the same vertices with the same normals (PN triangles: Vlachos,
+Peters, Boyd & Mitchell 2001) take that away. Edges that bend by more than the surface's `crease_angle` are meant
+to be edges, and stay straight and sharp.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+
+# Corner i of a triangle is followed by corner i + 1.
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+class CurvedPatches:
+    """Cubic patches over the triangles of a surface.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    faces : (m, 3) ndarray
+    normals : (m, 3) ndarray
+        Outward unit normals of the faces.
+    crease_angle : float
+        Degrees that two triangles may be bent by at their common edge and still be parts of one smooth surface.
+    """
+
+    def __init__(self, points: FloatArray, faces: IntArray, normals: FloatArray, crease_angle: float) -> None:
+        self._points, self._faces, self._normals = points, faces, normals
+        self._least_cosine = np.cos(np.radians(crease_angle))
+
+    def __call__(self, faces: IntArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Points (q, 3) and unit normals (q, 3) at barycentric weights (q, 3) of faces (q,)."""
+        wanted, index = np.unique(faces, return_inverse=True)
+        corners, along, middle = (part[index] for part in self._control_points(wanted))
+        w = weights[:, :, None]
+        after, before = w[:, _NEXT], w[:, _LAST]
+        # along[:, i, 0] lies on the edge to the next corner, a third of the way, along[:, i, 1] on that to the last.
+        value = w**3 * corners + 3.0 * w**2 * (after * along[:, :, 0] + before * along[:, :, 1])
+        position = value.sum(axis=1) + 6.0 * w.prod(axis=1) * middle
+        slope = 3.0 * w**2 * corners + 6.0 * w * (after * along[:, :, 0] + before * along[:, :, 1])
+        slope += (
+            3.0 * (after**2 * along[:, _NEXT, 1] + before**2 * along[:, _LAST, 0])
+            + 6.0 * after * before * middle[:, None]
+        )
+        normal = np.cross(slope[:, 1] - slope[:, 0], slope[:, 2] - slope[:, 0])
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        flat = self._normals[faces]
+        # A patch never folds over its own triangle; where a bad one would, the triangle's normal stands.
+        bad = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
+        return position, np.where(bad, flat, normal / np.where(length > 0, length, 1.0))
+
+    def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of some faces: corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
+        corners = self._points[self._faces[faces]]
+        normals = self._corner_normals(faces)
+        smooth = self._smooth_edges[faces]
+        along = np.empty((len(faces), 3, 2, 3))
+        for side, (other, edge) in enumerate(((_NEXT, np.arange(3)), (_LAST, _LAST))):
+            reach = corners[:, other] - corners
+            height = np.einsum("fij,fij->fi", reach, normals) * smooth[:, edge]
+            along[:, :, side] = corners + (reach - height[:, :, None] * normals) / 3.0
+        edges = along.mean(axis=(1, 2))
+        return corners, along, edges + 0.5 * (edges - corners.mean(axis=1))
+
+    def _corner_normals(self, faces: IntArray) -> FloatArray:
+        """Unit normals at the corners of some faces, (f, 3, 3), over the neighbours that are smoothly joined.
+
+        Weighted as Max (1999) does, which is exact for vertices on a sphere.
+        """
+        start, ring = self._rings
+        vertices = self._faces[faces].ravel()
+        count = start[vertices + 1] - start[vertices]
+        corner = np.repeat(np.arange(len(vertices)), count)
+        place = np.arange(len(corner)) - np.repeat(np.cumsum(count) - count, count) + start[vertices][corner]
+        other = ring[place]
+        joined = (
+            np.einsum("ij,ij->i", self._normals[other // 3], self._normals[np.repeat(faces, 3)[corner]])
+            >= self._least_cosine
+        )
+        here, beside = self._faces[other // 3, other % 3], self._faces[other // 3]
+        a = self._points[beside[np.arange(len(other)), (other + 1) % 3]] - self._points[here]
+        b = self._points[beside[np.arange(len(other)), (other + 2) % 3]] - self._points[here]
+        size = np.einsum("ij,ij->i", a, a) * np.einsum("ij,ij->i", b, b)
+        part = np.cross(a, b) * (joined / np.where(size > 0, size, 1.0))[:, None]
+        total = np.stack([np.bincount(corner, part[:, i], minlength=len(vertices)) for i in range(3)], axis=1)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        flat = np.repeat(self._normals[faces], 3, axis=0)
+        return np.where(length > 0, total / np.where(length > 0, length, 1.0), flat).reshape(-1, 3, 3)
+
+    @cached_property
+    def _rings(self) -> tuple[IntArray, IntArray]:
+        """Corners (3 face + place) by vertex: vertex v has ``ring[start[v]:start[v + 1]]``."""
+        flat = self._faces.ravel()
+        ring = np.argsort(flat, kind="stable")
+        start = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=len(self._points)))])
+        return start, ring
+
+    @cached_property
+    def _smooth_edges(self) -> BoolArray:
+        """Whether the edge from corner i to the next bends less than the crease angle, (m, 3)."""
+        tail, head = self._faces, self._faces[:, _NEXT]
+        count = len(self._points)
+        key = (np.minimum(tail, head) * np.int64(count) + np.maximum(tail, head)).ravel()
+        order = np.argsort(key, kind="stable")
+        same = key[order][1:] == key[order][:-1]
+        first, second = order[:-1][same], order[1:][same]
+        cosine = np.einsum("ij,ij->i", self._normals[first // 3], self._normals[second // 3])
+        smooth = np.zeros(len(key), dtype=bool)
+        smooth[first] = smooth[second] = cosine >= self._least_cosine
+        return smooth.reshape(-1, 3)

@@ -1,0 +1,140 @@
+"""A coarser surface within a measured distance: fTetWild's time goes with the triangles it is given."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.deviation import two_sided_distance
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.repair import Edges, bodies, compact, count_self_intersections, single
+from tetlux.meshing.surface import Surface, signed_volume
+
+# Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a
+# sphere, 5 to 10 on organic and mechanical surfaces. The first try; the next ones follow from what it measured.
+TRIANGLES = 6.0
+# fast-simplification's `agg`: at its default, 7, it collapses in haste and needs twice the triangles for the
+# same distance; at 3 and below it stops short of the count wanted.
+HASTE = 4.0
+# Decimations that are measured, and counts that are tried for each until one is closed and manifold: quadric
+# decimation joins sheets now and then, and a few triangles more or less do not.
+TRIES = 6
+COUNTS = 4
+# Places at which the tries are measured; the result is measured at more.
+ROUGHLY = 1_500
+# A proxy that uses less than this share of the deviation has more triangles than it needs.
+GOOD_USE = 0.6
+# A part of no more triangles, joined to the rest by an edge of four, is a crumb.
+CRUMB = 8
+# Below this there is nothing to gain.
+FEWEST = 300
+
+
+def proxy(surface: Surface, deviation: float) -> Surface:
+    """Decimate a surface, no farther than `deviation` from it anywhere, in both directions.
+
+    Parameters
+    ----------
+    surface : Surface
+    deviation : float
+        Largest distance, unit, measured by `two_sided_distance`.
+
+    Returns
+    -------
+    Surface
+        Closed, manifold, outward oriented, of as many bodies as `surface`, and free of self-intersections if
+        `surface` is; `surface` itself if nothing coarser is all that.
+
+    Raises
+    ------
+    InputError
+        If `deviation` is not positive.
+
+    References
+    ----------
+    Garland & Heckbert, Surface simplification using quadric error metrics, SIGGRAPH 1997.
+    """
+    if not np.isfinite(deviation) or deviation <= 0:
+        raise InputError(f"deviation is {deviation:g}; give a length greater than 0.")
+    wanted = TRIANGLES * surface.area / (deviation * surface.diagonal)
+    if len(surface.faces) <= FEWEST or 1.3 * min(wanted, FEWEST) > len(surface.faces):
+        return surface
+    # Unit size, about the origin: fast-simplification's thresholds are absolute.
+    origin, size = surface.points.mean(axis=0), surface.diagonal
+    points, faces = (surface.points - origin) / size, surface.faces
+    if len(faces) > 10 * wanted:
+        # Most of the work once, and not once for each try.
+        points, faces = _decimated(points, faces, int(5 * wanted))
+    candidates: list[Surface] = []
+    for _ in range(TRIES):
+        count = int(max(wanted, FEWEST))
+        if count >= 0.8 * min(len(s.faces) for s in (surface, *candidates)):
+            break
+        coarse = _sound(surface, points, faces, count, origin, size)
+        if coarse is None:
+            wanted *= 2.0
+            continue
+        distance = two_sided_distance(coarse, surface, ROUGHLY)
+        if distance <= 0.95 * deviation:
+            candidates.append(coarse)
+            if distance > GOOD_USE * deviation or count <= FEWEST:
+                break
+        # The distance goes with the inverse of the count: that of a chord from its arc goes with the edge squared.
+        wanted = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
+    for coarse in reversed(candidates):
+        if two_sided_distance(coarse, surface) <= deviation:
+            return coarse
+    return surface
+
+
+def _sound(
+    surface: Surface, points: FloatArray, faces: IntArray, count: int, origin: FloatArray, size: float
+) -> Surface | None:
+    """A decimation to about `count` triangles that bounds as many bodies as the surface, if there is one."""
+    wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
+    for attempt in range(COUNTS):
+        target = int(count * (1.0 + 0.04 * attempt))
+        if target >= len(faces):
+            return None
+        p, f = _decimated(points, faces, target)
+        if len(f) < 4 or not _is_manifold(f):
+            continue
+        body = bodies(len(p), f)
+        if int(body.max()) + 1 != wanted or any(signed_volume(p, f[body == i]) <= 0 for i in range(wanted)):
+            continue
+        if not surface.overlaps and count_self_intersections(p, f):
+            continue
+        return replace(surface, points=p * size + origin, faces=f, repairs=(), warnings=())
+    return None
+
+
+def _decimated(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
+    from fast_simplification import simplify  # noqa: PLC0415
+
+    points, faces = simplify(points, faces.astype(np.int32), target_count=count, agg=HASTE)
+    return compact(np.asarray(points, dtype=np.float64), _without_flaps(faces.astype(np.int64)))
+
+
+def _without_flaps(faces: IntArray) -> IntArray:
+    """Without what quadric decimation leaves of thin places: triangles back to back, and crumbs that hang on an edge.
+
+    Crumbs are parts of a few triangles that are joined to the rest by edges of four.
+    """
+    from scipy.sparse import coo_matrix  # noqa: PLC0415
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    faces = single(faces)
+    edges = Edges(faces)
+    if (edges.triangles == 2).all():
+        return faces
+    plain = np.flatnonzero(edges.triangles[edges.edge] == 2)
+    pairs = plain[np.argsort(edges.edge[plain], kind="stable")].reshape(-1, 2) % len(faces)
+    graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(faces), len(faces)))
+    _, part = connected_components(graph, directed=False)
+    return faces[np.bincount(part)[part] > CRUMB]
+
+
+def _is_manifold(faces: IntArray) -> bool:
+    """Whether two triangles meet at each edge, each walking it its own way."""
+    edges = Edges(faces)
+    return bool((edges.triangles == 2).all() and (edges.balance == 0).all())

@@ -1,0 +1,73 @@
+"""Splitting triangles whose edges are too long, without gaps between them."""
+
+import numpy as np
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+
+_NEXT = np.array([1, 2, 0])
+
+
+def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """The edges of triangles (f, 3): their ends (e, 2), and the edge from each corner to the next, (f, 3)."""
+    ends = np.sort(np.stack([faces, faces[:, _NEXT]], axis=2).reshape(-1, 2), axis=1)
+    count = int(faces.max(initial=0)) + 1
+    key, number = np.unique(ends[:, 0] * np.int64(count) + ends[:, 1], return_inverse=True)
+    return np.column_stack([key // count, key % count]), number.reshape(-1, 3)
+
+
+def with_longest(points: FloatArray, faces: IntArray, marked: BoolArray) -> BoolArray:
+    """Add to marked edges (e,) of `edges_of` the longest one of every triangle that has one, and so on.
+
+    Splitting these keeps triangles from becoming ever thinner (Rivara 1984).
+    """
+    ends, edge = edges_of(faces)
+    lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    longest = edge[np.arange(len(faces)), lengths[edge].argmax(axis=1)]
+    marked = marked.copy()
+    while True:
+        missing = marked[edge].any(axis=1) & ~marked[longest]
+        if not missing.any():
+            return marked
+        marked[longest[missing]] = True
+
+
+def split_edges(points: FloatArray, faces: IntArray, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Split edges of triangles in the middle, and triangles with them.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    faces : (f, 3) ndarray
+    marked : (e,) ndarray of bool
+        The edges of `edges_of` to split, as `with_longest` returns them.
+
+    Returns
+    -------
+    points : (n + s, 3) ndarray
+        The given ones first, then the middles of the marked edges in their order.
+    faces : (g, 3) ndarray
+    parents : (g,) ndarray
+        The triangle that each is part of.
+    """
+    ends, edge = edges_of(faces)
+    middle = np.full(len(ends), -1)
+    middle[marked] = len(points) + np.arange(int(marked.sum()))
+    lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
+    # From a to b runs the longest edge, which is split first.
+    turn = (lengths[edge].argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(faces, turn, axis=1).T
+    ab, bc, ca = np.take_along_axis(middle[edge], turn, axis=1).T
+    whole, halved = ab < 0, ab >= 0
+    parts, parents = [], []
+    for rows, *triangle in (
+        (whole, a, b, c),
+        (halved & (ca < 0), a, ab, c),
+        (halved & (ca >= 0), a, ab, ca),
+        (halved & (ca >= 0), ab, c, ca),
+        (halved & (bc < 0), ab, b, c),
+        (halved & (bc >= 0), ab, b, bc),
+        (halved & (bc >= 0), ab, bc, c),
+    ):
+        parts.append(np.column_stack(triangle)[rows])
+        parents.append(np.flatnonzero(rows))
+    return np.vstack([points, points[ends[marked]].mean(axis=1)]), np.vstack(parts), np.concatenate(parents)

@@ -1,0 +1,151 @@
+"""The linear solvers: one solution by all of them, true residuals, the ledger, and what happens when one fails."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import spsolve
+
+from tests.conftest import TISSUE, block
+from tetlux.fem import Medium, linear
+from tetlux.fem.assembly import system_matrix
+from tetlux.fem.linear import Method, MultigridSolver, Product, Solver, direct, jacobi, multigrid, solver_for
+from tetlux.meshing import RunError, TetMesh, refine
+
+METHODS = [jacobi, multigrid, direct]
+# Nearly singular; strongly absorbing.
+CLEAR = Medium(sigma_a=1e-4, sigma_s_prime=0.9999, eta=1.5)
+DARK = Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.4)
+
+
+@pytest.fixture(scope="module")
+def wide() -> TetMesh:
+    """Edges that differ by a factor of sixty, towards a corner."""
+    mesh = block((6, 6, 6), (20.0, 20.0, 20.0))
+    for step in range(18):
+        far = np.linalg.norm(mesh.points[mesh.tetrahedra].mean(axis=1) - mesh.points[0], axis=1)
+        mesh = refine(mesh, far < 14.0 * 0.75**step)
+    assert mesh.edge_lengths.max() > 60 * mesh.edge_lengths.min()
+    return mesh
+
+
+def loads_on(mesh: TetMesh, count: int = 3) -> np.ndarray:
+    """Points of light at nodes here and there."""
+    loads = np.zeros((len(mesh.points), count))
+    loads[np.linspace(0, len(mesh.points) - 1, count).astype(int), np.arange(count)] = 1.0
+    return loads
+
+
+@pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_solves(method: Callable[[Product], Method], medium: Medium, wide: TetMesh) -> None:
+    matrix, loads = system_matrix(wide, medium), loads_on(wide)
+    found = Solver(matrix, [method]).solve(loads)
+    assert (np.linalg.norm(loads - matrix @ found, axis=0) < 2e-11).all()
+    truth = spsolve(matrix.tocsc(), loads)
+    # In a strong absorber the residual says less of the exitance, which is a billionth of the fluence at the source.
+    exitance, expected = found[wide.boundary_nodes], truth[wide.boundary_nodes]
+    assert (np.linalg.norm(exitance - expected, axis=0) < 1e-7 * np.linalg.norm(expected, axis=0)).all()
+
+
+@pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
+@pytest.mark.parametrize("aim", [1e-3, 1e-11])
+def test_the_ledger_closes_wherever_the_iteration_stops(
+    monkeypatch: pytest.MonkeyPatch, aim: float, medium: Medium, wide: TetMesh
+) -> None:
+    monkeypatch.setattr(linear, "AIM", aim)
+    monkeypatch.setattr(linear, "REFUSED", 1.0)
+    load = loads_on(wide, 1)[:, 0]
+    matrix = system_matrix(wide, medium)
+    fluence = Solver(matrix, [jacobi]).solve(load)
+    out = wide.boundary_node_areas @ fluence[wide.boundary_nodes] / (2.0 * medium.boundary_factor)
+    assert out + medium.sigma_a * (wide.node_volumes @ fluence) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_many_loads_are_solved_as_one_by_one(wide: TetMesh) -> None:
+    loads = loads_on(wide, 11)
+    loads[:, 4] = 0.0
+    loads[:, 5] *= 1e6
+    solver = MultigridSolver(system_matrix(wide, TISSUE))
+    together = solver.solve(loads)
+    assert together.shape == loads.shape
+    assert (together[:, 4] == 0.0).all()
+    for column in range(11):
+        alone = solver.solve(loads[:, column])
+        assert alone.shape == (len(loads),)
+        assert np.linalg.norm(alone - together[:, column]) <= 1e-9 * np.linalg.norm(alone)
+
+
+def test_multigrid_does_not_slow_down_as_the_mesh_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Iterations of Jacobi grow with the number of nodes along an edge, those of multigrid hardly."""
+    iterations: dict[str, list[int]] = {"jacobi": [], "multigrid": []}
+    for count in (10, 40):
+        mesh = block((count,) * 3, (20.0,) * 3)
+        matrix, load = system_matrix(mesh, TISSUE), loads_on(mesh, 2)[:, 1]
+        for method in (jacobi, multigrid):
+            solver, seen = Solver(matrix, [method]), 0
+
+            class Counted(Product):
+                def __call__(self, x: np.ndarray, whole: int = len(load)) -> np.ndarray:
+                    nonlocal seen
+                    seen += self.matrix.shape == (whole, whole)
+                    return super().__call__(x)
+
+            monkeypatch.setattr(solver._product, "__class__", Counted)
+            solver.solve(load)
+            iterations[method.__name__].append(seen)
+    assert iterations["jacobi"][1] > 2.5 * iterations["jacobi"][0]
+    assert iterations["multigrid"][1] < 1.6 * iterations["multigrid"][0]
+
+
+def test_what_one_method_leaves_the_next_one_solves(wide: TetMesh) -> None:
+    matrix, load = system_matrix(wide, TISSUE), loads_on(wide, 1)[:, 0]
+    prepared = []
+
+    def helpless(product: Product) -> Method:
+        return lambda rest: np.full_like(rest, np.nan)
+
+    def rough(product: Product) -> Method:
+        inverse = 1.0 / product.matrix.diagonal()[:, None]
+        return lambda rest: 0.1 * inverse * rest
+
+    def thorough(product: Product) -> Method:
+        prepared.append(product)
+        return direct(product)
+
+    found = Solver(matrix, [helpless, rough, thorough]).solve(load)
+    assert np.linalg.norm(load - matrix @ found) < 2e-11
+    assert len(prepared) == 1
+    Solver(matrix, [direct, thorough]).solve(load)
+    assert len(prepared) == 1, "a method that is not needed is not prepared"
+    with pytest.raises(RunError, match="stopped at a relative residual of"):
+        Solver(matrix, [helpless, rough]).solve(load)
+
+
+def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetMesh) -> None:
+    matrix = system_matrix(wide, TISSUE)
+    monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
+    monkeypatch.setattr(linear, "THREADS", 3)
+    x = np.random.default_rng(0).normal(size=(matrix.shape[0], 2))
+    product = Product(matrix)
+    assert len(product._blocks) == 3
+    assert (product(x) == matrix @ x).all()
+    assert (product(x[:, :1]) == matrix @ x[:, :1]).all()
+
+
+def test_nodes_without_neighbours_are_no_obstacle() -> None:
+    """Where absorption outweighs everything there is nothing to aggregate."""
+    matrix = csr_array(diags_array(np.linspace(1.0, 2.0, 1000)))
+    assert MultigridSolver(matrix).solve(np.ones(1000)) == pytest.approx(1.0 / np.linspace(1.0, 2.0, 1000))
+
+
+@pytest.mark.parametrize(
+    ("cells", "loads", "expected"), [(5, 1, jacobi), (5, 100, direct), (30, 1, multigrid), (30, 100, multigrid)]
+)
+def test_the_solver_goes_by_size(cells: int, loads: int, expected: Callable[[Product], Method]) -> None:
+    mesh = block((cells,) * 3, (20.0,) * 3)
+    solver = solver_for(system_matrix(mesh, TISSUE), loads)
+    assert solver._methods[0] is expected
+    load = loads_on(mesh, 1)
+    assert np.linalg.norm(load - solver.matrix @ solver.solve(load)) < 2e-11
