@@ -71,17 +71,22 @@ def _solved(job: dict[str, Any]) -> tuple[Any, Any]:
 
 
 def _geometry(job: dict[str, Any]) -> Any:
-    from netgen.csg import CSGeometry, OrthoBrick, Pnt, Sphere, Torus, Vec  # noqa: PLC0415
+    """The exact shape; a torus by OpenCASCADE, since netgen's own often cannot be meshed."""
+    from netgen import csg, occ  # noqa: PLC0415
 
-    geometry = CSGeometry()
-    sizes, center = job["sizes"].tolist(), Pnt(*job["center"].tolist())
+    sizes, center = job["sizes"].tolist(), job["center"].tolist()
+    if job["kind"] == "torus":
+        major, minor = sizes
+        ring = occ.Circle(occ.Pnt(center[0] + major, *center[1:]), occ.Dir(0.0, 1.0, 0.0), minor)
+        axis = occ.Axis(occ.Pnt(*center), occ.Z)
+        return occ.OCCGeometry(occ.Face(occ.Wire([ring])).Revolve(axis, 360.0))
+    geometry = csg.CSGeometry()
     if job["kind"] == "sphere":
-        geometry.Add(Sphere(center, sizes[0]))
-    elif job["kind"] == "torus":
-        geometry.Add(Torus(center, Vec(0.0, 0.0, 1.0), *sizes))
+        geometry.Add(csg.Sphere(csg.Pnt(*center), sizes[0]))
     else:
         width, depth = sizes
-        geometry.Add(OrthoBrick(Pnt(-0.5 * width, -0.5 * width, -depth), Pnt(0.5 * width, 0.5 * width, 0.0)))
+        low, high = csg.Pnt(-0.5 * width, -0.5 * width, -depth), csg.Pnt(0.5 * width, 0.5 * width, 0.0)
+        geometry.Add(csg.OrthoBrick(low, high))
     return geometry
 
 

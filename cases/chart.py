@@ -59,8 +59,6 @@ def chart(
     ------
     InputError
         If a case is wrong or is a sweep, or `out` cannot be written to.
-    RunError
-        If the files cannot be written in the end.
     """
     cases = load_all(requests)
     for case in cases:
@@ -70,18 +68,19 @@ def chart(
     methods = _methods(report)
     _warm_up()
     charted: list[Charted] = []
+    failed = 0
     for case in cases:
         try:
             scene = scene_of(case, quick=quick)
             report(f"{case.name}: {len(scene.samples.points):,} places; the reference is {scene.reference.told}")
             charted.append(Charted(scene, runs_on(scene, methods, quick=quick, report=report)))
+            write_chart(charted, out)
         except TetluxError as error:
+            failed += 1
             print(f"tetlux: {case.name} failed: {error}", file=sys.stderr, flush=True)
-            continue
-        write_chart(charted, out)
-    if charted:
+    if failed < len(cases):
         report(f"written to {out}: {', '.join(FILES)}")
-    return 0 if len(charted) == len(cases) else 1
+    return 1 if failed else 0
 
 
 def _methods(report: Callable[[str], None]) -> list[Method]:

@@ -21,7 +21,7 @@ from tetlux.meshing.mesher import tetrahedralize
 
 # Seconds until a peer is stopped.
 TIME_LIMIT = 300.0
-# Netgen's longest edge, as a share of the body's mean thickness 2 V/A; at more it fails on a torus.
+# Netgen's longest edge, as a share of the body's mean thickness 2 V/A.
 LONGEST = 0.75
 
 
@@ -120,9 +120,7 @@ def _ngsolve(order: int) -> Callable[[Scene, float], Outcome]:
                 "samples": scene.samples.points,
             },
         )
-        return Outcome(
-            result["exitance"], float(result["seconds"]), int(result["unknowns"]), int(result["tetrahedra"])
-        )
+        return Outcome(result["exitance"], float(result["seconds"]), int(result["unknowns"]), int(result["tetrahedra"]))
 
     return run
 

@@ -1,5 +1,6 @@
 """The picture of a chart: a row for each case, with error and seconds and unknowns against each other."""
 
+import math
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,17 +20,20 @@ INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
 # Inches: the picture's width, a row's height and what of it is above and below the panels, and where these begin and
 # how wide they are. The last one is the key.
 WIDTH, ROW, ABOVE, BELOW = 16.0, 4.7, 0.6, 0.7
-PANELS = ((1.1, 3.7), (5.95, 2.5), (9.2, 2.5), (11.95, 3.9))
+PANELS = ((1.1, 3.7), (5.9, 2.4), (9.05, 2.4), (11.7, 4.2))
 WIDEST = 150  # characters of a line of notes
-NARROW = 30.0
 NOTE = (
     "Seconds: from the surface in memory to the exitance at the surface, meshing included, nothing remembered. "
     "Error: relative L2 over the surface (of a slab with a closed form, both faces away from the rim). "
+    "NGSolve is given the exact shape, all others its triangles. "
     "p, q: error ~ unknowns^p, seconds ~ unknowns^q, by least squares over the runs shown."
 )
 NOTE_OF_MONTE_CARLO = (
     "Monte Carlo solves radiative transfer from the same sources: what is shown is the difference between that and "
     "diffusion, an error of neither."
+)
+NOTE_OF_FINER_RUN = (
+    "Dashed: the estimated error of a reference that is itself a finer run; errors near it or below mean little."
 )
 
 
@@ -72,6 +76,8 @@ def draw_chart(charted: Sequence[Charted], path: Path) -> None:
     lines = textwrap.wrap(NOTE, WIDEST)
     if any(run.method == MONTE_CARLO.name for one in charted for run in one.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
+    if any(one.scene.reference.error > 0 for one in charted):
+        lines += textwrap.wrap(NOTE_OF_FINER_RUN, WIDEST)
     foot = 0.35 + 0.25 * len(lines)
     rows = len(charted)
     height = ROW * rows + foot
@@ -84,6 +90,11 @@ def draw_chart(charted: Sequence[Charted], path: Path) -> None:
             for x, width in PANELS
         )
         _draw_runs(one.runs, left, middle, right)
+        for axes in (left, middle):
+            # Below it the reference is no better than what is measured against it.
+            low, high = axes.get_ylim()
+            if low < one.scene.reference.error < high:
+                axes.axhline(one.scene.reference.error, color=INK, linestyle="--", linewidth=1.2, zorder=1.5)
         _draw_key(one.runs, key)
         name = left.annotate(
             one.scene.case.name, (0.0, 1.06), xycoords="axes fraction", fontsize=18, fontweight="bold", color=INK
@@ -152,9 +163,10 @@ def _line(axes: Axes, look: Look, x: list[float], y: list[float]) -> None:
 
 
 def _tick(axis: Axis, limits: tuple[float, float], quantity: str) -> None:
-    """Few and plain numbers: at powers of ten, or between them too where there are not two of these."""
-    narrow = limits[1] / limits[0] < NARROW
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,), numticks=12))
+    """Few and plain numbers: at powers of ten, and between them where there are hardly two of these."""
+    decades = math.log10(limits[1] / limits[0])
+    between = (1.0, 2.0, 5.0) if decades < 1.0 else (1.0, 3.0) if decades < 2.0 else (1.0,)
+    axis.set_major_locator(LogLocator(subs=between, numticks=12))
     axis.set_minor_locator(LogLocator(subs=tuple(range(2, 10)), numticks=120))
     axis.set_minor_formatter(NullFormatter())
 
@@ -172,9 +184,10 @@ def _draw_key(runs: Sequence[Run], axes: Axes) -> None:
     shown = [name for name in LOOKS if name in fitted]
     axes.set(xlim=(0.0, 1.0), ylim=(len(LOOKS), -1.0))
     axes.axis("off")
-    columns = {0.88: "error", 1.0: "seconds"}
-    for x, head in zip(columns, ("p", "q"), strict=True):
-        axes.text(x, -1.0, head, fontsize=13, style="italic", ha="right", va="center", color=INK)
+    columns = {0.89: "error", 1.0: "seconds"}
+    for (x, quantity), head in zip(columns.items(), ("p", "q"), strict=True):
+        if any(fitted[name][quantity] is not None for name in shown):
+            axes.text(x, -1.0, head, fontsize=13, style="italic", ha="right", va="center", color=INK)
     for y, name in enumerate(shown):
         look = LOOKS[name]
         _line(axes, look._replace(marker="", size=0.0), [0.0, 0.08], [y, y])

@@ -1,5 +1,6 @@
 """Runs of methods on a scene, and what they add up to: the front of the best, and exponents."""
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -67,10 +68,13 @@ def runs_on(scene: Scene, methods: Sequence[Method], *, quick: bool, report: Cal
             name = f"{method.name} {method.labelled(value)}".strip()
             try:
                 outcome = method.run(scene, value)
-            except TetluxError as error:
-                report(f"  {name}: failed: {error}")
+            except TetluxError as failure:
+                report(f"  {name}: failed: {failure}")
                 continue
             error = scene.error_of(outcome.exitance)
+            if not math.isfinite(error):
+                report(f"  {name}: failed: its exitance is not finite")
+                continue
             if method.comparable:
                 competing.append(len(runs))
             runs.append(
@@ -108,5 +112,3 @@ def exponents(runs: Sequence[Run]) -> dict[str, dict[str, float | None]]:
             "seconds": fitted_exponent(unknowns, [run.seconds for run in sized]),
         }
     return found
-
-

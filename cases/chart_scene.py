@@ -15,7 +15,7 @@ from tetlux.fem.lights import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.errors import InputError
+from tetlux.meshing.errors import InputError, RunError
 
 # The far finer run that is the reference where there is no closed form.
 REFERENCE_TOLERANCE, REFERENCE_TETRAHEDRA = 0.001, 1_000_000
@@ -88,9 +88,7 @@ class Scene:
     @property
     def sources(self) -> list[tuple[FloatArray, float]]:
         """Positions (3,) and powers, W, of all points where light is deposited."""
-        return [
-            (point, float(power)) for d in self.deposits for point, power in zip(d.points, d.powers, strict=True)
-        ]
+        return [(point, float(power)) for d in self.deposits for point, power in zip(d.points, d.powers, strict=True)]
 
     @property
     def in_points(self) -> bool:
@@ -125,23 +123,29 @@ def scene_of(case: Case, *, quick: bool = False) -> Scene:
     surface, medium = case.surface, case.medium
     deposits = [light.deposit_in(surface, medium) for light in case.lights]
     samples = Samples(*surface_samples(surface, *lit_points(deposits, medium)))
-    repeats = 1 if quick else REPEATS
+    measured = _in_closed_form(shape, medium, deposits, samples)
+    if measured is None:
+        # A surface is more than its triangles where these stand for a curve.
+        samples = replace(samples, points=surface.project(samples.points)[0])
+        measured = samples, _finer_run(case, samples, quick)
+    if not measured[1].exitance.max(initial=0.0) > 0:
+        raise RunError("no light leaves the body, so there is nothing to measure.")
+    return Scene(case, shape, deposits, *measured, 1 if quick else REPEATS)
+
+
+def _in_closed_form(
+    shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], samples: Samples
+) -> tuple[Samples, Reference] | None:
+    """None if there is none for this shape or light, or a source is too near to where it does not hold."""
     known = CLOSED_FORMS.get(kind_of(shape))
-    if known is not None:
-        try:
-            samples, reference = known(shape, medium, deposits, samples)
-            return Scene(case, shape, deposits, samples, reference, repeats)
-        except InputError:
-            pass  # not for this light, or a source too near to the rim: a finer run will do
-    # The surface is more than its triangles where these stand for a curve.
-    samples = replace(samples, points=surface.project(samples.points)[0])
-    return Scene(case, shape, deposits, samples, _finer_run(case, samples, quick), repeats)
+    try:
+        return known(shape, medium, deposits, samples) if known else None
+    except InputError:
+        return None
 
 
 def _finer_run(case: Case, samples: Samples, quick: bool) -> Reference:
-    tolerance, most = (
-        (QUICK_TOLERANCE, QUICK_TETRAHEDRA) if quick else (REFERENCE_TOLERANCE, REFERENCE_TETRAHEDRA)
-    )
+    tolerance, most = (QUICK_TOLERANCE, QUICK_TETRAHEDRA) if quick else (REFERENCE_TOLERANCE, REFERENCE_TETRAHEDRA)
     solution = solve(case.surface, case.medium, case.lights, tolerance=tolerance, most_tetrahedra=most, cache=False)
     estimate = solution.error_estimate
     told = (
@@ -181,14 +185,13 @@ def _on_slab(
         here = comparison.where(points) & (face * samples.normals[:, 2] > 0.5)
         parts.append(Samples(samples.points[here], samples.normals[here], samples.weights[here]))
         exitance.append(comparison.forms["robin"](points[here]))
-    both = Samples(
-        *(np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals", "weights"))
-    )
+    both = Samples(*(np.concatenate([getattr(p, name) for p in parts]) for name in ("points", "normals", "weights")))
     told = "the same equation and boundary on the endless slab, solved in closed form; both faces, away from the rim"
     return both, Reference("closed form", told, np.concatenate(exitance))
 
 
 # Where the exitance of a whole body is known in closed form: its samples, and the reference at them.
-CLOSED_FORMS: dict[
-    str, Callable[[SurfaceSpec, Medium, list[Deposit], Samples], tuple[Samples, Reference]]
-] = {"sphere": _on_sphere, "slab": _on_slab}
+CLOSED_FORMS: dict[str, Callable[[SurfaceSpec, Medium, list[Deposit], Samples], tuple[Samples, Reference]]] = {
+    "sphere": _on_sphere,
+    "slab": _on_slab,
+}

@@ -28,9 +28,9 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface import Surface, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
-# What the sum is scaled by, so that it is 0.8 to 3 times the true error on spheres of radius 3 to 100 mean free paths,
+# What the sum is scaled by, so that it is 0.6 to 3 times the true error on spheres of radius 3 to 100 mean free paths,
 # sources 0.005 to 10 below the surface, indices 1 to 1.5 and albedos 0.5 to 0.9999.
-CALIBRATION = 0.9
+CALIBRATION = 0.75
 # Facets whose distance from the surface could add no more than this share of the rest are not measured: a facet's
 # distance is at most this share of its longest edge, where the surface is smooth.
 NOT_MEASURED, FARTHEST = 0.02, 0.2

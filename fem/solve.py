@@ -27,7 +27,7 @@ NEGLIGIBLE_DIP = 1e-6
 # needed: to split them takes this part of their error away.
 SPLIT_SHARE, GAIN = 0.8, 0.4
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
-SAFETY, POWER_SAFETY = 0.9, 0.5
+SAFETY, POWER_SAFETY = 0.6, 0.4
 MOST_TETRAHEDRA = 1_000_000
 
 

@@ -47,7 +47,7 @@ MOST_CHARGES = 3000
 _RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.3, 2), (0.8, 4), (2.0, 8)))
 _CUTS = 12
 # Pairs of a point and a charge that are worked on at once, so that they stay in the processor's cache.
-PAIRS = 20_000
+PAIRS = 100_000
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,10 @@ to be edges, and stay straight and sharp.
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Corner i of a triangle is followed by corner i + 1.
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -58,8 +60,10 @@ class CurvedPatches:
     def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Of some faces: corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
         corners = self._points[self._faces[faces]]
-        normals = self._corner_normals(faces)
-        smooth = self._smooth_edges[faces]
+        normals = self._corner_normals[faces]
+        smooth = np.zeros(3 * len(self._faces), dtype=bool)
+        smooth[np.concatenate(self._joined)] = True
+        smooth = smooth.reshape(-1, 3)[faces]
         along = np.empty((len(faces), 3, 2, 3))
         for side, (other, edge) in enumerate(((_NEXT, np.arange(3)), (_LAST, _LAST))):
             reach = corners[:, other] - corners
@@ -68,49 +72,37 @@ class CurvedPatches:
         edges = along.mean(axis=(1, 2))
         return corners, along, edges + 0.5 * (edges - corners.mean(axis=1))
 
-    def _corner_normals(self, faces: IntArray) -> FloatArray:
-        """Unit normals at the corners of some faces, (f, 3, 3), over the neighbours that are smoothly joined.
+    @cached_property
+    def _corner_normals(self) -> FloatArray:
+        """Unit normals at the corners of the faces, (m, 3, 3): one for all that meet in a vertex between two creases.
 
         Weighted as Max (1999) does, which is exact for vertices on a sphere.
         """
-        start, ring = self._rings
-        vertices = self._faces[faces].ravel()
-        count = start[vertices + 1] - start[vertices]
-        corner = np.repeat(np.arange(len(vertices)), count)
-        place = np.arange(len(corner)) - np.repeat(np.cumsum(count) - count, count) + start[vertices][corner]
-        other = ring[place]
-        joined = (
-            np.einsum("ij,ij->i", self._normals[other // 3], self._normals[np.repeat(faces, 3)[corner]])
-            >= self._least_cosine
-        )
-        here, beside = self._faces[other // 3, other % 3], self._faces[other // 3]
-        a = self._points[beside[np.arange(len(other)), (other + 1) % 3]] - self._points[here]
-        b = self._points[beside[np.arange(len(other)), (other + 2) % 3]] - self._points[here]
-        size = np.einsum("ij,ij->i", a, a) * np.einsum("ij,ij->i", b, b)
-        part = np.cross(a, b) * (joined / np.where(size > 0, size, 1.0))[:, None]
-        total = np.stack([np.bincount(corner, part[:, i], minlength=len(vertices)) for i in range(3)], axis=1)
+        count = len(self._faces)
+        first, second = self._joined
+        # An edge runs from corner i to the next on one side and back on the other: its ends are each one vertex.
+        after_first, after_second = (3 * (edge // 3) + _NEXT[edge % 3] for edge in (first, second))
+        ends = np.concatenate([first, after_first]), np.concatenate([after_second, second])
+        graph = coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(3 * count, 3 * count))
+        _, fan = connected_components(graph, directed=False)
+        corners = self._points[self._faces]
+        a, b = corners[:, _NEXT] - corners, corners[:, _LAST] - corners
+        size = np.einsum("fij,fij->fi", a, a) * np.einsum("fij,fij->fi", b, b)
+        part = (np.cross(a, b) / np.where(size > 0, size, 1.0)[:, :, None]).reshape(-1, 3)
+        total = np.column_stack([np.bincount(fan, part[:, i]) for i in range(3)])[fan]
         length = np.linalg.norm(total, axis=1, keepdims=True)
-        flat = np.repeat(self._normals[faces], 3, axis=0)
+        flat = np.repeat(self._normals, 3, axis=0)
         return np.where(length > 0, total / np.where(length > 0, length, 1.0), flat).reshape(-1, 3, 3)
 
     @cached_property
-    def _rings(self) -> tuple[IntArray, IntArray]:
-        """Corners (3 face + place) by vertex: vertex v has ``ring[start[v]:start[v + 1]]``."""
-        flat = self._faces.ravel()
-        ring = np.argsort(flat, kind="stable")
-        start = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=len(self._points)))])
-        return start, ring
-
-    @cached_property
-    def _smooth_edges(self) -> BoolArray:
-        """Whether the edge from corner i to the next bends less than the crease angle, (m, 3)."""
+    def _joined(self) -> tuple[IntArray, IntArray]:
+        """Edges that bend less than the crease angle: on either side the corner (3 face + place) that each starts at."""
         tail, head = self._faces, self._faces[:, _NEXT]
-        count = len(self._points)
-        key = (np.minimum(tail, head) * np.int64(count) + np.maximum(tail, head)).ravel()
+        key = (np.minimum(tail, head) * np.int64(len(self._points)) + np.maximum(tail, head)).ravel()
         order = np.argsort(key, kind="stable")
         same = key[order][1:] == key[order][:-1]
         first, second = order[:-1][same], order[1:][same]
         cosine = np.einsum("ij,ij->i", self._normals[first // 3], self._normals[second // 3])
-        smooth = np.zeros(len(key), dtype=bool)
-        smooth[first] = smooth[second] = cosine >= self._least_cosine
-        return smooth.reshape(-1, 3)
+        # Faces that run along their edge the same way are not two sides of one surface.
+        smooth = (cosine >= self._least_cosine) & (tail.ravel()[first] != tail.ravel()[second])
+        return first[smooth], second[smooth]

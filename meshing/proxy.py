@@ -20,7 +20,7 @@ HASTE = 4.0
 # decimation joins sheets now and then, and a few triangles more or less do not.
 TRIES = 6
 COUNTS = 4
-# Places at which the tries are measured; the result is measured at more.
+# Places at which a try is measured first; one that is near there is measured at more.
 ROUGHLY = 1_500
 # A proxy that uses less than this share of the deviation has more triangles than it needs.
 GOOD_USE = 0.6
@@ -65,26 +65,25 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     if len(faces) > 10 * wanted:
         # Most of the work once, and not once for each try.
         points, faces = _decimated(points, faces, int(5 * wanted))
-    candidates: list[Surface] = []
+    best = surface
     for _ in range(TRIES):
         count = int(max(wanted, FEWEST))
-        if count >= 0.8 * min(len(s.faces) for s in (surface, *candidates)):
+        if count >= 0.8 * len(best.faces):
             break
         coarse = _sound(surface, points, faces, count, origin, size)
         if coarse is None:
             wanted *= 2.0
             continue
         distance = two_sided_distance(coarse, surface, ROUGHLY)
-        if distance <= 0.95 * deviation:
-            candidates.append(coarse)
+        if distance <= deviation:
+            distance = two_sided_distance(coarse, surface)
+        if distance <= deviation:
+            best = coarse
             if distance > GOOD_USE * deviation or count <= FEWEST:
                 break
         # The distance goes with the inverse of the count: that of a chord from its arc goes with the edge squared.
         wanted = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
-    for coarse in reversed(candidates):
-        if two_sided_distance(coarse, surface) <= deviation:
-            return coarse
-    return surface
+    return best
 
 
 def _sound(

@@ -50,9 +50,9 @@ def test_a_larger_deviation_makes_fewer_triangles() -> None:
 
 
 def test_a_first_try_that_is_too_coarse_is_followed_by_finer_ones() -> None:
-    bumpy = _bumpy(0.06)
-    coarse = proxy_of(bumpy, 0.005 * bumpy.diagonal)
-    first = proxy.TRIANGLES * bumpy.area / (0.005 * bumpy.diagonal**2)
+    bumpy = _bumpy(0.1)
+    coarse = proxy_of(bumpy, 0.01 * bumpy.diagonal)
+    first = proxy.TRIANGLES * bumpy.area / (0.01 * bumpy.diagonal**2)
     assert 1.1 * first < len(coarse.faces) < 0.8 * len(bumpy.faces)
 
 

@@ -191,6 +191,14 @@ def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
     assert (moved.quality >= np.minimum(cube.quality, np.maximum(0.1, 0.4 * cube.quality)) - 1e-9).all()
 
 
+def test_a_move_to_the_surface_does_not_shrink_tetrahedra_away() -> None:
+    """All nodes are on the boundary, and called to a tenth of their distance: shapes would stay as they are."""
+    cube = block((1, 1, 1), (2.0, 2.0, 2.0))
+    moved = moved_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
+    assert (moved.volumes >= 0.399 * cube.volumes).all()
+    assert moved.volume < 0.9 * cube.volume
+
+
 def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPatch) -> None:
     cube, other = block((4, 4, 4), (1.0, 1.0, 1.0)), block((1, 1, 1), (0.1, 0.1, 0.1))
     given: list[float] = []

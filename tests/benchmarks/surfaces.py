@@ -1,0 +1,75 @@
+"""Seconds from a triangle surface to the exitance: ``python -m tests.benchmarks.surfaces [FILE...]``.
+
+Without files, the hare that ships and one of 100,000 triangles made of it. The beam comes from above, along z; bodies
+are taken to be 60 mean free paths from corner to corner. Cold: no mesh is remembered; warm: it is.
+"""
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.cases.case import library_folder
+from tetlux.fem import Medium, PencilBeam, solve
+from tetlux.meshing import Surface, read_surface
+from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
+
+ACROSS = 60.0
+
+
+def refined(surface: Surface, faces: int) -> Surface:
+    """A surface of at least so many triangles, its new vertices on the curved surface."""
+    points, triangles, parents = surface.points, surface.faces, np.arange(len(surface.faces))
+    flat = points
+    while len(triangles) < faces:
+        ends, edge = edges_of(triangles)
+        owner = np.empty(len(ends), dtype=np.int64)
+        owner[edge.ravel()] = np.repeat(parents, 3)
+        marked = with_longest(flat, triangles, np.ones(len(ends), dtype=bool))
+        flat, triangles, origin = split_edges(flat, triangles, marked)
+        points = np.vstack([points, surface.on_curve(owner[marked], flat[len(points) :])[0]])
+        parents = parents[origin]
+    return Surface(points, triangles, surface.unit, f"{surface.name}, refined")
+
+
+def main() -> None:
+    """Print a row for each surface."""
+    hare = library_folder() / "hare.stl"
+    read = {path: read_surface(path) for path in map(Path, sys.argv[1:])} or {hare: read_surface(hare)}
+    surfaces = [surface for surface in read.values()]
+    if not sys.argv[1:]:
+        surfaces.append(refined(surfaces[0], 100_000))
+    print("| surface | triangles | reading | cold | of which meshing | warm | tetrahedra | estimated error |")
+    print("|---|---|---|---|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["TETLUX_CACHE_DIR"] = folder
+        for index, surface in enumerate(surfaces):
+            reading = "-"
+            if index < len(read):
+                started = time.perf_counter()
+                surface = read_surface(list(read)[index])
+                reading = f"{time.perf_counter() - started:.2f} s"
+            scale = ACROSS / surface.diagonal
+            medium = Medium(sigma_a=0.01 * scale, sigma_s_prime=scale, eta=1.4)
+            top = surface.points[surface.points[:, 2].argmax()]
+            start = (float(top[0]), float(top[1]), float(top[2] + surface.diagonal))
+            low = surface.points.mean(axis=0)
+            toward = tuple((low - np.array(start)).tolist())
+            beam = PencilBeam(start, toward)
+            seconds = []
+            for _ in range(2):
+                started = time.perf_counter()
+                solution = solve(surface, medium, [beam])
+                seconds.append((time.perf_counter() - started, solution.seconds["mesh"]))
+            print(
+                f"| {surface.name} | {len(surface.faces):,} | {reading} | {seconds[0][0]:.2f} s | {seconds[0][1]:.2f} s "
+                f"| {seconds[1][0]:.2f} s | {len(solution.mesh.tetrahedra):,} | {solution.error_estimate:.2%} |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,136 @@
+"""What is subtracted of point sources: it is a solution, it is nearly the half-space's, and it does no harm."""
+
+import numpy as np
+import pytest
+
+from tests.conftest import TISSUE, block
+from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
+from tetlux.fem.exact import half_space
+from tetlux.fem.subtraction import charges_of
+from tetlux.meshing import Surface, TetMesh, slab, sphere, torus
+
+PLATE = slab(200.0, 100.0)
+SOURCE = np.array([[0.0, 0.0, -1.0]])
+ONE = np.ones(1)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_charges_are_nearly_the_half_space(eta: float) -> None:
+    medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=eta)
+    charges = charges_of(SOURCE, ONE, PLATE, medium, images=True)
+    rho = np.linspace(0.0, 3.0, 30)
+    points = np.column_stack([rho, 0 * rho, 0 * rho])
+    truth = half_space.point_fluence(medium, depth=1.0, points=np.column_stack([rho, 0 * rho, 0 * rho]))
+    # Panels of two points: 1 % and 3 % off, and finite elements solve for what is left.
+    assert charges.fluence(points) == pytest.approx(truth, rel=0.05)
+    alone = charges_of(SOURCE, ONE, PLATE, medium, images=False)
+    assert len(alone.positions) == 1
+    assert alone.fluence(points[10:])[0] != pytest.approx(truth[10], rel=0.2)
+
+
+def test_charges_solve_the_equation_inside() -> None:
+    charges = charges_of(SOURCE, ONE, PLATE, TISSUE, images=True)
+    x, step = np.array([[0.7, -0.4, -2.0]]), 1e-3
+    around = np.vstack([x + s * step * e for e in np.eye(3) for s in (-1, 1)])
+    here = charges.fluence(x)[0]
+    laplacian = (charges.fluence(around).sum() - 6.0 * here) / step**2
+    assert laplacian == pytest.approx(TISSUE.sigma_tr**2 * here, rel=1e-4)
+    values = charges.fluence(around)
+    _, gradient = charges.fluence_and_gradient(x)
+    np.testing.assert_allclose(gradient[0], (values[1::2] - values[::2]) / (2.0 * step), rtol=1e-5)
+
+
+@pytest.mark.parametrize("gap", [4.0, 0.6])
+def test_images_never_lie_in_another_part_of_the_body(gap: float) -> None:
+    """On the inner side of a ring the line of images points across the hole, at the other side."""
+    ring = torus(10.0 + 0.5 * gap, 10.0)
+    charges = charges_of(np.array([[1.0 + 0.5 * gap, 0.0, 0.0]]), ONE, ring, TISSUE, images=True)
+    images = charges.positions[1:]
+    assert not ring.contains(images).any()
+    foot = np.array([0.5 * gap, 0.0, 0.0])
+    clear = np.linalg.norm(ring.closest(images)[0] - images, axis=1)
+    assert (clear >= 0.499 * np.linalg.norm(images - foot, axis=1)).all()
+    assert len(images) < len(charges_of(SOURCE, ONE, PLATE, TISSUE, images=True).positions) - 1
+    # A source deeper than the hole is wide has no image at all.
+    assert (len(images) == 0) == (gap < 1)
+
+
+@pytest.mark.parametrize("mass", ["lumped", "consistent"])
+def test_what_is_subtracted_does_not_change_where_the_solution_converges_to(mass: str) -> None:
+    """A source well inside a block, on a mesh that resolves it: plain P1, and both subtractions."""
+    mesh = block((20, 20, 20), (10.0, 10.0, 10.0))
+    light = [PointSource((0.0, 0.0, -5.0))]
+    plain, free, half = (
+        solve(mesh, TISSUE, light, mass=mass, subtract=s)  # type: ignore[arg-type]
+        for s in ("nothing", "free-space", "half-space")
+    )
+    weights = mesh.boundary_node_areas
+    for other in (plain, free):
+        gap = np.sqrt(weights @ (other.exitance - half.exitance) ** 2 / (weights @ half.exitance**2))
+        assert gap < 0.01
+        assert other.power.exited == pytest.approx(half.power.exited, rel=0.004)
+    assert max(abs(s.power.balance_error) for s in (plain, free, half)) < 1e-9
+
+
+def test_a_few_hundred_nodes_do_for_a_source_below_the_surface() -> None:
+    """A slab's exitance to some per cent at once, where plain P1 on the same mesh is far off."""
+    mesh = block((12, 12, 6), (30.0, 30.0, 10.0))
+    light = [PointSource((0.3, 0.2, -1.0))]
+    rho = np.linspace(0.0, 6.0, 40)
+    points = np.column_stack([0.3 + rho, 0.2 + 0 * rho, 0 * rho])
+    truth = half_space.point_exitance(TISSUE, depth=1.0, rho=rho)
+    weights = rho
+
+    def error(subtract: str) -> float:
+        found = solve(mesh, TISSUE, light, subtract=subtract).exitance_at(points)  # type: ignore[arg-type]
+        return float(np.sqrt(weights @ (found - truth) ** 2 / (weights @ truth**2)))
+
+    # Measured 0.9 %, 26 % and 61 %.
+    assert error("half-space") < 0.02
+    assert error("nothing") > 10 * error("half-space")
+    assert error("free-space") > 3 * error("half-space")
+
+
+def test_a_source_at_a_node_has_a_finite_fluence() -> None:
+    mesh = block((4, 4, 4), (4.0, 4.0, 4.0))
+    solution = solve(mesh, TISSUE, [PointSource((0.0, 0.0, -2.0))])
+    assert np.isfinite(solution.fluence).all()
+    assert abs(solution.power.balance_error) < 1e-9
+
+
+def test_values_between_nodes_are_those_of_the_closed_form() -> None:
+    """Close to a source deep inside, fluence is 1/(4 pi D r): the mesh is far too coarse to show that itself."""
+    mesh = block((10, 10, 10), (40.0, 40.0, 40.0))
+    solution = solve(mesh, TISSUE, [PointSource((0.0, 0.0, -20.0))])
+    r = np.array([0.1, 0.5, 1.0])
+    found = solution.fluence_at(np.column_stack([r, 0 * r, 0 * r - 20.0]))
+    free = np.exp(-TISSUE.sigma_tr * r) / (4.0 * np.pi * TISSUE.diffusion * r)
+    np.testing.assert_allclose(found, free, rtol=0.05)
+
+
+def test_a_wide_beam_is_subtracted_too(ball: Surface, ball_mesh: TetMesh) -> None:
+    beam = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=1.0)
+    solution = solve(ball, TISSUE, [beam], mesh=ball_mesh)
+    assert solution.patches[0].charges.sources == 127
+    assert abs(solution.power.balance_error) < 1e-9
+
+
+def test_many_lights_on_one_mesh(ball: Surface, ball_mesh: TetMesh) -> None:
+    """A system solves as `solve` does, and each light's solution knows nothing of the others."""
+    lights = [PointSource((0.0, 0.0, 8.5)), PointSource((5.0, 0.0, -5.0), power=2.0)]
+    system = System(ball_mesh, TISSUE, ball)
+    for light in lights:
+        assert system.solve([light]).fluence == pytest.approx(solve(ball, TISSUE, [light], mesh=ball_mesh).fluence)
+    together = system.solve(lights)
+    apart = sum(system.solve([light]).fluence for light in lights)
+    assert together.fluence == pytest.approx(apart, rel=1e-8)
+
+
+def test_spheres_of_all_sizes_share_one_shape() -> None:
+    """A wide curved body and its images: nothing in it knows a length but the mean free path."""
+    for scale in (1e-3, 1e3):
+        medium = Medium(sigma_a=0.01 / scale, sigma_s_prime=1.0 / scale, eta=1.4)
+        charges = charges_of(scale * np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0 * scale), medium, images=True)
+        plain = charges_of(np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
+        np.testing.assert_allclose(charges.positions / scale, plain.positions, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(charges.strengths, plain.strengths, rtol=1e-9)
