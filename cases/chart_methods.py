@@ -72,7 +72,7 @@ class Method:
     run: Callable[[Scene, float], Outcome]
     fits: Callable[[Scene], bool] = lambda _: True
     comparable: bool = True
-    quick: int = 2
+    quick: int = 1
 
     def labelled(self, value: float) -> str:
         """The parameter and a value of it, as in ``tolerance=0.02``."""
@@ -177,7 +177,7 @@ FINITE_ELEMENTS = (
         _on_mesh(_graded, "nothing"),
         _has_light_to_grade_to,
     ),
-    Method("P1, adaptive", "tolerance", (0.2, 0.1, 0.05, 0.02, 0.01), _adaptive("nothing")),
+    Method("P1, adaptive", "tolerance", (0.2, 0.1, 0.05, 0.02, 0.01), _adaptive("nothing"), quick=2),
     Method(
         "free-space subtracted, adaptive",
         "tolerance",
@@ -192,5 +192,5 @@ FINITE_ELEMENTS = (
         _on_mesh(_uniform, "half-space"),
         lambda scene: scene.in_points,
     ),
-    Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("half-space")),
+    Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("half-space"), quick=2),
 )

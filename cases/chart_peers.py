@@ -153,9 +153,9 @@ PEERS = (
         "NGSolve",
         "ngsolve",
         (
-            Method("NGSolve P1", "grading", (0.3, 0.2, 0.15, 0.1, 0.07), _ngsolve(1), _has_exact_shape, quick=1),
-            Method("NGSolve P2", "grading", (0.5, 0.3, 0.2, 0.15, 0.1), _ngsolve(2), _has_exact_shape, quick=1),
-            Method("NGSolve P3", "grading", (0.5, 0.3, 0.2, 0.15), _ngsolve(3), _has_exact_shape, quick=1),
+            Method("NGSolve P1", "grading", (0.3, 0.2, 0.15, 0.1, 0.07), _ngsolve(1), _has_exact_shape),
+            Method("NGSolve P2", "grading", (0.5, 0.3, 0.2, 0.15, 0.1), _ngsolve(2), _has_exact_shape, quick=0),
+            Method("NGSolve P3", "grading", (0.5, 0.3, 0.2, 0.15), _ngsolve(3), _has_exact_shape),
         ),
     ),
     Peer(
@@ -168,7 +168,6 @@ PEERS = (
                 (2.0, 1.0, 0.7, 0.5, 0.35, 0.25),
                 _redbird,
                 lambda scene: scene.in_points,
-                quick=1,
             ),
         ),
     ),

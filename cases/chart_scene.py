@@ -13,13 +13,15 @@ from tetlux.cases.schema import CaseSpec, SurfaceSpec
 from tetlux.fem.grading import lit_points
 from tetlux.fem.lights import Deposit
 from tetlux.fem.medium import Medium
+from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError, RunError
 
-# The far finer run that is the reference where there is no closed form.
-REFERENCE_TOLERANCE, REFERENCE_TETRAHEDRA = 0.001, 1_000_000
-QUICK_TOLERANCE, QUICK_TETRAHEDRA = 0.01, 100_000
+# The far finer run that is the reference where there is no closed form: the first of these tolerances that is met,
+# or else the run that came closest.
+REFERENCE_TOLERANCES, REFERENCE_TETRAHEDRA = (0.001, 0.002, 0.005), 500_000
+QUICK_TOLERANCES = (0.01,)
 # Other programs of the machine disturb a run: a short one is made so many times.
 REPEATS = 3
 # What is measured against such a reference is asked for no less than so many times the reference's own error.
@@ -145,14 +147,23 @@ def _in_closed_form(
 
 
 def _finer_run(case: Case, samples: Samples, quick: bool) -> Reference:
-    tolerance, most = (QUICK_TOLERANCE, QUICK_TETRAHEDRA) if quick else (REFERENCE_TOLERANCE, REFERENCE_TETRAHEDRA)
-    solution = solve(case.surface, case.medium, case.lights, tolerance=tolerance, most_tetrahedra=most, cache=False)
-    estimate = solution.error_estimate
-    told = (
-        f"tetlux itself at tolerance {tolerance:g}: {len(solution.mesh.tetrahedra):,} tetrahedra, "
-        f"estimated error {estimate:.2%}"
-    )
-    return Reference("finer run", told, solution.exitance_at(samples.points), estimate)
+    best: Solution | None = None
+    for tolerance in QUICK_TOLERANCES if quick else REFERENCE_TOLERANCES:
+        solution = solve(
+            case.surface,
+            case.medium,
+            case.lights,
+            tolerance=tolerance,
+            most_tetrahedra=REFERENCE_TETRAHEDRA,
+            cache=False,
+        )
+        if best is None or solution.error_estimate < best.error_estimate:
+            best = solution
+        if best.error_estimate <= tolerance:
+            break
+    assert best is not None
+    told = f"tetlux itself on {len(best.mesh.tetrahedra):,} tetrahedra, estimated error {best.error_estimate:.2%}"
+    return Reference("finer run", told, best.exitance_at(samples.points), best.error_estimate)
 
 
 def _on_sphere(

@@ -20,7 +20,8 @@ from scipy.sparse import csr_array
 
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
-from tetlux.meshing.tetmesh import EDGES, TetMesh, cross, dot, over_corners
+from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.tetmesh import EDGES, TetMesh
 
 Mass = Literal["lumped", "consistent"]
 

@@ -1,4 +1,4 @@
-"""How wrong is the exitance, and which tetrahedra make it so?
+"""How wrong the exitance is, and which tetrahedra make it so.
 
 The dual-weighted residual (Becker & Rannacher 2001): the system is solved once more with the exitance itself as
 its load, and that solution z says how much an error made somewhere shows at the surface where the light leaves; a
@@ -103,9 +103,7 @@ def estimated(solution: Solution, solver: MultigridSolver) -> Estimate:
     def shares_by(dual: FloatArray) -> FloatArray:
         shares = medium.diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, hats, dual))
         shares += medium.sigma_a * mesh.volumes * _lumping(smooth, dual[mesh.tetrahedra])
-        of_faces = _lumping(
-            np.take_along_axis(smooth[mesh.boundary_cells], corners, axis=1), dual[mesh.boundary_faces]
-        )
+        of_faces = _lumping(np.take_along_axis(smooth[mesh.boundary_cells], corners, axis=1), dual[mesh.boundary_faces])
         shares += np.bincount(mesh.boundary_cells, robin * mesh.boundary_areas * of_faces, minlength=len(shares))
         shares += _of_facets(mesh, medium, surface, hats, (fluence, leaving, dual), float(shares.sum()))
         return CALIBRATION * shares
@@ -124,7 +122,8 @@ def _roughness(mesh: TetMesh, hats: FloatArray, values: FloatArray) -> FloatArra
     nodes, count = mesh.tetrahedra.ravel(), len(mesh.points)
     weight = np.bincount(nodes, np.repeat(mesh.volumes, 4), minlength=count)
     mean = np.stack(
-        [np.bincount(nodes, np.repeat(mesh.volumes * slope[:, i], 4), minlength=count) / weight for i in range(3)], axis=1
+        [np.bincount(nodes, np.repeat(mesh.volumes * slope[:, i], 4), minlength=count) / weight for i in range(3)],
+        axis=1,
     )
     return np.asarray(mean[mesh.tetrahedra] - slope[:, None])
 

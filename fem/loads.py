@@ -8,8 +8,8 @@ import numpy as np
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
-from tetlux.fem.paths import CellTree
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.tetmesh import TetMesh
 
 
@@ -29,7 +29,7 @@ def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
     """
     load = np.zeros(len(mesh.points))
     if len(deposit.points) or len(deposit.starts):
-        tree = CellTree(mesh)
+        tree = mesh.tree
         line, points, powers = _line_load(mesh, tree, medium, deposit)
         load += line
         # Points go with what is left of the lines.

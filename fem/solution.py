@@ -116,9 +116,7 @@ class Solution:
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
         return self._exitance_of(self._interpolated(queries, cells, corners, weights))
 
-    def _interpolated(
-        self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray
-    ) -> FloatArray:
+    def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> FloatArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
         fluence = (weights * self.fluence[nodes]).sum(axis=1)
         for patch in self.patches:

@@ -153,9 +153,7 @@ def solve_each(
     def steps_on(mesh: TetMesh, before: list[Step] | None) -> list[Step]:
         with watch.stage("assemble"):
             system = System(mesh, medium, surface, mass, expected=len(scenes))
-        return [
-            system.step(sources, watch, before[i] if before else None) for i, sources in enumerate(scene_sources)
-        ]
+        return [system.step(sources, watch, before[i] if before else None) for i, sources in enumerate(scene_sources)]
 
     given = mesh is not None
     if mesh is None:

@@ -96,7 +96,7 @@ class CurvedPatches:
 
     @cached_property
     def _joined(self) -> tuple[IntArray, IntArray]:
-        """Edges that bend less than the crease angle: on either side the corner (3 face + place) that each starts at."""
+        """Edges that bend less than the crease angle, by the corner (3 face + place) they start at on either side."""
         tail, head = self._faces, self._faces[:, _NEXT]
         key = (np.minimum(tail, head) * np.int64(len(self._points)) + np.maximum(tail, head)).ravel()
         order = np.argsort(key, kind="stable")

@@ -1,14 +1,14 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 from tetlux.meshing.blocks import grouped, in_blocks, once
+from tetlux.meshing.cell_tree import CellTree
+from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint
 from tetlux.meshing.surface import Surface, triangle_areas
@@ -236,15 +236,9 @@ class TetMesh:
         return nearest, face, np.column_stack([1.0 - wb - wc, wb, wc])
 
     @cached_property
-    def _centroids(self) -> cKDTree:
-        centroids = np.empty((len(self.tetrahedra), 3))
-
-        def fill(block: slice, corners: FloatArray) -> None:
-            centroids[block] = corners.mean(axis=0).T
-
-        over_corners(fill, self.points, self.tetrahedra)
-        # Centroids lie evenly enough without the medians that a balanced tree takes its time for.
-        return cKDTree(centroids, balanced_tree=False, compact_nodes=False)
+    def tree(self) -> CellTree:
+        """The tetrahedra in a tree of boxes, which finds those that points lie in and paths pass."""
+        return CellTree(self.points, self.tetrahedra)
 
     def barycentric(self, queries: FloatArray, cells: IntArray) -> FloatArray:
         """Barycentric coordinates of query i in tetrahedron ``cells[i]``, (q, 4)."""
@@ -267,30 +261,7 @@ class TetMesh:
         weights : (q, 4) ndarray
             Barycentric coordinates; nan for points outside.
         """
-        queries = np.asarray(queries, dtype=float).reshape(-1, 3)
-        cells = np.full(len(queries), -1, dtype=np.int64)
-        weights = np.full((len(queries), 4), np.nan)
-        left = np.arange(len(queries))
-        tried = 0
-        # Far from the origin coordinates carry fewer digits of a tetrahedron.
-        size = float(self.volumes.min()) ** (1 / 3)
-        slack = 1e-10 + 16.0 * np.finfo(float).eps * float(np.abs(self.points).max()) / size
-        for wanted in (8, 64, 512, len(self.tetrahedra)):
-            count = min(wanted, len(self.tetrahedra))
-            if len(left) == 0 or count == tried:
-                break
-            found = self._centroids.query(queries[left], k=list(range(tried + 1, count + 1)))
-            distance, near = np.asarray(found[0]), np.asarray(found[1], dtype=np.int64)
-            for column in near.T:
-                inner = self.barycentric(queries[left], column)
-                hit = (inner.min(axis=1) >= -slack) & (cells[left] < 0)
-                cells[left[hit]] = column[hit]
-                weights[left[hit]] = inner[hit]
-            # No tetrahedron reaches farther from its centroid than three quarters of its longest edge.
-            reach = 0.75 * float(self.longest_edges.max())
-            left = left[(cells[left] < 0) & (distance[:, -1] <= reach)]
-            tried = count
-        return cells, weights
+        return self.tree.locate(np.asarray(queries, dtype=float).reshape(-1, 3))
 
 
 def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
@@ -303,32 +274,3 @@ def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
 
     over_corners(fill, points, tetrahedra)
     return result
-
-
-def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray, tetrahedra: IntArray) -> None:
-    """Call ``work(block, corners)`` for blocks of tetrahedra, on all cores.
-
-    Parameters
-    ----------
-    work : callable
-        Gets a slice of ``range(m)`` and the corners there: (4, 3, b), corner, coordinate, tetrahedron.
-    points : (n, 3) ndarray
-    tetrahedra : (m, 4) ndarray
-    """
-    coordinates = np.ascontiguousarray(points.T)
-
-    def work_on(block: slice) -> None:
-        nodes = np.ascontiguousarray(tetrahedra[block].T)
-        work(block, np.stack([[axis[corner] for axis in coordinates] for corner in nodes]))
-
-    in_blocks(work_on, len(tetrahedra))
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products (3, b) of vectors (3, b): NumPy's own is several times slower."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Dot products (b,) of vectors (3, b)."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])

@@ -26,7 +26,9 @@ def test_triangles_of_a_sphere_become_a_sphere(subdivisions: int, gain: int) -> 
     curved, normals = ball.on_curve(faces, flat)
     off = np.abs(np.linalg.norm(curved, axis=1) - 10.0).max()
     assert off < (10.0 - np.linalg.norm(flat, axis=1)).max() / gain
-    assert np.einsum("ij,ij->i", normals, curved / np.linalg.norm(curved, axis=1, keepdims=True)).min() > np.cos(np.radians(0.3))
+    assert np.einsum("ij,ij->i", normals, curved / np.linalg.norm(curved, axis=1, keepdims=True)).min() > np.cos(
+        np.radians(0.3)
+    )
 
 
 def test_edges_that_are_meant_stay() -> None:

@@ -123,6 +123,17 @@ def test_what_one_method_leaves_the_next_one_solves(wide: TetMesh) -> None:
         Solver(matrix, [helpless, rough]).solve(load)
 
 
+def test_what_is_left_is_solved_for_again(wide: TetMesh) -> None:
+    """As long as it helps: an iteration's own idea of its residual is not the true one."""
+    matrix, load = system_matrix(wide, TISSUE), loads_on(wide, 1)[:, 0]
+
+    def short(product: Product) -> Method:
+        method = direct(product)
+        return lambda rest: 0.999 * method(rest)
+
+    assert np.linalg.norm(load - matrix @ Solver(matrix, [short]).solve(load)) < 2e-11
+
+
 def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetMesh) -> None:
     matrix = system_matrix(wide, TISSUE)
     monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.fem import Deposit, Medium, PencilBeam, paths
+from tetlux.fem import Deposit, Medium, PencilBeam
 from tetlux.fem.loads import load_vector
-from tetlux.fem.paths import CellTree
-from tetlux.meshing import Surface, TetMesh
+from tetlux.meshing import Surface, TetMesh, cell_tree
 from tetlux.meshing.arrays import FloatArray, IntArray
 
 FORWARD = Medium(sigma_a=0.05, sigma_s=3.0, g=0.8, eta=1.4)
@@ -130,7 +129,7 @@ def test_paths_on_a_graded_mesh_are_cut_as_one_by_one() -> None:
     load = load_vector(mesh, FORWARD, deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
-    for part in CellTree(mesh).cut(deposit.starts, deposit.directions, deposit.lengths):
+    for part in mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths):
         assert part.weights[part.cells >= 0].sum(axis=1) == pytest.approx(1.0, abs=1e-14)
 
 
@@ -141,7 +140,7 @@ def test_nothing_falls_between_tetrahedra() -> None:
     faces = mesh.tetrahedra[random.integers(len(mesh.tetrahedra), size=500), :3]
     starts, ends = (np.einsum("ij,ijk->ik", random.dirichlet(np.ones(3), 500), mesh.points[faces]) for _ in range(2))
     deposit = beams(starts, ends)
-    parts = list(CellTree(mesh).cut(deposit.starts, deposit.directions, deposit.lengths))
+    parts = list(mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths))
     assert all((part.cells >= 0).all() for part in parts)
 
 
@@ -150,7 +149,7 @@ def test_what_falls_between_the_thinnest_tetrahedra_is_found_there() -> None:
     mesh, _ = turned(pressed(block((6, 6, 6), (2.0, 2.0, 2.0)), 7.0), 1)
     starts, ends = np.random.default_rng(12).choice(mesh.points, size=(2, 1000))
     deposit = beams(starts, ends + 1e-12)
-    tree = CellTree(mesh)
+    tree = mesh.tree
     middles = [np.zeros((0, 3))]
     for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths):
         outside = part.cells < 0
@@ -171,7 +170,7 @@ def test_what_runs_outside_goes_to_the_nearest_nodes() -> None:
     mesh = TetMesh(whole.points, whole.tetrahedra[~gap])
     x, y = np.array([0.3, -0.6, 0.2, 7.0]), np.array([0.5, 0.2, -1.6, 7.0])
     deposit = beams(np.column_stack([x, y, np.full(4, 0.001)]), np.column_stack([x, y, np.full(4, -4.002)]))
-    (part,) = CellTree(mesh).cut(deposit.starts, deposit.directions, deposit.lengths)
+    (part,) = mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths)
     outside = part.cells < 0
     order = np.lexsort((part.enter[outside], part.paths[outside]))
     assert part.paths[outside][order].tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 3]
@@ -208,9 +207,9 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
     deposit = beams(starts, ends)
     load = load_vector(mesh, FORWARD, deposit)
-    monkeypatch.setattr(paths, "PORTION", portion)
+    monkeypatch.setattr(cell_tree, "PORTION", portion)
     assert load_vector(mesh, FORWARD, deposit) == pytest.approx(load, abs=1e-14)
-    tree = CellTree(mesh)
+    tree = mesh.tree
     parts = list(tree.cut(deposit.starts, deposit.directions, deposit.lengths))
     assert len(parts) > {1: 60, 50: 20, 1000: 2}[portion]
     covered = np.zeros(len(starts))
@@ -241,7 +240,7 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
     for mesh, size in ((ball_mesh, 5.0), (graded, 1.0)):
         starts = np.column_stack([random.uniform(-0.5, 0.5, size=(200, 2)) * size, np.zeros(200)])
         deposit = beams(starts, starts * 0.5 - np.array([0.0, 0.0, size]))
-        tree = CellTree(mesh)
+        tree = mesh.tree
         levels = [Counting(level) for level in tree._levels]
         tree._levels = levels  # type: ignore[assignment]
         passed = sum(len(part.cells) for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths))
@@ -251,7 +250,7 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
         tested = [len(cells) for *_, cells in tree._near(deposit.starts, deposit.directions, deposit.lengths)]
         # 2.7 and 2.1.
         assert sum(tested) < 4.0 * passed
-        assert max(tested) <= paths.PORTION
+        assert max(tested) <= cell_tree.PORTION
 
 
 def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:
@@ -262,7 +261,7 @@ def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:
     grid = np.unique(mesh.points[:, 0])
     starts = np.array([[x, low[1], high[2]] for x in grid])
     deposit = beams(starts, starts + np.array([0.0, 0.0, low[2] - high[2]]))
-    tree = CellTree(mesh)
+    tree = mesh.tree
     (part,) = tree.cut(deposit.starts, deposit.directions, deposit.lengths)
     assert (part.cells >= 0).all()
     assert (tree.locate(mesh.points)[0] >= 0).all()
@@ -281,7 +280,7 @@ def test_points_are_found_in_the_tetrahedron_that_they_are_deepest_in(ball_mesh:
             random.uniform(-11, 11, size=(200, 3)),
         ]
     )
-    cells, weights = CellTree(ball_mesh).locate(queries)
+    cells, weights = ball_mesh.tree.locate(queries)
     every = np.arange(len(corners))
     for query, cell, weight in zip(queries, cells, weights, strict=True):
         depth = ball_mesh.barycentric(np.tile(query, (len(every), 1)), every).min(axis=1)

@@ -120,6 +120,12 @@ def test_bisection_is_conforming(seed: int, share: float) -> None:
     longest = mesh.tetrahedron_edges[np.arange(len(marked)), mesh.edge_lengths[mesh.tetrahedron_edges].argmax(axis=1)]
     whole = {tuple(edge) for edge in fine.edges.tolist()}
     assert not whole & {tuple(edge) for edge in mesh.edges[longest[marked]].tolist()}
+    # Nothing is split across: where an edge of a tetrahedron or of a face is gone, its longest one is.
+    gone = np.array([tuple(edge) not in whole for edge in mesh.edges.tolist()])
+    for corners in ([0, 1, 2, 3], [1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]):
+        edges = mesh.tetrahedron_edges[:, [i for i, pair in enumerate(EDGES) if set(pair) <= set(corners)]]
+        longest = edges[np.arange(len(edges)), mesh.edge_lengths[edges].argmax(axis=1)]
+        assert (gone[longest] == gone[edges].any(axis=1)).all()
 
 
 def test_nothing_marked_nothing_split() -> None:

@@ -49,9 +49,7 @@ def test_the_ledger_closes(ball_solution: Solution) -> None:
     # What exits is the integral of the exitance: here by 40,000 points on the true sphere.
     gamma = np.pi * ((np.arange(40_000) + 0.5) / 40_000) ** 3
     around = np.arange(40_000) * 2.399963
-    points = 10.0 * np.column_stack(
-        [np.sin(gamma) * np.cos(around), np.sin(gamma) * np.sin(around), np.cos(gamma)]
-    )
+    points = 10.0 * np.column_stack([np.sin(gamma) * np.cos(around), np.sin(gamma) * np.sin(around), np.cos(gamma)])
     areas = 200 * np.pi * np.sin(gamma) * 3.0 * np.pi ** (1 / 3) * gamma ** (2 / 3) / 40_000
     assert areas @ ball_solution.exitance_at(points) == pytest.approx(power.exited, rel=0.01)
 

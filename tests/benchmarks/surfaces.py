@@ -37,38 +37,37 @@ def refined(surface: Surface, faces: int) -> Surface:
 
 def main() -> None:
     """Print a row for each surface."""
-    hare = library_folder() / "hare.stl"
-    read = {path: read_surface(path) for path in map(Path, sys.argv[1:])} or {hare: read_surface(hare)}
-    surfaces = [surface for surface in read.values()]
-    if not sys.argv[1:]:
-        surfaces.append(refined(surfaces[0], 100_000))
+    given = [Path(argument) for argument in sys.argv[1:]]
     print("| surface | triangles | reading | cold | of which meshing | warm | tetrahedra | estimated error |")
     print("|---|---|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         os.environ["TETLUX_CACHE_DIR"] = folder
-        for index, surface in enumerate(surfaces):
-            reading = "-"
-            if index < len(read):
-                started = time.perf_counter()
-                surface = read_surface(list(read)[index])
-                reading = f"{time.perf_counter() - started:.2f} s"
-            scale = ACROSS / surface.diagonal
-            medium = Medium(sigma_a=0.01 * scale, sigma_s_prime=scale, eta=1.4)
-            top = surface.points[surface.points[:, 2].argmax()]
-            start = (float(top[0]), float(top[1]), float(top[2] + surface.diagonal))
-            low = surface.points.mean(axis=0)
-            toward = tuple((low - np.array(start)).tolist())
-            beam = PencilBeam(start, toward)
-            seconds = []
-            for _ in range(2):
-                started = time.perf_counter()
-                solution = solve(surface, medium, [beam])
-                seconds.append((time.perf_counter() - started, solution.seconds["mesh"]))
-            print(
-                f"| {surface.name} | {len(surface.faces):,} | {reading} | {seconds[0][0]:.2f} s | {seconds[0][1]:.2f} s "
-                f"| {seconds[1][0]:.2f} s | {len(solution.mesh.tetrahedra):,} | {solution.error_estimate:.2%} |",
-                flush=True,
-            )
+        for path in given or [library_folder() / "hare.stl"]:
+            started = time.perf_counter()
+            surface = read_surface(path)
+            report(surface, f"{time.perf_counter() - started:.2f} s")
+        if not given:
+            report(refined(surface, 100_000), "-")
+
+
+def report(surface: Surface, reading: str) -> None:
+    """Solve twice, and print a row."""
+    scale = ACROSS / surface.diagonal
+    medium = Medium(sigma_a=0.01 * scale, sigma_s_prime=scale, eta=1.4)
+    x, y, z = surface.points[surface.points[:, 2].argmax()].tolist()
+    start = (x, y, z + surface.diagonal)
+    u, v, w = (surface.points.mean(axis=0) - start).tolist()
+    seconds, meshing = [], []
+    for _ in range(2):
+        started = time.perf_counter()
+        solution = solve(surface, medium, [PencilBeam(start, (u, v, w))])
+        seconds.append(time.perf_counter() - started)
+        meshing.append(solution.seconds["mesh"])
+    print(
+        f"| {surface.name} | {len(surface.faces):,} | {reading} | {seconds[0]:.2f} s | {meshing[0]:.2f} s "
+        f"| {seconds[1]:.2f} s | {len(solution.mesh.tetrahedra):,} | {solution.error_estimate:.2%} |",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

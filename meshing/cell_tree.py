@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.tetmesh import TetMesh, cross, dot, over_corners
+from tetlux.meshing.corners import cross, dot, over_corners
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9
@@ -50,23 +50,24 @@ class CellTree:
 
     Parameters
     ----------
-    mesh : TetMesh
+    points : (n, 3) ndarray
+    tetrahedra : (m, 4) ndarray
     """
 
-    def __init__(self, mesh: TetMesh) -> None:
-        self._coordinates = np.ascontiguousarray(mesh.points.T)
-        self._tetrahedra = mesh.tetrahedra
-        low, high = np.empty((2, 3, len(mesh.tetrahedra)))
+    def __init__(self, points: FloatArray, tetrahedra: IntArray) -> None:
+        self._coordinates = np.ascontiguousarray(points.T)
+        self._tetrahedra = tetrahedra
+        low, high = np.empty((2, 3, len(tetrahedra)))
 
         def fill(block: slice, corners: FloatArray) -> None:
             low[:, block], high[:, block] = corners.min(axis=0), corners.max(axis=0)
 
-        over_corners(fill, mesh.points, mesh.tetrahedra)
+        over_corners(fill, points, tetrahedra)
         # In the order of a k-d tree's leaves neighbours stand side by side, however graded the mesh is.
         leaves = cKDTree((0.5 * (low + high)).T, balanced_tree=False, compact_nodes=False)
         self._order = np.asarray(leaves.indices, dtype=np.int64)
         # Centres and crossings of boxes are rounded.
-        margin = 16.0 * np.finfo(float).eps * np.abs(mesh.points).max()
+        margin = 16.0 * np.finfo(float).eps * np.abs(points).max()
         low, high = (low - margin).take(self._order, axis=1), (high + margin).take(self._order, axis=1)
         # From the tetrahedra's boxes up to the whole: centres and half sides (boxes, 6, CHILDREN) of each one's parts.
         self._levels: list[FloatArray] = []
