@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.linear import MultigridSolver
+from tetlux.fem.linear import Solver
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Solution
 from tetlux.fem.subtraction import hat_gradients
@@ -62,13 +62,13 @@ class Estimate:
         return float(self.power_shares.sum())
 
 
-def estimated(solution: Solution, solver: MultigridSolver) -> Estimate:
+def estimated(solution: Solution, solver: Solver) -> Estimate:
     """Estimate the error of a solution.
 
     Parameters
     ----------
     solution : Solution
-    solver : MultigridSolver
+    solver : Solver
         Of its system matrix.
 
     Returns

@@ -47,15 +47,14 @@ def exitance(phi: Any, v: Any, w: Any) -> Any:
 
 
 def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
-    """The matrix of the left-hand side.
+    """The matrix of the left-hand side by scikit-fem's quadrature: what `tetlux.fem.assembly` is held against.
 
     Parameters
     ----------
     mesh : TetMesh
     medium : Medium
     mass : {"lumped", "consistent"}
-        How the two terms without derivatives are integrated. Lumped (by the corners) is as accurate at
-        second order, and keeps the fluence from going negative where consistent mass does.
+        How the two terms without derivatives are integrated.
 
     Returns
     -------

@@ -203,7 +203,7 @@ def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
 
 def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
     """The patch of the tetrahedra whose nodes are all good; none if a source is not among them."""
-    cells = good[mesh.tetrahedra].all(axis=1)
+    cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
     home, _ = mesh.locate(charges.positions[: charges.sources])
     if not cells[home[home >= 0]].all():
         cells = np.zeros(len(cells), dtype=bool)
@@ -271,8 +271,8 @@ def _mass(values: FloatArray, mass: Mass) -> FloatArray:
     """Mass matrices of simplices of size 1 times values at their corners, (m, d + 1)."""
     corners = values.shape[1]
     if mass == "lumped":
-        return values / corners
-    return (values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1))
+        return np.asarray(values / corners)
+    return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
 
 
 def hat_gradients(corners: FloatArray) -> FloatArray:

@@ -33,8 +33,9 @@ def test_it_is_coarser_near_and_sound(make: object, share: float) -> None:
     coarse = proxy_of(surface, deviation)
     assert len(coarse.faces) < 0.5 * len(surface.faces)
     assert two_sided_distance(coarse, surface) <= deviation
-    # At ten times the places, the distance was up to 1.02 times that at the usual ones.
-    assert two_sided_distance(coarse, surface, 80_000) < 1.15 * deviation
+    # Every vertex, edge and triangle: here the usual places hold the farthest (on a scan of 100k triangles it
+    # was up to 1.2 times as far).
+    assert two_sided_distance(coarse, surface, 80_000) <= deviation
     edges = Edges(coarse.faces)
     assert (edges.triangles == 2).all()
     assert (edges.balance == 0).all()

@@ -7,11 +7,12 @@ from tetlux.fem import PointSource, solve
 from tetlux.fem.exact import half_space
 from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing import slab
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
 from tetlux.meshing.surface import signed_volume, triangle_areas
 
 
-def smallest_angle(points: np.ndarray, faces: np.ndarray) -> float:  # type: ignore[type-arg]
+def smallest_angle(points: FloatArray, faces: IntArray) -> float:
     corners = points[faces]
     a, b = np.roll(corners, -1, axis=1) - corners, np.roll(corners, 1, axis=1) - corners
     cosine = np.einsum("fij,fij->fi", a, b) / np.linalg.norm(a, axis=2) / np.linalg.norm(b, axis=2)

@@ -76,9 +76,9 @@ def tetlux(points: FloatArray, tetrahedra: IntArray, method: str) -> Row:
 
 
 def ngsolve(points: FloatArray, tetrahedra: IntArray, factor: float) -> Row:
-    """The same by NGSolve, whose faces and tetrahedra count from 1; `factor` is A."""
-    import netgen.meshing as netgen  # type: ignore[import-not-found] # noqa: PLC0415
-    import ngsolve as ng  # type: ignore[import-not-found] # noqa: PLC0415
+    """The same by NGSolve; `factor` is A, so that only tetlux needs to know how it follows from eta."""
+    import netgen.meshing as netgen  # noqa: PLC0415
+    import ngsolve as ng  # noqa: PLC0415
 
     faces = np.sort(tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3), axis=1)
     faces, times = np.unique(faces, axis=0, return_counts=True)
