@@ -26,7 +26,7 @@ def main(job_path: str, result_path: str) -> None:
         job: dict[str, Any] = {key: data[key] for key in data.files}
     ngsolve.SetNumThreads(os.cpu_count() or 1)
     seconds: list[float] = []
-    while len(seconds) < int(job["repeats"]) and sum(seconds) < float(job["repeat_seconds"]):
+    while not seconds or (len(seconds) < job["repeats"] and sum(seconds) < job["repeat_seconds"]):
         started = time.perf_counter()
         mesh, fluence = _solved(job)
         seconds.append(time.perf_counter() - started)

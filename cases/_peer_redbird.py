@@ -18,7 +18,7 @@ def main(job_path: str, result_path: str) -> None:
     with np.load(job_path) as data:
         job: dict[str, Any] = {key: data[key] for key in data.files}
     seconds: list[float] = []
-    while len(seconds) < int(job["repeats"]) and sum(seconds) < float(job["repeat_seconds"]):
+    while not seconds or (len(seconds) < job["repeats"] and sum(seconds) < job["repeat_seconds"]):
         started = time.perf_counter()
         fluence = _solved(redbirdpy, job)
         seconds.append(time.perf_counter() - started)

@@ -16,12 +16,9 @@ from scipy.sparse import csr_array
 from skfem import Basis, BilinearForm, ElementTetP1, FacetBasis, MeshTet1
 from skfem.helpers import dot, grad
 
-from tetlux.fem.assembly import Mass, system_matrix
+from tetlux.fem.assembly import Mass
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tetmesh import TetMesh
-
-__all__ = ["Mass", "absorption", "diffusion", "exitance", "node_volumes", "system_matrix", "weak_form_matrix"]
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.
 _CORNERS_OF_TETRAHEDRON = (np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), np.full(4, 1 / 24))
@@ -75,8 +72,3 @@ def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> cs
         + exitance.assemble(boundary, A=medium.boundary_factor)
     )
     return csr_array(matrix)
-
-
-def node_volumes(mesh: TetMesh) -> FloatArray:
-    """``∫ v`` of every node's hat function, (n,): weights that sum to the volume."""
-    return mesh.node_volumes

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.forms import Mass
+from tetlux.fem.assembly import Mass
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.medium import Medium
@@ -60,7 +60,7 @@ def solve(
     mesh : TetMesh, optional
         Use this mesh of the body as it is.
     mass : {"lumped", "consistent"}
-        Integration of the terms without derivatives, see `tetlux.fem.system_matrix`.
+        Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     subtract : {"half-space", "free-space", "nothing"}
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
         `tetlux.fem.subtraction`.

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
-from tetlux.fem.forms import Mass
+from tetlux.fem.assembly import Mass
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium

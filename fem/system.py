@@ -6,9 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.assembly import system_matrix
+from tetlux.fem.assembly import Mass, system_matrix
 from tetlux.fem.estimate import Estimate, estimated
-from tetlux.fem.forms import Mass, node_volumes
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
@@ -20,6 +19,9 @@ from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, pat
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
+
+# A light needs its own, once more where its patch shrinks, and two to estimate the error.
+LOADS_OF_A_LIGHT = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +44,7 @@ class System:
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
     mass : {"lumped", "consistent"}
-        Integration of the terms without derivatives, see `tetlux.fem.forms.system_matrix`.
+        Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     expected : int
         How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
     """
@@ -56,7 +58,7 @@ class System:
     @cached_property
     def solver(self) -> Solver:
         """The solver of its matrix."""
-        return solver_for(system_matrix(self.mesh, self.medium, self.mass), 2 * self.expected)
+        return solver_for(system_matrix(self.mesh, self.medium, self.mass), LOADS_OF_A_LIGHT * self.expected)
 
     @property
     def body(self) -> Surface:
@@ -137,7 +139,7 @@ class System:
             incident=sum(d.incident for d in deposits) + outside,
             specular=sum(d.specular for d in deposits) + outside - transmitted * mesh.area,
             absorbed=sum(d.absorbed for d in deposits)
-            + medium.sigma_a * float(node_volumes(mesh) @ fluence)
+            + medium.sigma_a * float(mesh.node_volumes @ fluence)
             + sum(term.absorbed for term in terms),
             exited=0.0,
             ballistic=sum(d.ballistic for d in deposits),

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.repair import Edges, bodies, compact, count_self_intersections, single
+from tetlux.meshing.repair import Edges, bodies, compact, count_self_intersections
 from tetlux.meshing.surface import Surface, signed_volume
 
 # Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a
@@ -56,21 +56,22 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     """
     if not np.isfinite(deviation) or deviation <= 0:
         raise InputError(f"deviation is {deviation:g}; give a length greater than 0.")
-    wanted = TRIANGLES * surface.area / (deviation * surface.diagonal)
-    if len(surface.faces) <= FEWEST or 1.3 * min(wanted, FEWEST) > len(surface.faces):
+    if len(surface.faces) <= FEWEST:
         return surface
+    wanted = min(TRIANGLES * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
     # Unit size, about the origin: fast-simplification's thresholds are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
-    points, faces = (surface.points - origin) / size, surface.faces
-    if len(faces) > 10 * wanted:
-        # Most of the work once, and not once for each try.
-        points, faces = _decimated(points, faces, int(5 * wanted))
+    fine = (surface.points - origin) / size, surface.faces
+    # Most of the work once, and not once for each try.
+    base = _decimated(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
     best = surface
     for _ in range(TRIES):
         count = int(max(wanted, FEWEST))
         if count >= 0.8 * len(best.faces):
             break
-        coarse = _sound(surface, points, faces, count, origin, size)
+        if count > 0.6 * len(base[1]):
+            base = fine
+        coarse = _sound(surface, *base, count, origin, size)
         if coarse is None:
             wanted *= 2.0
             continue
@@ -115,14 +116,13 @@ def _decimated(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatAr
 
 
 def _without_flaps(faces: IntArray) -> IntArray:
-    """Without what quadric decimation leaves of thin places: triangles back to back, and crumbs that hang on an edge.
+    """Without what quadric decimation leaves of thin places: a few triangles that hang on the rest by edges of four.
 
-    Crumbs are parts of a few triangles that are joined to the rest by edges of four.
+    Most are two, back to back; some are a tetrahedron.
     """
     from scipy.sparse import coo_matrix  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
-    faces = single(faces)
     edges = Edges(faces)
     if (edges.triangles == 2).all():
         return faces

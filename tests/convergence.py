@@ -18,8 +18,8 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTet, RefTri
 
 from tetlux.fem import Medium, PointSource, Power, Solution
+from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import dipole, half_space, slab, sphere
-from tetlux.fem.forms import system_matrix
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.linear import MultigridSolver
 from tetlux.fem.solve import solve

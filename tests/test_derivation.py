@@ -16,8 +16,8 @@ import pytest
 from tests.conftest import block
 from tests.convergence import summed
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
+from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import cylinder, half_space, slab, sphere
-from tetlux.fem.forms import system_matrix
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector

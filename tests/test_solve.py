@@ -7,8 +7,8 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, linear, solve
+from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.forms import node_volumes, system_matrix
 from tetlux.fem.linear import MultigridSolver
 from tetlux.meshing import InputError, RunError, Surface, TetMesh, slab, sphere
 
@@ -94,7 +94,7 @@ def test_exitance_converges_at_second_order_on_a_plate() -> None:
         mesh = block((count, count, count), (2 * half, 2 * half, 2 * half))
         points = mesh.points + np.array([0.0, 0.0, half])
         truth = np.cos(k * points).prod(axis=1)
-        fluence = MultigridSolver(system_matrix(mesh, medium)).solve(node_volumes(mesh) * rate * truth)
+        fluence = MultigridSolver(system_matrix(mesh, medium)).solve(mesh.node_volumes * rate * truth)
         weights, nodes = mesh.boundary_node_areas, mesh.boundary_nodes
         gap = (fluence - truth)[nodes]
         errors.append(math.sqrt(weights @ gap**2 / (weights @ truth[nodes] ** 2)))

@@ -1,0 +1,443 @@
+"""`tetlux chart`: what it measures with, what it writes, and what it says."""
+
+import csv
+import importlib.util
+import json
+import math
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.conftest import TISSUE
+from tetlux import cases, fem, meshing
+from tetlux.cases import chart as chart_module
+from tetlux.cases import chart_methods, chart_peers, chart_runs, chart_scene
+from tetlux.cases.case import find_case_file, load_cases
+from tetlux.cases.chart_measure import fitted_exponent, pareto_front, relative_error, surface_samples
+from tetlux.cases.chart_methods import FINITE_ELEMENTS, OURS, Method, Outcome
+from tetlux.cases.chart_models import MODELS, MONTE_CARLO
+from tetlux.cases.chart_peers import PEERS, Peer, answer
+from tetlux.cases.chart_picture import LOOKS
+from tetlux.cases.chart_runs import Run, exponents, runs_on
+from tetlux.cases.chart_scene import Reference, Samples, Scene, scene_of
+from tetlux.cases.cli import main
+from tetlux.fem import solve
+from tetlux.fem.exact import slab, sphere
+from tetlux.meshing import RunError, Surface, box, tetrahedralize
+
+NO_LIGHT = (np.zeros((0, 3)), np.zeros(0))
+BY_NAME = {method.name: method for method in (*MODELS, *FINITE_ELEMENTS, MONTE_CARLO)}
+
+
+@pytest.fixture(scope="module")
+def ball_scene() -> Scene:
+    return scene_of(load_cases(find_case_file("sphere"))[0], quick=True)
+
+
+def few(scene: Scene, count: int = 50) -> Scene:
+    """A scene with a few samples, for methods whose values do not matter."""
+    samples = Samples(*(np.asarray(getattr(scene.samples, name))[:count] for name in ("points", "normals", "weights")))
+    return replace(scene, samples=samples, reference=replace(scene.reference, exitance=np.ones(count)))
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "chart.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# Measures
+
+
+def test_samples_stand_for_the_whole_surface() -> None:
+    body = box((4.0, 3.0, 2.0))
+    points, normals, weights = surface_samples(body, *NO_LIGHT)
+    assert weights.sum() == pytest.approx(body.area, rel=1e-12)
+    assert (weights > 0).all()
+    # By Gauss's theorem: 3 V, twice the first moment, 0.
+    assert weights @ (points * normals).sum(axis=1) == pytest.approx(3.0 * body.volume, rel=1e-12)
+    # A rule of degree 2: x² on the faces x = ±2 is 4, on the others 16/3 in the mean over the length of 4, by 3.
+    assert weights @ points[:, 0] ** 2 == pytest.approx(2 * 6.0 * 4.0 + 2 * (12.0 + 8.0) * 4.0 / 3.0, rel=1e-12)
+
+
+def test_samples_are_dense_where_light_is() -> None:
+    """Dense enough to integrate what falls from a source like the dipole's own 1/r³, with its square."""
+    body, depth = box((40.0, 40.0, 20.0)), 1.0
+    source = np.array([[0.0, 0.0, 10.0 - depth]])
+    points, normals, weights = surface_samples(body, source, np.array([depth]))
+    top = normals[:, 2] > 0.5
+    rho = np.hypot(points[top, 0], points[top, 1])
+    inside = rho < 15.0
+    # ∫ (rho² + 1)^-3 over a disc of radius R is pi/2 (1 - (R² + 1)^-2).
+    summed = weights[top][inside] @ (rho[inside] ** 2 + depth**2) ** -3.0
+    assert summed == pytest.approx(0.5 * math.pi, rel=2e-3)
+    assert (rho < 2.0).sum() > 2 * (rho > 10.0).sum() / 100
+    assert np.sqrt(weights[top][rho < 1.0].max()) < 0.25 * depth
+
+
+def test_a_known_perturbation_is_the_error() -> None:
+    rng = np.random.default_rng(0)
+    truth, weights = rng.uniform(1.0, 2.0, 200), rng.uniform(0.5, 1.5, 200)
+    assert relative_error(1.03 * truth, truth, weights) == pytest.approx(0.03, rel=1e-12)
+    off = truth.copy()
+    off[7] += 0.4
+    expected = math.sqrt(weights[7] * 0.4**2 / (weights * truth**2).sum())
+    assert relative_error(off, truth, weights) == pytest.approx(expected, rel=1e-12)
+    assert relative_error(off, truth, 3.0 * weights) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_front_is_what_nothing_beats() -> None:
+    seconds = [1.0, 2.0, 3.0, 2.0, 1.0, 4.0]
+    errors = [0.5, 0.2, 0.3, 0.1, 0.6, 0.1]
+    assert pareto_front(seconds, errors).tolist() == [True, False, False, True, False, False]
+    assert pareto_front([], []).tolist() == []
+
+
+def test_exponents_are_fitted_to_three_runs_or_more() -> None:
+    x = [100.0, 1000.0, 20000.0]
+    assert fitted_exponent(x, [3.0 * value**-0.7 for value in x]) == pytest.approx(-0.7, abs=1e-12)
+    assert fitted_exponent(x[:2], [1.0, 2.0]) is None
+    assert fitted_exponent([5.0] * 3, [1.0, 2.0, 3.0]) is None
+    assert fitted_exponent(x, [1.0, 0.0, 2.0]) is None
+
+
+# Scenes
+
+
+def test_the_sphere_is_measured_on_the_true_sphere(ball_scene: Scene) -> None:
+    """Power that leaves, by the samples and by the closed form."""
+    points, weights = ball_scene.samples.points, ball_scene.samples.weights
+    assert np.allclose(np.linalg.norm(points, axis=1), 10.0, rtol=1e-12)
+    # The triangles' own area is 0.12 % less.
+    assert weights.sum() == pytest.approx(400.0 * math.pi, rel=1e-6)
+    ((source, power),) = ball_scene.sources
+    total = power * sphere.point_total(TISSUE, radius=10.0, source_radius=float(np.linalg.norm(source)))
+    assert weights @ ball_scene.reference.exitance == pytest.approx(total, rel=1e-4)
+    assert ball_scene.reference.kind == "closed form"
+
+
+def test_the_slab_is_measured_on_both_faces() -> None:
+    scene = scene_of(load_cases(find_case_file("slab"))[0], quick=True)
+    ((source, power),) = scene.sources
+    emitted = scene.samples.weights * scene.reference.exitance
+    front = scene.samples.normals[:, 2] > 0
+    assert np.allclose(scene.samples.points[:, 2], np.where(front, 0.0, -10.0), atol=1e-9)
+    depth = -float(source[2])
+    sides: list[tuple[np.ndarray, slab.Face]] = [(front, "front"), (~front, "back")]
+    for side, face in sides:
+        total = power * slab.point_total(TISSUE, thickness=10.0, depth=depth, face=face)
+        # The rest leaves beyond the samples: 0.09 % of the front's, 0.56 % of the back's.
+        assert 0.993 * total < emitted[side].sum() < total
+
+
+def test_without_a_closed_form_the_reference_is_a_finer_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(chart_scene, "QUICK_TOLERANCES", (0.1,))
+    (tmp_path / "block.yaml").write_text(
+        "surface: {box: {size: [10, 10, 10]}}\n"
+        "medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}\n"
+        "lights:\n  - diffuse: {irradiance: 1.0}\n"
+    )
+    scene = scene_of(load_cases(tmp_path / "block.yaml")[0], quick=True)
+    assert scene.reference.kind == "finer run"
+    assert scene.reference.told.startswith("tetlux itself on ")
+    assert 0 < scene.reference.error <= 0.1
+    assert scene.samples.weights.sum() == pytest.approx(600.0, rel=1e-12)
+    # Diffuse light is deposited in no point: what needs one does not do this scene.
+    fitting = {name for name, method in BY_NAME.items() if method.fits(scene)}
+    assert fitting == {"P1, uniform", "P1, adaptive", OURS}
+    assert not any(method.fits(scene) for peer in PEERS for method in peer.methods)
+
+
+def test_tolerances_below_the_reference_are_left_out(ball_scene: Scene) -> None:
+    rough = replace(ball_scene, reference=Reference("finer run", "", ball_scene.reference.exitance, error=0.004))
+    assert BY_NAME[OURS].ladder_for(ball_scene) == BY_NAME[OURS].ladder
+    assert BY_NAME[OURS].ladder_for(rough) == (0.05, 0.02)
+    assert BY_NAME["P1, uniform"].ladder_for(rough) == BY_NAME["P1, uniform"].ladder
+
+
+# Methods
+
+
+def test_closed_forms_of_the_half_space_on_the_sphere(ball_scene: Scene) -> None:
+    """Both differ from the sphere's own closed form by what the curvature does, and the dipole by its boundary."""
+    errors = {m.name: ball_scene.error_of(m.run(ball_scene, 0.0).exitance) for m in MODELS}
+    assert errors["dipole alone"] == pytest.approx(0.402, abs=0.01)
+    assert errors["half-space alone"] == pytest.approx(0.113, abs=0.005)
+
+
+def test_tetlux_meets_its_tolerance_on_the_sphere(ball_scene: Scene) -> None:
+    outcome = BY_NAME[OURS].run(ball_scene, 0.02)
+    assert 0.001 < ball_scene.error_of(outcome.exitance) < 0.02
+    assert outcome.estimate is not None
+    assert outcome.estimate <= 0.02
+    assert outcome.unknowns is not None
+    assert outcome.tetrahedra is not None
+    assert 300 < outcome.unknowns < outcome.tetrahedra
+
+
+def test_monte_carlo_sees_the_same_power(ball_scene: Scene) -> None:
+    """Transfer and diffusion differ near the source by a third, in all that leaves by little."""
+    outcome = MONTE_CARLO.run(ball_scene, 50_000)
+    assert 0.3 < ball_scene.error_of(outcome.exitance) < 0.45
+    weights = ball_scene.samples.weights
+    # Two runs of 50,000 and 1,000,000: 1.033.
+    assert weights @ outcome.exitance == pytest.approx(weights @ ball_scene.reference.exitance, rel=0.06)
+
+
+def fake(name: str, seconds: list[float], off: list[float], *, comparable: bool = True) -> Method:
+    """A method that takes so long and errs by so much."""
+
+    def run(scene: Scene, value: float) -> Outcome:
+        index = int(value)
+        if math.isnan(off[index]):
+            raise RunError("the mesher failed.")
+        return Outcome((1.0 + off[index]) * scene.reference.exitance, seconds[index], 10 * (index + 1), 40)
+
+    return Method(name, "step", tuple(map(float, range(len(seconds)))), run, comparable=comparable, quick=1)
+
+
+def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_scene: Scene) -> None:
+    methods = [
+        fake("slow", [1.0, 1.1 * chart_runs.LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
+        fake("broken", [1.0, 2.0, 3.0], [0.4, math.nan, 0.2]),
+        fake("other model", [1e-3], [0.01], comparable=False),
+    ]
+    lines: list[str] = []
+    runs = runs_on(few(ball_scene), methods, quick=False, report=lines.append)
+    assert [(run.method, run.parameter, run.on_front) for run in runs] == [
+        ("slow", "step=0", False),
+        ("slow", "step=1", True),
+        ("broken", "step=0", True),
+        ("broken", "step=2", True),
+        ("other model", "step=0", None),
+    ]
+    assert [run.error for run in runs] == pytest.approx([0.5, 0.1, 0.4, 0.2, 0.01])
+    assert "  broken step=1: failed: the mesher failed." in lines
+    assert [run.method for run in runs_on(few(ball_scene), methods, quick=True, report=lines.append)] == [
+        "slow",
+        "broken",
+        "other model",
+    ]
+
+
+def test_exponents_by_method() -> None:
+    def row(n: int) -> Run:
+        return Run("c", "m", "", 1e-3 * n**1.2, n, 5 * n, 2.0 * n**-0.5, None, False, "closed form")
+
+    plain = replace(row(1), method="dipole alone", unknowns=None)
+    found = exponents([row(100), row(1000), row(5000), plain])
+    assert found["m"] == pytest.approx({"error": -0.5, "seconds": 1.2})
+    assert found["dipole alone"] == {"error": None, "seconds": None}
+
+
+def test_every_method_has_a_look() -> None:
+    assert {*BY_NAME, *(method.name for peer in PEERS for method in peer.methods)} == set(LOOKS)
+    assert len({(look.color, look.marker) for look in LOOKS.values()}) == len(LOOKS)
+
+
+# Peers
+
+
+def test_peers_are_never_imported_here() -> None:
+    """redbirdpy is under the GPL: the program that imports it imports nothing of tetlux, nor is it imported."""
+    assert not {"ngsolve", "netgen", "redbirdpy"} & set(sys.modules)
+    scripts = 0
+    for package in (meshing, fem, cases):
+        assert package.__file__ is not None
+        for path in Path(package.__file__).parent.rglob("*.py"):
+            text = path.read_text(encoding="utf-8")
+            imports = re.findall(r"^\s*(?:from|import) ([\w.]+)", text, re.MULTILINE)
+            assert not any("_peer_" in name for name in imports), path
+            if "redbirdpy" in imports:
+                scripts += 1
+                assert not any(name.startswith("tetlux") for name in imports), path
+    assert scripts == 1
+
+
+def test_a_peer_that_fails_is_an_error_of_one_line() -> None:
+    with pytest.raises(RunError, match="can't open file"):
+        answer("_peer_of_nobody.py", {"points": np.zeros(3)})
+    with pytest.raises(RunError, match=r"KeyError|No module named") as failure:
+        answer("_peer_redbird.py", {"points": np.zeros(3)})
+    assert "\n" not in str(failure.value)
+
+
+def installed(package: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    return pytest.mark.skipif(importlib.util.find_spec(package) is None, reason=f"{package} is not installed")
+
+
+@installed("ngsolve")
+def test_ngsolve_on_the_exact_sphere(ball_scene: Scene) -> None:
+    third = next(m for peer in PEERS for m in peer.methods if m.name == "NGSolve P3")
+    outcome = third.run(ball_scene, 0.5)
+    # Five runs: 0.0055 to 0.0065.
+    assert 0.002 < ball_scene.error_of(outcome.exitance) < 0.01
+
+
+@installed("redbirdpy")
+def test_redbirdpy_solves_the_same_system(ball_scene: Scene) -> None:
+    """Linear elements with consistent masses on one mesh are one answer, whoever finds it."""
+    case = ball_scene.case
+    mesh = tetrahedralize(case.surface)
+    ours = solve(mesh, case.medium, case.lights, mass="consistent", subtract="nothing")
+    source, power = ball_scene.sources[0]
+    theirs = answer(
+        "_peer_redbird.py",
+        {
+            "nodes": mesh.points,
+            "tetrahedra": mesh.tetrahedra,
+            "diffusion": case.medium.diffusion,
+            "sigma_a": case.medium.sigma_a,
+            "robin": 1.0 / (2.0 * case.medium.boundary_factor),
+            "eta": case.medium.eta,
+            "points": source[None],
+            "powers": np.array([power]),
+            "repeats": 1,
+            "repeat_seconds": 0.0,
+        },
+    )
+    assert np.allclose(theirs["fluence"], ours.fluence, rtol=1e-6, atol=1e-9 * ours.fluence.max())
+
+
+# The command
+
+LITTLE = (
+    fake("half-space alone", [0.01], [0.2]),
+    fake(OURS, [0.5, 1.0], [0.02, 0.005]),
+    fake("P1, graded", [2.0], [0.1]),
+)
+ABSENT = (Peer("NGSolve", "no_such_package", ()),)
+
+
+@pytest.fixture
+def little(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chart of methods that take no time."""
+    monkeypatch.setattr(chart_module, "MODELS", LITTLE[:1])
+    monkeypatch.setattr(chart_module, "FINITE_ELEMENTS", LITTLE[1:])
+    monkeypatch.setattr(chart_module, "PEERS", ABSENT)
+    monkeypatch.setattr(chart_module, "monte_carlo_installed", lambda: False)
+    monkeypatch.setattr(chart_module, "_warm_up", lambda: None)
+
+
+@pytest.mark.usefixtures("little")
+def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["chart", "sphere", "slab", "--out", str(tmp_path / "out")]) == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["chart.csv", "chart.json", "chart.png"]
+    rows = table(tmp_path / "out")
+    columns = "case,method,parameter,seconds,unknowns,tetrahedra,error,estimate,on_front,reference"
+    assert ",".join(rows[0]) == columns
+    assert [(row["case"], row["method"]) for row in rows[:4]] == [
+        ("sphere", "half-space alone"),
+        ("sphere", OURS),
+        ("sphere", OURS),
+        ("sphere", "P1, graded"),
+    ]
+    assert [float(row["error"]) for row in rows[:4]] == pytest.approx([0.2, 0.02, 0.005, 0.1])
+    assert [row["on_front"] for row in rows[:4]] == ["True", "True", "True", "False"]
+    data = json.loads((tmp_path / "out" / "chart.json").read_text())
+    assert len(data["runs"]) == len(rows) == 8
+    assert data["runs"][2]["error"] == pytest.approx(0.005)
+    assert data["cases"]["slab"]["reference"]["kind"] == "closed form"
+    assert data["cases"]["slab"]["exponents"][OURS] == {"error": None, "seconds": None}
+    assert data["machine"]["cores"] >= 1
+    assert {"python", "tetlux", "numpy"} <= set(data["versions"])
+    picture = np.asarray(Image.open(tmp_path / "out" / "chart.png").convert("RGB")).astype(int)
+    assert picture.shape[1] == 2000
+    for name in (OURS, "P1, graded"):
+        color = [int(LOOKS[name].color[i : i + 2], 16) for i in (1, 3, 5)]
+        assert (np.abs(picture - color).max(axis=2) < 8).sum() > 300, name
+    said = capsys.readouterr().out
+    assert 'NGSolve is not installed and left out; pip install "tetlux[peers]" brings it.' in said
+    assert 'Monte Carlo is left out: it needs numba; pip install "tetlux[montecarlo]" brings it.' in said
+
+
+@pytest.mark.usefixtures("little")
+def test_a_chart_that_cannot_be_written_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "chart.csv").write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(chart_module, "draw_chart", full)
+    assert main(["chart", "sphere", "--out", str(tmp_path)]) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["chart.csv"]
+    assert (tmp_path / "chart.csv").read_text() == "old"
+    assert capsys.readouterr().err == (
+        f"tetlux: sphere failed: the chart cannot be written to {tmp_path}: No space left on device; "
+        "choose another folder with --out.\n"
+    )
+
+
+@pytest.mark.usefixtures("little")
+def test_a_case_that_fails_does_not_take_the_others_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def failing(*_: object) -> Reference:
+        raise RunError("the mesher failed.")
+
+    monkeypatch.setattr(chart_scene, "_finer_run", failing)
+    assert main(["chart", "torus", "sphere", "--out", str(tmp_path)]) == 1
+    assert {row["case"] for row in table(tmp_path)} == {"sphere"}
+    assert capsys.readouterr().err == "tetlux: torus failed: the mesher failed.\n"
+
+
+SWEEP = """\
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights:
+  - point: {position: [0, 0, 9]}
+sweep: {medium.sigma_a: [0.01, 0.1]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["ball"], "ball is neither a file nor one of the cases that ship: hare, slab, sphere, torus."),
+        (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),
+        (
+            ["sphere", "--out", "sweep.yaml"],
+            "results cannot be written to sweep.yaml; choose another folder with --out.",
+        ),
+    ],
+)
+def test_a_wrong_request_is_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sweep.yaml").write_text(SWEEP)
+    assert main(["chart", *arguments]) == 2
+    assert capsys.readouterr().err == f"tetlux: {said}\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.yaml"]
+
+
+def test_nothing_is_remembered_from_run_to_run(ball_scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that found what an earlier one had prepared would be timed too short."""
+    seen: list[tuple[set[str], object]] = []
+
+    def stopped(surface: Surface, *_: object, cache: bool = True, **__: object) -> None:
+        seen.append((set(vars(surface)), cache))
+        raise RunError("seen")
+
+    monkeypatch.setattr(chart_methods, "tetrahedralize", stopped)
+    monkeypatch.setattr(chart_methods, "solve", stopped)
+    monkeypatch.setattr(chart_peers, "tetrahedralize", stopped)
+    redbird = next(m for peer in PEERS for m in peer.methods if m.name == "redbirdpy P1")
+    assert ball_scene.case.surface.diagonal > 0
+    for name in ("P1, uniform", "P1, adaptive", "free-space subtracted, adaptive", OURS):
+        with pytest.raises(RunError, match="seen"):
+            BY_NAME[name].run(ball_scene, 0.0)
+    with pytest.raises(RunError, match="seen"):
+        redbird.run(ball_scene, 1.0)
+    assert seen == [({field.name for field in fields(Surface)}, False)] * 5
