@@ -65,7 +65,7 @@ def check_writable(out: Path) -> None:
         raise InputError(f"results cannot be written to {out}; choose another folder with --out.")
 
 
-def run_all(cases: Sequence[Case], out: Path) -> int:
+def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:
     """Run cases, with a line for each stage; 0 if all ran, 1 if some failed."""
     check_writable(out)
     failed = 0
@@ -79,7 +79,7 @@ def run_all(cases: Sequence[Case], out: Path) -> int:
             print(f"  {time.perf_counter() - started:6.1f} s  {line}", flush=True)
 
         try:
-            folder = run_case(case, out, report)
+            folder = run_case(case, out, report, cache=cache)
         except TetluxError as error:
             failed += 1
             print(f"tetlux: {case.name} failed: {error}", file=sys.stderr, flush=True)

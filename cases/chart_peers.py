@@ -74,7 +74,8 @@ def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
     with tempfile.TemporaryDirectory(prefix="tetlux-peer-", ignore_cleanup_errors=True) as folder:
         job_path, result_path = Path(folder) / "job.npz", Path(folder) / "result.npz"
         np.savez(job_path, **job)
-        command = [sys.executable, str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
+        # -P: the names of this folder's modules are not to hide those of others.
+        command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
         try:
             done = subprocess.run(
                 command,

@@ -50,6 +50,7 @@ def _parser() -> argparse.ArgumentParser:
         help="a YAML case file, or the name of one that ships (sphere, hare, ...)",
     )
     run.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: results")
+    run.add_argument("--no-cache", action="store_true", help="neither use nor keep meshes of earlier runs")
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="check case files and the surfaces they name, without solving")
@@ -70,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     from tetlux.cases.batch import load_all, run_all  # noqa: PLC0415
 
-    return run_all(load_all(options.cases), options.out)
+    return run_all(load_all(options.cases), options.out, cache=not options.no_cache)
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -26,7 +26,7 @@ COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 
 
-def run_case(case: Case, out: Path, report: Report = lambda _: None) -> Path:
+def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: bool = True) -> Path:
     """Solve a case and write its results.
 
     Results are written into a folder beside the final one and moved there when all are complete, the
@@ -39,6 +39,8 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None) -> Path:
         Folder of all results; this case's go to ``out / case.name``.
     report : callable
         Called with a line of text as each stage ends.
+    cache : bool
+        Whether the mesher's mesh is looked up and kept in the user's cache directory.
 
     Returns
     -------
@@ -51,7 +53,7 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None) -> Path:
         If the mesher or the solver fails, or the results cannot be written.
     """
     started = time.perf_counter()
-    solution = solve(case.surface, case.medium, case.lights, tolerance=case.tolerance, report=report)
+    solution = solve(case.surface, case.medium, case.lights, tolerance=case.tolerance, cache=cache, report=report)
     target = out / case.name
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -34,6 +34,8 @@ CALIBRATION = 0.75
 # Facets whose distance from the surface could add no more than this share of the rest are not measured: a facet's
 # distance is at most this share of its longest edge, where the surface is smooth.
 NOT_MEASURED, FARTHEST = 0.02, 0.2
+# A facet that is farther than this share of its longest edge from the surface does not just cut a curve short.
+BULGE = 0.1
 # The mean distance of a paraboloid from a triangle through three of its points, over that at the middle.
 MEAN_OVER_MIDDLE = 0.75
 
@@ -161,8 +163,9 @@ def _of_facets(
     measured = order[np.cumsum(most[order]) > NOT_MEASURED * rest]
     middles = corners[measured].mean(axis=1)
     distance = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
-    # A sphere through the corners of an equilateral triangle stands h²/6R above its middle.
-    curvature = 2.0 * 6.0 * distance / length[measured] ** 2
+    # A sphere through the corners of an equilateral triangle stands h²/6R above its middle. What is farther is a node
+    # that could not be moved onto the surface, and tells nothing of its curvature.
+    curvature = np.where(distance < BULGE * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0)
     bent = np.abs(curvature - 1.0 / medium.extrapolation_length) * outflow[measured]
     added = MEAN_OVER_MIDDLE * distance * areas[measured] * (along[measured] + bent)
     return np.asarray(np.bincount(cells[measured], added, minlength=len(mesh.tetrahedra)), dtype=np.float64)

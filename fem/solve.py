@@ -24,8 +24,8 @@ from tetlux.meshing.tetmesh import TetMesh
 # A fluence below zero by less than this share of its maximum is not worth a sentence.
 NEGLIGIBLE_DIP = 1e-6
 # From mesh to mesh those tetrahedra are split that make up this share of the estimated error, or as little as is
-# needed: to split them takes this part of their error away.
-SPLIT_SHARE, GAIN = 0.8, 0.4
+# needed: to split them takes this part of their error away. A step is never too small to be worth its solution.
+SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
 SAFETY, POWER_SAFETY = 0.6, 0.4
 MOST_TETRAHEDRA = 1_000_000
@@ -196,7 +196,7 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
         error = float(shares.sum())
         if error <= aim:
             continue
-        part = min(SPLIT_SHARE, (1.0 - aim / error) / GAIN)
+        part = float(np.clip((1.0 - aim / error) / GAIN, LEAST_SHARE, SPLIT_SHARE))
         order = np.argsort(-shares)
         reached = np.cumsum(shares[order])
         marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True

@@ -25,15 +25,16 @@ from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 # The command that fills input.npz of its working directory; -S, since it is told where modules are.
 MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
-# Measured with what follows, 2 cores, ten runs each, from surface to mesh without the cache (seconds of the quietest
-# run; deviation as a share of the diagonal, after the boundary was moved back; volume against the surface's):
+# Measured with what follows on 2 cores, from surface to mesh, without the cache. Seconds are of the quietest of four
+# runs; the rest is over ten. Volume is against the surface's; deviation is of the mesh whose boundary was moved back,
+# as a share of the diagonal.
 #
 #   surface      faces    proxy    proxy / mesher / rest   tetrahedra   worst quality    volume   deviation
-#   sphere       5,120      466      .08 /  .35 / .03       2.5k        .28 - .29        -2.4 %     .005
-#   spot         5,856    1,136      .06 / 1.2  / .04       2.8 - 3.7k  .11 - .16        -1.9 %     .006 - .007
-#   cow          5,804    2,550      .18 / 1.8  / .04       3.0 - 3.8k  .10 - .16        -1.2 %     .011 - .016
-#   rocker-arm  20,088    1,272      .08 / 2.0  / .05       3.3 - 4.3k  .10 - .18        -1.1 %     .005 - .007
-#   nefertiti   99,938    1,548      .27 / 1.6  / .11       2.3 - 3.5k  .10 - .15        -1.5 %     .008 - .013
+#   sphere       5,120      466      .09 /  .31 / .03       2.5k        .28 - .29        -2.4 %     .005
+#   spot         5,856    1,136      .06 / 1.15 / .04       2.8 - 3.7k  .10 - .27        -1.9 %     .006 - .007
+#   cow          5,804    2,550      .18 / 1.7  / .04       3.0 - 3.8k  .10 - .17        -1.2 %     .011 - .017
+#   rocker-arm  20,088    1,272      .08 / 2.1  / .05       3.3 - 4.3k  .10 - .21        -1.1 %     .005 - .007
+#   nefertiti   99,938    1,548      .28 / 1.65 / .11       2.3 - 3.5k  .10 - .17        -1.5 %     .008 - .013
 #
 # Default deviation: this share of the diagonal, or of the body's mean thickness 2 V/A if that is less.
 DEVIATION = 0.01
@@ -43,8 +44,9 @@ DEVIATION_OF_THICKNESS = 0.25
 ENVELOPE = 0.55
 # Default edge length, as a share of the diagonal: at an eighth there are a fifth fewer tetrahedra, in as much time.
 EDGE_LENGTH = 1.0 / 12.0
-# Worst quality and time, of spot and rocker-arm: .13 and 1.3 at 8, .10 and 1 at 9.5, .075 and .9 at 10, .03 and .7
-# at 14; at 30 it is three times quicker and makes slivers of .01.
+# Worst quality of six runs of spot, rocker-arm and nefertiti, and the mesher's seconds: at 8 .13 and 1.4, 2.4, 2.0;
+# at 9 .12 and 1.5, 2.3, 1.9; at 10 .08 and 1.1, 1.8, 1.8. At 14 the worst was .03; at 30, which is three times
+# quicker than 10, .01.
 STOP_ENERGY = 9.5
 # A mesh whose boundary is farther from the surface than so many deviations has lost a part.
 LOST = 2.5

@@ -61,7 +61,7 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     wanted = min(TRIANGLES * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
     # Unit size, about the origin: fast-simplification's thresholds are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
-    fine = (surface.points - origin) / size, surface.faces
+    fine: tuple[FloatArray, IntArray] = (surface.points - origin) / size, surface.faces
     # Most of the work once, and not once for each try.
     base = _decimated(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
     best = surface
@@ -71,7 +71,7 @@ def proxy(surface: Surface, deviation: float) -> Surface:
             break
         if count > 0.6 * len(base[1]):
             base = fine
-        coarse = _sound(surface, *base, count, origin, size)
+        coarse = _sound(surface, base, count, origin, size)
         if coarse is None:
             wanted *= 2.0
             continue
@@ -88,15 +88,15 @@ def proxy(surface: Surface, deviation: float) -> Surface:
 
 
 def _sound(
-    surface: Surface, points: FloatArray, faces: IntArray, count: int, origin: FloatArray, size: float
+    surface: Surface, base: tuple[FloatArray, IntArray], count: int, origin: FloatArray, size: float
 ) -> Surface | None:
     """A decimation to about `count` triangles that bounds as many bodies as the surface, if there is one."""
     wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
     for attempt in range(COUNTS):
         target = int(count * (1.0 + 0.04 * attempt))
-        if target >= len(faces):
+        if target >= len(base[1]):
             return None
-        p, f = _decimated(points, faces, target)
+        p, f = _decimated(*base, target)
         if len(f) < 4 or not _is_manifold(f):
             continue
         body = bodies(len(p), f)

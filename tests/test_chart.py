@@ -284,7 +284,7 @@ def test_redbirdpy_solves_the_same_system(ball_scene: Scene) -> None:
     """Linear elements with consistent masses on one mesh are one answer, whoever finds it."""
     case = ball_scene.case
     mesh = tetrahedralize(case.surface)
-    ours = solve(mesh, case.medium, case.lights, mass="consistent", subtract="nothing")
+    ours = solve(case.surface, case.medium, case.lights, mesh=mesh, mass="consistent", subtract="nothing")
     source, power = ball_scene.sources[0]
     theirs = answer(
         "_peer_redbird.py",

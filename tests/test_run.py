@@ -193,3 +193,16 @@ def test_the_cases_that_ship_run(name: str, tmp_path: Path) -> None:
         scattered = case.medium.albedo * (1 - channel["power"]["specular"])
         # The plate ends 30 mm from the beam, five decay lengths: its rim takes less than 0.1 %.
         assert channel["power"]["exited"] == pytest.approx(scattered * (front + back), rel=0.004)
+
+
+def test_no_cache_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TETLUX_CACHE_DIR", str(tmp_path / "cache"))
+    case = tmp_path / "ball.yaml"
+    case.write_text(
+        "surface: {sphere: {radius: 5}}\nmedium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}\n"
+        "lights: [{point: {position: [0, 0, 0]}}]\ntolerance: 0.3\noutputs: [surface]\n"
+    )
+    assert main(["run", str(case), "--out", str(tmp_path / "out"), "--no-cache"]) == 0
+    assert not list(tmp_path.glob("cache/**/*.npz"))
+    assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 0
+    assert len(list(tmp_path.glob("cache/**/*.npz"))) == 1

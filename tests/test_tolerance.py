@@ -1,10 +1,13 @@
 """The tolerance is met, and the estimate is honest, on bodies that have a closed form."""
 
+import numpy as np
 import pytest
 
 from tests.benchmarks.scenes import SCENES
-from tetlux.fem import PointSource, solve, solve_each
-from tetlux.meshing import Surface
+from tetlux.fem import PointSource, System, solve, solve_each
+from tetlux.fem.sources import sources_of
+from tetlux.fem.stopwatch import Stopwatch
+from tetlux.meshing import Surface, TetMesh, refine, sphere
 
 
 @pytest.mark.slow
@@ -38,3 +41,16 @@ def test_every_scene_of_several_meets_the_tolerance(ball: Surface) -> None:
     one, two, centre = (solution.power.exited for solution in solutions)
     assert one == pytest.approx(two, rel=0.005)
     assert centre == pytest.approx(0.54062, rel=0.01)
+
+
+def test_a_gap_that_cannot_be_closed_is_no_curvature(ball_mesh: TetMesh) -> None:
+    """Nodes stuck beside their surface add as much to the estimate on a finer mesh, and not more and more."""
+    wide, medium = sphere(10.4), SCENES["sphere"]("").medium
+    sources = sources_of([PointSource((0.0, 0.0, 0.0))], ball_mesh.surface, medium, "half-space")
+    errors, mesh = [], ball_mesh
+    for _ in range(3):
+        errors.append(System(mesh, medium, wide).step(sources, Stopwatch()).estimate.error)
+        mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool))
+    # Without the limit it grows like one over the edge length: 6 times over these meshes.
+    assert errors[-1] < 1.05 * errors[0]
+    assert errors[-1] > 0.01
