@@ -4,7 +4,7 @@ import copy
 import itertools
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -195,7 +195,8 @@ def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Sur
         label = spec.surface.model_dump_json() + spec.unit
         started = time.perf_counter()
         if label not in surfaces:
-            surfaces[label] = _surface(spec.surface, spec.unit, document.path.parent)
+            surface = _surface(spec.surface, spec.unit, document.path.parent)
+            surfaces[label] = replace(surface, crease_angle=spec.surface.crease_angle)
         reading_seconds = time.perf_counter() - started
         surface = surfaces[label]
         check_size(surface, medium)

@@ -96,7 +96,7 @@ def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], 
     InputError
         If there is none for this shape or this light.
     """
-    kind = next(name for name in type(shape).model_fields if name != "scale" and getattr(shape, name) is not None)
+    kind = shape.kind
     known = FOR_SHAPES.get(kind, ())
     for name in names:
         if name not in known:

@@ -38,7 +38,7 @@ class Choice(Section):
 
     @model_validator(mode="after")
     def _exactly_one(self) -> "Choice":
-        kinds = [name for name, field in type(self).model_fields.items() if field.default is None]
+        kinds = self.kinds()
         given = [name for name in kinds if getattr(self, name) is not None]
         if len(given) != 1:
             raise PydanticCustomError(
@@ -47,6 +47,16 @@ class Choice(Section):
                 {"known": ", ".join(kinds), "given": " and ".join(given) if given else "none"},
             )
         return self
+
+    @classmethod
+    def kinds(cls) -> list[str]:
+        """The keys of which one is given."""
+        return [name for name, field in cls.model_fields.items() if field.default is None]
+
+    @property
+    def kind(self) -> str:
+        """The key that is given."""
+        return next(name for name in self.kinds() if getattr(self, name) is not None)
 
 
 class SphereSpec(Section):
@@ -91,6 +101,9 @@ class SurfaceSpec(Choice):
 
     file: str | None = Field(None, description="surface file, relative to the case file")
     scale: Length = Field(1.0, description="factor on the file's coordinates")
+    crease_angle: float = Field(
+        30.0, ge=0, le=180, description="degrees; triangles that bend less are one smooth surface, 0: all are flat"
+    )
     sphere: SphereSpec | None = None
     slab: SlabSpec | None = None
     box: BoxSpec | None = None

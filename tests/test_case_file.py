@@ -231,3 +231,10 @@ def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_device_is_no_case() -> None:
     with pytest.raises(InputError, match="is not a file"):
         load_cases(Path("/dev/zero"))
+
+
+def test_a_crease_angle_of_nought_takes_triangles_as_they_are(tmp_path: Path) -> None:
+    (round_,) = load(tmp_path, GOOD)
+    (flat,) = load(tmp_path, GOOD.replace("depth: 1}}", "depth: 1}, crease_angle: 0}"))
+    assert round_.surface.crease_angle == 30
+    assert flat.surface.crease_angle == 0

@@ -258,3 +258,15 @@ def test_light_that_is_all_reflected_is_said() -> None:
     assert solution.power.specular == 1.0
     assert solution.power.exited == 0.0
     assert "no light leaves the body" in solution.warnings[-1]
+
+
+def test_beams_enter_the_smooth_surface_that_triangles_stand_for() -> None:
+    """On 320 triangles, as on the sphere itself: the flat ones lie 0.16 inside it, tilted by up to 10 degrees."""
+    ball = sphere(10.0, subdivisions=2)
+    for x, y in ((0.3, 0.2), (2.0, 3.0), (5.0, -4.0)):
+        (found,) = PencilBeam((x, y, 20.0), (0.0, 0.0, -1.0)).deposit_in(ball, TISSUE).points
+        entry = np.array([x, y, math.sqrt(100.0 - x**2 - y**2)])
+        cosine, normal = entry[2] / 10.0, entry / 10.0
+        inside = math.sqrt(1.0 - (1.0 - cosine**2) / 1.4**2)
+        refracted = np.array([0.0, 0.0, -1.0]) / 1.4 + (cosine / 1.4 - inside) * normal
+        assert found == pytest.approx(entry + refracted / 1.01, abs=0.02)

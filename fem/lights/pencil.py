@@ -17,6 +17,8 @@ from tetlux.meshing.surface import Surface
 # A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path
 # apart, up to the second number: closer than that, what they deposit runs together.
 RAYS = (127, 2000)
+# A beam that meets a surface at less than this, by the sine of the angle, meets its triangles and not their curve.
+GRAZING = 0.1
 # What a beam still carries after this many reflections at the inside, or below this share, stays put.
 REFLECTIONS = 64
 NEGLIGIBLE = 1e-12
@@ -120,8 +122,8 @@ class PencilBeam:
         for origin in origins:
             distances, faces = _entering(surface, origin, direction)
             if len(faces):
-                entry = origin + distances[0] * direction
-                enter = _Entry.through(entry, direction, surface.normals[faces[0]], medium.eta, share)
+                entry, normal = _on_curve(surface, origin + distances[0] * direction, faces[0], direction)
+                enter = _Entry.through(entry, direction, normal, medium.eta, share)
                 parts.append(
                     _as_point(enter, surface, medium) if self.deposit == "point" else _as_line(enter, surface, medium)
                 )
@@ -168,6 +170,17 @@ def _entering(surface: Surface, origin: FloatArray, direction: FloatArray) -> tu
     distances, faces = surface.crossings(origin, direction)
     inward = surface.normals[faces] @ direction < 0
     return distances[inward], faces[inward]
+
+
+def _on_curve(surface: Surface, point: FloatArray, face: int, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Where a ray that meets a triangle meets the smooth surface that this stands for, and the normal there."""
+    (curved,), (normal,) = surface.on_curve(np.array([face]), point[None])
+    flat = surface.normals[face]
+    # Along the ray, to the height of the smooth surface; where they run side by side the triangle has to do.
+    slope = float(direction @ flat)
+    if abs(slope) < GRAZING or direction @ normal > -GRAZING:
+        return point, flat
+    return point + float((curved - point) @ flat) / slope * direction, normal
 
 
 @dataclass(frozen=True, eq=False)
