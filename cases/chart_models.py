@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.cases.chart_methods import Method, Outcome, quickest
-from tetlux.cases.chart_scene import Scene, kind_of
+from tetlux.cases.chart_scene import Scene
 from tetlux.fem.exact import dipole, half_space, monte_carlo
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -72,7 +72,7 @@ def _monte_carlo_on_slab(scene: Scene, source: FloatArray, photons: int) -> Floa
 
 
 def _monte_carlo_fits(scene: Scene) -> bool:
-    return scene.reference.kind == "closed form" and kind_of(scene.shape) in ("sphere", "slab")
+    return scene.reference.kind == "closed form" and scene.shape.kind in ("sphere", "slab")
 
 
 def monte_carlo_installed() -> bool:

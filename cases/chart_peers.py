@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.chart_methods import MOST_TETRAHEDRA, REPEAT_SECONDS, Method, Outcome
-from tetlux.cases.chart_scene import Scene, kind_of
+from tetlux.cases.chart_scene import Scene
 from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.errors import RunError
@@ -112,7 +112,7 @@ def _ngsolve(order: int) -> Callable[[Scene, float], Outcome]:
             "_peer_ngsolve.py",
             _problem(scene)
             | {
-                "kind": kind_of(shape),
+                "kind": shape.kind,
                 "sizes": sizes,
                 "center": center,
                 "order": order,
@@ -146,7 +146,7 @@ def _redbird(scene: Scene, longest: float) -> Outcome:
 
 
 def _has_exact_shape(scene: Scene) -> bool:
-    return scene.in_points and kind_of(scene.shape) in ("sphere", "slab", "torus")
+    return scene.in_points and scene.shape.kind in ("sphere", "slab", "torus")
 
 
 PEERS = (

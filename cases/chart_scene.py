@@ -102,12 +102,6 @@ class Scene:
         return relative_error(exitance, self.reference.exitance, self.samples.weights)
 
 
-def kind_of(shape: SurfaceSpec) -> str:
-    """The one key that is given: "file", "sphere", ..."""
-    kinds = [name for name in type(shape).model_fields if name != "scale"]
-    return next(name for name in kinds if getattr(shape, name) is not None)
-
-
 def spec_of(case: Case) -> CaseSpec:
     """What the case file says."""
     return CaseSpec.model_validate(read_document(case.source).data)
@@ -139,7 +133,7 @@ def _in_closed_form(
     shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], samples: Samples
 ) -> tuple[Samples, Reference] | None:
     """None if there is none for this shape or light, or a source is too near to where it does not hold."""
-    known = CLOSED_FORMS.get(kind_of(shape))
+    known = CLOSED_FORMS.get(shape.kind)
     try:
         return known(shape, medium, deposits, samples) if known else None
     except InputError:

@@ -23,11 +23,15 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # A fluence below zero by less than this share of its maximum is not worth a sentence.
 NEGLIGIBLE_DIP = 1e-6
+# And the same of power, by that which is incident.
+NEGLIGIBLE_POWER = 1e-4
+# A body that grows by more than this share as its triangles are taken for a smooth surface is worth a sentence.
+LARGEST_BULGE = 0.015
 # From mesh to mesh those tetrahedra are split that make up this share of the estimated error, or as little as is
 # needed: to split them takes this part of their error away. A step is never too small to be worth its solution.
 SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
-SAFETY, POWER_SAFETY = 0.6, 0.4
+SAFETY, POWER_SAFETY = 0.65, 0.4
 MOST_TETRAHEDRA = 1_000_000
 
 
@@ -143,6 +147,8 @@ def solve_each(
         if mesh is not None:
             raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
         mesh = body
+    if mesh is not None and mesh.unit != body.unit:
+        raise InputError(f"the mesh is in {mesh.unit} and the surface in {body.unit}; give both in one unit.")
     watch = Stopwatch()
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
@@ -206,10 +212,23 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
 def _warnings(solution: Solution, of_lights: list[str], tolerance: float, most_tetrahedra: int | None) -> list[str]:
     """What a user should know of a solution; the limit is None for a mesh that was given."""
     warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *of_lights]
-    if most_tetrahedra is not None and solution.error_estimate > tolerance:
+    if solution.error_estimate > tolerance:
+        where = "on the mesh given" if most_tetrahedra is None else f"at the limit of {most_tetrahedra:,} tetrahedra"
         warnings.append(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
-            f"at the limit of {most_tetrahedra:,} tetrahedra."
+            f"{where}."
+        )
+    bulge = solution.surface.bulge
+    if abs(bulge) > LARGEST_BULGE:
+        warnings.append(
+            f"the body is taken as smooth, which changes its volume by about {bulge:+.1%}; give it more triangles, or "
+            "a crease_angle of 0 if they are meant to be flat."
+        )
+    power = solution.power
+    if min(power.absorbed, power.exited) < -NEGLIGIBLE_POWER * power.incident:
+        warnings.append(
+            "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
+            "tolerance, or give a finer mesh."
         )
     if solution.power.exited == 0.0:
         warnings.append(

@@ -50,11 +50,17 @@ def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtra
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     deposits = tuple(light.deposit_in(surface, medium) for light in lights)
-    whole = Sources(deposits, (), deposits)
-    if subtract == "nothing":
-        return whole
-    images = subtract == "half-space"
-    charges = tuple(charges_of(d.points, d.powers, surface, medium, images=images) for d in deposits if len(d.points))
-    if sum(len(c.positions) for c in charges) > MOST_CHARGES:
-        return whole
-    return Sources(deposits, charges, tuple(replace(d, points=d.points[:0], powers=d.powers[:0]) for d in deposits))
+    charges: list[Charges] = []
+    on_mesh: list[Deposit] = []
+    left = 0 if subtract == "nothing" else MOST_CHARGES
+    for deposit in deposits:
+        # As many as can be afforded: with images, or at least without.
+        for images in (True, False) if subtract == "half-space" else (False,):
+            if 0 < len(deposit.points) <= left:
+                some = charges_of(deposit.points, deposit.powers, surface, medium, images=images)
+                if len(some.positions) <= left:
+                    left -= len(some.positions)
+                    charges.append(some)
+                    deposit = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])  # noqa: PLW2901
+        on_mesh.append(deposit)
+    return Sources(deposits, tuple(charges), tuple(on_mesh))

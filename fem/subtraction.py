@@ -38,13 +38,18 @@ CLEARANCE = 0.5
 # Close to its source fluence grows like 1/r: a node closer than this share of the source's depth, or of a mean free
 # path, shows the fluence at that distance.
 CLOSEST = 0.02
+# A source this near to a facet, by the facet's longest edge, is too near for the integrals over it to see.
+RESOLVED = 3e-4
+# Inner faces of a patch are no longer than this times their distance from the charges: across them the fluence steps
+# by what linear interpolation misses.
+COARSEST_INNER = 1.5
 # A guess that is off by more than this share of itself is not used.
 GOOD_GUESS = 0.5
 # More charges than this cost more than the tetrahedra that they save.
 MOST_CHARGES = 3000
 # Rules for the faces of a patch by their longest edge over the distance to the nearest charge; where that is larger
 # than the last limit, a face is cut in four.
-_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.3, 2), (0.8, 4), (2.0, 8)))
+_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.15, 2), (0.5, 4), (2.0, 8)))
 _CUTS = 12
 # Pairs of a point and a charge that are worked on at once, so that they stay in the processor's cache.
 PAIRS = 100_000
@@ -136,6 +141,7 @@ def charges_of(points: FloatArray, powers: FloatArray, surface: Surface, medium:
             heights, weights = _image_line(depth, medium.extrapolation_length)
             line = foot + heights[:, None] * normal
             clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
+            clear &= ~surface.contains(line)
             # Beyond the first charge that comes too close to the body again there may be more of it.
             clear = np.logical_and.accumulate(clear)
             positions.append(line[clear])
@@ -191,23 +197,45 @@ class PatchTerms:
     absorbed: float
 
 
-def whole_patch(mesh: TetMesh, charges: Charges) -> Patch:
-    """A patch that covers all of a mesh."""
-    return Patch(charges, np.ones(len(mesh.tetrahedra), dtype=bool), charges.fluence(mesh.points))
-
-
 def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
     """Where the charges are a good guess of a fluence (n,) at the nodes, (n,)."""
     return np.asarray(np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes))
 
 
 def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
-    """The patch of the tetrahedra whose nodes are all good; none if a source is not among them."""
+    """The patch of the tetrahedra whose nodes are all good; an empty one if that would not be sound."""
     cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
-    home, _ = mesh.locate(charges.positions[: charges.sources])
-    if not cells[home[home >= 0]].all():
+    if not _is_sound(mesh, charges, cells):
         cells = np.zeros(len(cells), dtype=bool)
     return Patch(charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
+
+
+def _is_sound(mesh: TetMesh, charges: Charges, cells: BoolArray) -> bool:
+    """Whether the integrals over a patch's faces are those that Gauss's theorem speaks of.
+
+    The ledger cannot tell, since it is made of the same integrals.
+    """
+    homes, _ = mesh.locate(charges.positions)
+    sources, images = homes[: charges.sources], homes[charges.sources :]
+    if (sources < 0).any() or not cells[sources].all() or cells[images[images >= 0]].any():
+        return False
+    places = charges.positions[: charges.sources]
+    foot, face, _ = mesh.closest_boundary(places)
+    size = _longest_edge(mesh.points[mesh.boundary_faces[face]])
+    if (np.linalg.norm(foot - places, axis=1) < RESOLVED * size).any():
+        return False
+    if cells.all():
+        return True
+    faces, on_boundary = _faces(mesh, cells)
+    inner = mesh.points[faces[~on_boundary]]
+    apart, _ = cKDTree(charges.positions).query(inner.mean(axis=1))
+    return bool((_longest_edge(inner) <= COARSEST_INNER * apart).all())
+
+
+def _longest_edge(corners: FloatArray) -> FloatArray:
+    """Longest edges (f,) of triangles (f, 3, 3)."""
+    edges = corners - corners[:, [1, 2, 0]]
+    return np.asarray(np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1, initial=0.0)))
 
 
 def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
@@ -305,8 +333,7 @@ def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, Float
     owner, place = np.arange(len(corners)), np.broadcast_to(np.eye(3), (len(corners), 3, 3))
     for cut in range(_CUTS + 1):
         part = place @ corners[owner]
-        edges = part - part[:, [1, 2, 0]]
-        size = np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1, initial=0.0))
+        size = _longest_edge(part)
         near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
         done = np.zeros(len(part), dtype=bool)
         for limit, nodes, weights in _RULES:

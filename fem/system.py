@@ -15,7 +15,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms, whole_patch
+from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -106,7 +106,8 @@ class System:
         with watch.stage("assemble"):
             load = np.sum([load_vector(mesh, medium, deposit) for deposit in sources.on_mesh], axis=0)
             if before is None:
-                patches = [whole_patch(mesh, charges) for charges in sources.charges]
+                everywhere = np.ones(len(mesh.points), dtype=bool)
+                patches = [patch_of(mesh, charges, everywhere) for charges in sources.charges]
             else:
                 coarse = before.solution.mesh.points
                 patches = [

@@ -291,7 +291,17 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
                 f"the mesher's deviation of {deviation:.3g} {surface.unit}: give a smaller deviation."
             )
-    wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
+    of_surface = bodies(len(surface.points), surface.faces)
+    # The first vertices of each body: a small one may be gone without a trace in the sums.
+    _, first = np.unique(of_surface, return_index=True)
+    vertices = surface.points[surface.faces[first]].reshape(-1, 3)
+    astray = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
+    if not surface.overlaps and (astray > LOST * deviation).any():
+        raise _NotTheBodyError(
+            f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
+            "others; give a smaller deviation, or leave it out."
+        )
+    wanted = len(first)
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:
         raise _NotTheBodyError(

@@ -9,6 +9,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
 
+# Triangles beyond which a surface is taken to be fine enough.
+MOST_BULGING = 20_000
 UNITS = ("nm", "um", "mm", "cm", "m", "in")
 
 
@@ -105,8 +107,23 @@ class Surface:
             return points, self.normals[faces]
         return self._patches(faces, barycentric_of(points, self.points[self.faces[faces]]))
 
+    @cached_property
+    def bulge(self) -> float:
+        """How much larger the smooth surface's volume is than that of the triangles, as a share of it, roughly.
+
+        Surfaces of many triangles do not bulge, and are not looked at.
+        """
+        if self.crease_angle <= 0 or len(self.faces) > MOST_BULGING:
+            return 0.0
+        corners = self.points[self.faces]
+        faces, added = np.arange(len(self.faces)), np.zeros(len(self.faces))
+        for i in range(3):
+            middle = 0.5 * (corners[:, i] + corners[:, i - 1])
+            added += np.einsum("ij,ij->i", self.on_curve(faces, middle)[0] - middle, self.normals) / 3.0
+        return float(added @ triangle_areas(self.points, self.faces)[1]) / self.volume
+
     def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The smooth surface's points (q, 3) and normals (q, 3) nearest to queries (q, 3), by the nearest triangle."""
+        """Points (q, 3) of the smooth surface and its normals (q, 3), above the nearest points of triangles."""
         nearest, faces = self.closest(queries)
         return self.on_curve(faces, nearest)
 

@@ -152,8 +152,8 @@ class TetMesh:
 
     @cached_property
     def surface(self) -> Surface:
-        """The boundary as a surface of its own."""
-        return Surface(self.boundary_points, self.boundary_triangles, self.unit, "mesh")
+        """The boundary as a surface of its own, flat facets and all."""
+        return Surface(self.boundary_points, self.boundary_triangles, self.unit, "mesh", crease_angle=0.0)
 
     @cached_property
     def boundary_areas(self) -> FloatArray:

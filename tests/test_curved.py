@@ -82,3 +82,10 @@ def test_projecting_finds_the_curved_surface() -> None:
     points, normals = ball.project(10.3 * outward)
     assert np.abs(np.linalg.norm(points, axis=1) - 10.0).max() < 5e-5
     assert np.einsum("ij,ij->i", normals, outward).min() > 0.99999
+
+
+def test_twelve_sides_are_all_sharp() -> None:
+    """They bend by 30 degrees, give or take rounding."""
+    prism = cylinder(5.0, 20.0, segments=12)
+    faces, flat = places_on(prism)
+    np.testing.assert_allclose(prism.on_curve(faces, flat)[0], flat, atol=1e-9)

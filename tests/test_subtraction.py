@@ -6,8 +6,9 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.exact import half_space
-from tetlux.fem.subtraction import charges_of
-from tetlux.meshing import Surface, TetMesh, slab, sphere, torus
+from tetlux.fem.sources import sources_of
+from tetlux.fem.subtraction import MOST_CHARGES, charges_of
+from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 
 PLATE = slab(200.0, 100.0)
 SOURCE = np.array([[0.0, 0.0, -1.0]])
@@ -41,7 +42,7 @@ def test_charges_solve_the_equation_inside() -> None:
     np.testing.assert_allclose(gradient[0], (values[1::2] - values[::2]) / (2.0 * step), rtol=1e-5)
 
 
-@pytest.mark.parametrize("gap", [4.0, 0.6])
+@pytest.mark.parametrize("gap", [4.0, 0.6, 0.4, 0.2, 0.05])
 def test_images_never_lie_in_another_part_of_the_body(gap: float) -> None:
     """On the inner side of a ring the line of images points across the hole, at the other side."""
     ring = torus(10.0 + 0.5 * gap, 10.0)
@@ -135,3 +136,57 @@ def test_spheres_of_all_sizes_share_one_shape() -> None:
         plain = charges_of(np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
         np.testing.assert_allclose(charges.positions / scale, plain.positions, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(charges.strengths, plain.strengths, rtol=1e-9)
+
+
+def two_boxes(gap: float) -> Surface:
+    """Cubes of edge 10, one above the other, the lower one's upper face at z = 0."""
+    cube = box((10.0, 10.0, 10.0))
+    apart = np.array([0.0, 0.0, 5.0])
+    points = np.vstack([cube.points - apart, cube.points + apart + [0.0, 0.0, gap]])
+    return surface_from_arrays(points, np.vstack([cube.faces, cube.faces + len(cube.points)]))
+
+
+def test_a_body_close_by_changes_nothing() -> None:
+    """The images of a source would lie in it."""
+    light = [PointSource((0.0, 0.0, -1.0))]
+    alone = solve(slab(10.0, 10.0), TISSUE, light)
+    beside = solve(two_boxes(0.2), TISSUE, light)
+    assert beside.power.exited == pytest.approx(alone.power.exited, rel=0.005)
+    assert beside.error_estimate <= 0.02
+
+
+@pytest.mark.parametrize(("subtract", "depth"), [("half-space", 0.0), ("free-space", 1e-9)])
+def test_a_source_on_the_surface_loses_no_power(subtract: str, depth: float) -> None:
+    """No integral over facets sees it there, so it is not subtracted."""
+    mesh = block((16, 16, 8), (8.0, 8.0, 4.0))
+    light = [PointSource((0.3, 0.2, -depth))]
+    near = solve(mesh, TISSUE, light, subtract=subtract)  # type: ignore[arg-type]
+    assert not near.patches[0].cells.any()
+    # The sum of all loads is the power that goes in, and what exits is that of a source a little deeper.
+    deeper = solve(mesh, TISSUE, [PointSource((0.3, 0.2, -0.01))])
+    assert near.power.exited == pytest.approx(deeper.power.exited, rel=0.02)
+
+
+def test_a_patch_too_coarse_for_its_source_is_dropped() -> None:
+    """A mesh whose tetrahedra are larger than all that happens: plain P1 is the better answer there."""
+    ring = torus(7.0, 6.0)
+    mesh = tetrahedralize(ring)
+    light = [PointSource((1.02, 0.0, 0.0))]
+    solution = solve(ring, TISSUE, light, mesh=mesh)
+    plain = solve(ring, TISSUE, light, mesh=mesh, subtract="nothing")
+    assert solution.power.exited == pytest.approx(plain.power.exited, rel=0.05)
+    assert min(solution.power.absorbed, solution.power.exited) > 0
+
+
+def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
+    """A wide beam goes without images, or without anything; a source beside it keeps what it has."""
+    point = PointSource((0.0, 0.0, -9.0))
+    for radius, most in ((2.5, 1), (20.0, 0)):
+        wide = PencilBeam((0.0, 0.0, 30.0), (0.0, 0.0, -1.0), radius=min(radius, 9.0))
+        sources = sources_of([point, wide], ball, TISSUE, "half-space")
+        assert len(sources.charges[0].positions) > 1
+        assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
+        assert sum(float(d.powers.sum()) for d in sources.on_mesh) + sum(
+            float(c.strengths[: c.sources].sum()) for c in sources.charges
+        ) == pytest.approx(sum(float(d.powers.sum()) for d in sources.deposits))
+        assert len(sources.charges) >= 1 + most

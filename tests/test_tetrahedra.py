@@ -307,3 +307,13 @@ def test_crumbs_of_the_envelope_are_swept(monkeypatch: pytest.MonkeyPatch) -> No
     cells = np.vstack([cube.tetrahedra, len(cube.points) + np.arange(4)])
     monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (points, cells))
     assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
+
+
+def test_a_body_that_the_mesher_lost_is_missed() -> None:
+    """A crumb beside a ball: it makes no difference to volume and area."""
+    ball, crumb = sphere(50.0, subdivisions=3), sphere(0.5, center=(0.0, 0.0, 60.0), subdivisions=3)
+    both = surface_from_arrays(
+        np.vstack([ball.points, crumb.points]), np.vstack([ball.faces, crumb.faces + len(ball.points)])
+    )
+    with pytest.raises(RunError, match="lacks one of the surface's 2 bodies"):
+        mesher._check_against(tetrahedralize(ball), both, 1.0)
