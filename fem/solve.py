@@ -168,9 +168,12 @@ def solve_each(
             deposits = [deposit for sources in scene_sources for deposit in sources.deposits]
             mesh = graded_towards(mesh, surface, *lit_points(deposits, medium), most_tetrahedra)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
-    steps = steps_on(mesh, None)
+    steps = best = steps_on(mesh, None)
+    least = np.inf
     while True:
         worst = max(step.estimate.error for step in steps)
+        if worst < least:
+            best, least = steps, worst
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
         marked = _to_split(steps, tolerance)
         if given or not marked.any():
@@ -178,6 +181,8 @@ def solve_each(
         with watch.stage("mesh"):
             finer = refine(mesh, marked, surface)
         if len(finer.tetrahedra) > most_tetrahedra:
+            # Where refinement does not help any more, an earlier mesh may have been the better one.
+            steps = best
             break
         mesh = finer
         steps = steps_on(mesh, steps)

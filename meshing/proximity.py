@@ -135,17 +135,20 @@ def winding_number(points: FloatArray, faces: IntArray, queries: FloatArray) -> 
     -------
     (q,) ndarray
     """
-    corners = points[faces]
+    # Coordinate by coordinate: NumPy is slow along axes of three.
+    corners = [np.ascontiguousarray(points[faces[:, i]].T) for i in range(3)]
     result = np.empty(len(queries))
     for i, query in enumerate(queries):
-        a, b, c = np.moveaxis(corners - query, 1, 0)
-        la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
-        numerator = np.einsum("ij,ij->i", a, np.cross(b, c))
+        (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (corner - query[:, None] for corner in corners)
+        la = np.sqrt(ax * ax + ay * ay + az * az)
+        lb = np.sqrt(bx * bx + by * by + bz * bz)
+        lc = np.sqrt(cx * cx + cy * cy + cz * cz)
+        numerator = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
         denominator = (
             la * lb * lc
-            + np.einsum("ij,ij->i", a, b) * lc
-            + np.einsum("ij,ij->i", b, c) * la
-            + np.einsum("ij,ij->i", c, a) * lb
+            + (ax * bx + ay * by + az * bz) * lc
+            + (bx * cx + by * cy + bz * cz) * la
+            + (cx * ax + cy * ay + cz * az) * lb
         )
         result[i] = np.arctan2(numerator, denominator).sum() / (2.0 * np.pi)
     return result

@@ -129,7 +129,10 @@ class Surface:
 
     def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Whether each of the queries (q, 3) lies inside."""
-        return np.asarray(winding_number(self.points, self.faces, queries) > 0.5)
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        inside = np.asarray(((queries >= low) & (queries <= high)).all(axis=1))
+        inside[inside] = winding_number(self.points, self.faces, queries[inside]) > 0.5
+        return inside
 
     def crossings(self, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
         """Where a ray meets the surface.
