@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.subdivide import quartered
+from tetlux.meshing.surface import Surface, longest_sides
 
 # Exitance falls like 1/r³ from where light enters: the pieces that are sampled are no longer than this times their
 # distance from the light, and no longer than this share of the body's diagonal.
@@ -40,28 +41,17 @@ def surface_samples(
     corners, normals = surface.points[surface.faces], surface.normals
     done: list[tuple[FloatArray, FloatArray]] = []
     while len(corners):
-        edges = corners - corners[:, [1, 2, 0]]
-        longest = np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1))
         limit = np.full(len(corners), LONGEST_PIECE * surface.diagonal)
         if tree is not None:
             distance, nearest = tree.query(corners.mean(axis=1))
             limit = np.minimum(limit, PIECE * np.maximum(distance, 0.5 * resolutions[nearest]))
-        small = longest <= limit
+        small = longest_sides(corners) <= limit
         done.append((corners[small], normals[small]))
-        corners, normals = _quartered(corners[~small]), np.repeat(normals[~small], 4, axis=0)
+        corners, normals = quartered(corners[~small]), np.repeat(normals[~small], 4, axis=0)
     pieces, of_pieces = (np.concatenate(parts) for parts in zip(*done, strict=True))
     across = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
     areas = 0.5 * np.linalg.norm(across, axis=1)
     return (_RULE @ pieces).reshape(-1, 3), np.repeat(of_pieces, 3, axis=0), np.repeat(areas / 3.0, 3)
-
-
-def _quartered(corners: FloatArray) -> FloatArray:
-    """Four triangles (4 f, 3, 3) out of each of (f, 3, 3)."""
-    middles = 0.5 * (corners + corners[:, [1, 2, 0]])
-    a, b, c = (corners[:, i] for i in range(3))
-    ab, bc, ca = (middles[:, i] for i in range(3))
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
 
 
 def relative_error(values: FloatArray, truth: FloatArray, weights: FloatArray) -> float:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.tetmesh import EDGES, TetMesh
 
@@ -89,7 +89,7 @@ class Assembly:
         mesh, nodes = self.mesh, len(self.mesh.points)
         low, high = mesh.edges.T
         edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
-        diagonal = -_sums(low, edges, nodes) - _sums(high, edges, nodes)
+        diagonal = -summed(low, edges, nodes) - summed(high, edges, nodes)
         absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
         diagonal += absorbed
         diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
@@ -97,8 +97,8 @@ class Assembly:
             # Their rows sum to what those of the lumped ones hold on the diagonal.
             within = np.tile(sigma_a * mesh.volumes / 20.0, 6)
             across = np.repeat(escape * mesh.boundary_areas / 12.0, 3)
-            coupling = _sums(self._slots, within, len(edges)) + _sums(mesh.boundary_edges, across, len(edges))
-            diagonal -= _sums(low, coupling, nodes) + _sums(high, coupling, nodes)
+            coupling = summed(self._slots, within, len(edges)) + summed(mesh.boundary_edges, across, len(edges))
+            diagonal -= summed(low, coupling, nodes) + summed(high, coupling, nodes)
             edges = edges + coupling
         indptr, indices, source = self._pattern
         return csr_array((np.concatenate([edges, diagonal])[source], indices, indptr), shape=(nodes, nodes))
@@ -126,7 +126,7 @@ class Assembly:
                 values[edge, block] = scale * dot(normals[i], normals[j])
 
         over_corners(fill, mesh.points, mesh.tetrahedra)
-        return _sums(self._slots, values, len(mesh.edges))
+        return summed(self._slots, values, len(mesh.edges))
 
     @cached_property
     def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:
@@ -147,8 +147,3 @@ class Assembly:
         indices[place], source[place] = transposed.indices, transposed.data
         indices[middle], source[middle] = np.arange(nodes), len(low) + np.arange(nodes)
         return starts.astype(np.int32), indices, source
-
-
-def _sums(places: IntArray | IndexArray, values: FloatArray, count: int) -> FloatArray:
-    """Sums (count,) of the values that belong to each place."""
-    return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)

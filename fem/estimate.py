@@ -23,9 +23,8 @@ import numpy as np
 from tetlux.fem.linear import Solver
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Solution
-from tetlux.fem.subtraction import hat_gradients
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface import Surface, triangle_areas
+from tetlux.meshing.surface import Surface, longest_sides
 from tetlux.meshing.tetmesh import TetMesh
 
 # Facets of a round body err to one side, and partly against the gradients: with half of their sum the estimate is 0.6
@@ -59,11 +58,6 @@ class Estimate:
         """Relative L2 error of the exitance over the surface."""
         return float(self.shares.sum())
 
-    @property
-    def power_error(self) -> float:
-        """Relative error of the power that leaves."""
-        return float(self.power_shares.sum())
-
 
 def estimated(solution: Solution, solver: Solver) -> Estimate:
     """Estimate the error of a solution.
@@ -91,12 +85,11 @@ def estimated(solution: Solution, solver: Solver) -> Estimate:
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     duals = solver.solve(loads)
 
-    hats = hat_gradients(mesh.points[mesh.tetrahedra])
-    rough = _roughness(mesh, hats, fluence)
+    rough = _roughness(mesh, fluence)
     smooth = fluence[mesh.tetrahedra]
     for patch in patches:
         inside = patch.cells[:, None]
-        rough -= inside[..., None] * _roughness(mesh, hats, patch.at_nodes)
+        rough -= inside[..., None] * _roughness(mesh, patch.at_nodes)
         smooth = smooth - inside * patch.at_nodes[mesh.tetrahedra]
     slope_gap = _size(rough)
     corners = (mesh.tetrahedra[mesh.boundary_cells][:, None, :] == mesh.boundary_faces[:, :, None]).argmax(axis=2)
@@ -104,11 +97,11 @@ def estimated(solution: Solution, solver: Solver) -> Estimate:
     leaving[mesh.boundary_nodes] = exitance - solution.transmitted_irradiance
 
     def shares_by(dual: FloatArray) -> FloatArray:
-        shares = medium.diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, hats, dual))
+        shares = medium.diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, dual))
         shares += medium.sigma_a * mesh.volumes * _lumping(smooth, dual[mesh.tetrahedra])
         of_faces = _lumping(np.take_along_axis(smooth[mesh.boundary_cells], corners, axis=1), dual[mesh.boundary_faces])
         shares += np.bincount(mesh.boundary_cells, robin * mesh.boundary_areas * of_faces, minlength=len(shares))
-        return shares + FACETS * _of_facets(mesh, medium, surface, hats, (fluence, leaving, dual), float(shares.sum()))
+        return shares + FACETS * _of_facets(mesh, medium, surface, (fluence, leaving, dual), float(shares.sum()))
 
     return Estimate(*(shares_by(dual) for dual in duals.T))
 
@@ -118,15 +111,10 @@ def _size(rough: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("mij,mij->m", rough, rough) / 4.0))
 
 
-def _roughness(mesh: TetMesh, hats: FloatArray, values: FloatArray) -> FloatArray:
+def _roughness(mesh: TetMesh, values: FloatArray) -> FloatArray:
     """What averaging over the nodes takes off a gradient, at the corners of each tetrahedron, (m, 4, 3)."""
-    slope = np.einsum("mij,mi->mj", hats, values[mesh.tetrahedra])
-    nodes, count = mesh.tetrahedra.ravel(), len(mesh.points)
-    weight = np.bincount(nodes, np.repeat(mesh.volumes, 4), minlength=count)
-    mean = np.stack(
-        [np.bincount(nodes, np.repeat(mesh.volumes * slope[:, i], 4), minlength=count) / weight for i in range(3)],
-        axis=1,
-    )
+    slope = np.einsum("mij,mi->mj", mesh.hat_gradients, values[mesh.tetrahedra])
+    mean = np.column_stack([mesh.to_nodes(mesh.volumes * part) for part in slope.T]) / mesh.node_volumes[:, None]
     return np.asarray(mean[mesh.tetrahedra] - slope[:, None])
 
 
@@ -142,22 +130,21 @@ def _of_facets(
     mesh: TetMesh,
     medium: Medium,
     surface: Surface,
-    hats: FloatArray,
     values: tuple[FloatArray, FloatArray, FloatArray],
     rest: float,
 ) -> FloatArray:
     """What flat facets add, (m,), by the fluence, the net flux that leaves, and the dual at the nodes."""
     fluence, leaving, dual = values
     faces, cells = mesh.boundary_faces, mesh.boundary_cells
-    slopes = [np.einsum("mij,mi->mj", hats[cells], values[mesh.tetrahedra[cells]]) for values in (fluence, dual)]
-    normals, areas = triangle_areas(mesh.points, faces)
+    hats, nodes = mesh.hat_gradients[cells], mesh.tetrahedra[cells]
+    slopes = [np.einsum("mij,mi->mj", hats, at_nodes[nodes]) for at_nodes in (fluence, dual)]
+    normals, areas = mesh.surface.normals, mesh.boundary_areas
     tangential = [s - np.einsum("ij,ij->i", s, normals)[:, None] * normals for s in slopes]
     product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
     outflow = np.abs(leaving[faces].mean(axis=1) * dual[faces].mean(axis=1))
     along = medium.diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + medium.sigma_a * product
     corners = mesh.points[faces]
-    edges = corners - corners[:, [1, 2, 0]]
-    length = np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1))
+    length = longest_sides(corners)
     most = FARTHEST * length * areas * (along + outflow / medium.extrapolation_length)
     order = np.argsort(most)
     measured = order[np.cumsum(most[order]) > NOT_MEASURED * rest]

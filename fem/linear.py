@@ -251,13 +251,6 @@ class Solver:
         return np.asarray(result * size)
 
 
-class MultigridSolver(Solver):
-    """A `Solver` by multigrid alone."""
-
-    def __init__(self, matrix: csr_array) -> None:
-        super().__init__(matrix, [multigrid])
-
-
 def solver_for(matrix: csr_array, loads: int = 1) -> Solver:
     """The solver that is quickest for a matrix.
 

@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, summed
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -44,11 +44,11 @@ def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
 def _point_load(mesh: TetMesh, tree: CellTree, points: FloatArray, powers: FloatArray) -> FloatArray:
     cells, weights = tree.locate(points)
     inside = cells >= 0
-    load = _summed(mesh, mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside])
+    load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
         # Between the surface and the mesh's facets, a hair outside the mesh.
         _, faces, corner = mesh.closest_boundary(points[~inside])
-        load += _summed(mesh, mesh.boundary_faces[faces], powers[~inside, None] * corner)
+        load += summed(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
     return load
 
 
@@ -72,15 +72,11 @@ def _line_load(
         q0 = mean[:, None] * part.weights + (carried * step**2 * _phi2(x))[:, None] * part.slopes
         q1 = cosine / medium.sigma_t_prime * mean[:, None] * part.slopes
         inside = part.cells >= 0
-        load += _summed(mesh, mesh.tetrahedra[part.cells[inside]], (q0 + q1)[inside])
+        load += summed(mesh.tetrahedra[part.cells[inside]], (q0 + q1)[inside], len(load))
         outside, middle = part.paths[~inside], 0.5 * (part.enter + part.leave)[~inside]
         points.append(deposit.starts[outside] + middle[:, None] * deposit.directions[outside])
         powers.append(mean[~inside])
     return load, np.concatenate(points), np.concatenate(powers)
-
-
-def _summed(mesh: TetMesh, nodes: IntArray, shares: FloatArray) -> FloatArray:
-    return np.asarray(np.bincount(nodes.ravel(), shares.ravel(), minlength=len(mesh.points)), dtype=np.float64)
 
 
 def _phi1(x: FloatArray) -> FloatArray:

@@ -57,8 +57,8 @@ def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtra
         # As many as can be afforded: with images, or at least without.
         for images in (True, False) if subtract == "half-space" else (False,):
             if 0 < len(deposit.points) <= left:
-                some = charges_of(deposit.points, deposit.powers, surface, medium, images=images)
-                if len(some.positions) <= left:
+                some = charges_of(deposit.points, deposit.powers, surface, medium, images=images, most=left)
+                if some is not None:
                     left -= len(some.positions)
                     charges.append(some)
                     deposit = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])  # noqa: PLW2901

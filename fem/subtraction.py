@@ -13,7 +13,8 @@ values at the nodes, and is plain P1 where there is no patch. In the weak form t
 and ``a(G, v)`` is, by Gauss, the source's own load and integrals over the patch's faces alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -24,9 +25,10 @@ from tetlux.fem.assembly import Mass
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.subdivide import quartered
+from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
 # The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,
@@ -115,7 +117,15 @@ class Charges:
         return fluence
 
 
-def charges_of(points: FloatArray, powers: FloatArray, surface: Surface, medium: Medium, *, images: bool) -> Charges:
+def charges_of(
+    points: FloatArray,
+    powers: FloatArray,
+    surface: Surface,
+    medium: Medium,
+    *,
+    images: bool,
+    most: int = MOST_CHARGES,
+) -> Charges | None:
     """Point sources and their images, each in the plane that touches the surface nearest to it.
 
     Parameters
@@ -128,15 +138,20 @@ def charges_of(points: FloatArray, powers: FloatArray, surface: Surface, medium:
     medium : Medium
     images : bool
         Without them it is the sources in free space.
+    most : int
+        How many charges can be afforded.
 
     Returns
     -------
-    Charges
+    Charges or None
+        None if they would be more.
     """
-    positions, strengths = [points], [powers]
+    positions, strengths, count = [points], [powers], len(points)
     feet, normals = surface.project(points)
     depths = np.linalg.norm(feet - points, axis=1)
     for foot, normal, depth, power in zip(feet, normals, depths.tolist(), powers.tolist(), strict=True):
+        if count > most:
+            return None
         if images and depth > 0:
             heights, weights = _image_line(depth, medium.extrapolation_length)
             line = foot + heights[:, None] * normal
@@ -146,6 +161,9 @@ def charges_of(points: FloatArray, powers: FloatArray, surface: Surface, medium:
             clear = np.logical_and.accumulate(clear)
             positions.append(line[clear])
             strengths.append(power * weights[clear])
+            count += int(clear.sum())
+    if count > most:
+        return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
     return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium)
 
@@ -168,6 +186,7 @@ class Patch:
 
     Parameters
     ----------
+    mesh : TetMesh
     charges : Charges
     cells : (m,) ndarray of bool
         The tetrahedra of the patch.
@@ -175,9 +194,19 @@ class Patch:
         The charges' fluence at the nodes.
     """
 
+    mesh: TetMesh
     charges: Charges
     cells: BoolArray
     at_nodes: FloatArray
+
+    @cached_property
+    def faces(self) -> tuple[IntArray, BoolArray]:
+        """Its outer faces (f, 3), oriented outward, and which of them are of the body's boundary (f,)."""
+        mesh = self.mesh
+        if self.cells.all():
+            return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
+        faces = TetMesh(mesh.points, mesh.tetrahedra[self.cells], mesh.unit).boundary_faces
+        return faces, np.isin(_keys(faces, len(mesh.points)), _keys(mesh.boundary_faces, len(mesh.points)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,37 +234,31 @@ def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
 def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
     """The patch of the tetrahedra whose nodes are all good; an empty one if that would not be sound."""
     cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
-    if not _is_sound(mesh, charges, cells):
-        cells = np.zeros(len(cells), dtype=bool)
-    return Patch(charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
+    patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
+    return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
 
 
-def _is_sound(mesh: TetMesh, charges: Charges, cells: BoolArray) -> bool:
+def _is_sound(patch: Patch) -> bool:
     """Whether the integrals over a patch's faces are those that Gauss's theorem speaks of.
 
     The ledger cannot tell, since it is made of the same integrals.
     """
+    mesh, charges, cells = patch.mesh, patch.charges, patch.cells
     homes, _ = mesh.locate(charges.positions)
     sources, images = homes[: charges.sources], homes[charges.sources :]
     if (sources < 0).any() or not cells[sources].all() or cells[images[images >= 0]].any():
         return False
     places = charges.positions[: charges.sources]
     foot, face, _ = mesh.closest_boundary(places)
-    size = _longest_edge(mesh.points[mesh.boundary_faces[face]])
+    size = longest_sides(mesh.points[mesh.boundary_faces[face]])
     if (np.linalg.norm(foot - places, axis=1) < RESOLVED * size).any():
         return False
     if cells.all():
         return True
-    faces, on_boundary = _faces(mesh, cells)
+    faces, on_boundary = patch.faces
     inner = mesh.points[faces[~on_boundary]]
     apart, _ = cKDTree(charges.positions).query(inner.mean(axis=1))
-    return bool((_longest_edge(inner) <= COARSEST_INNER * apart).all())
-
-
-def _longest_edge(corners: FloatArray) -> FloatArray:
-    """Longest edges (f,) of triangles (f, 3, 3)."""
-    edges = corners - corners[:, [1, 2, 0]]
-    return np.asarray(np.sqrt(np.einsum("fij,fij->fi", edges, edges).max(axis=1, initial=0.0)))
+    return bool((longest_sides(inner) <= COARSEST_INNER * apart).all())
 
 
 def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
@@ -246,12 +269,11 @@ def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
     return np.concatenate([good, good[cKDTree(points).query(added)[1]]])
 
 
-def patch_terms(mesh: TetMesh, medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
+def patch_terms(medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
     """Assemble what a patch adds.
 
     Parameters
     ----------
-    mesh : TetMesh
     medium : Medium
     patch : Patch
     mass : {"lumped", "consistent"}
@@ -261,32 +283,27 @@ def patch_terms(mesh: TetMesh, medium: Medium, patch: Patch, mass: Mass) -> Patc
     -------
     PatchTerms
     """
-    count = len(mesh.points)
-    charges = patch.charges
+    mesh, charges = patch.mesh, patch.charges
     sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
     if not patch.cells.any():
         return PatchTerms(load_vector(mesh, medium, sources), exited=0.0, absorbed=0.0)
-    faces, on_boundary = _faces(mesh, patch.cells)
-    corners = mesh.points[faces]
-    out_of_faces, through = _integrals(corners, charges)
+    count = len(mesh.points)
+    faces, on_boundary = patch.faces
+    out_of_faces, through = _integrals(mesh.points[faces], charges)
     robin = 1.0 / (2.0 * medium.boundary_factor)
-
-    def gathered(nodes: IntArray, values: FloatArray) -> FloatArray:
-        return np.asarray(np.bincount(nodes.ravel(), values.ravel(), minlength=count))
-
     leaving = robin * out_of_faces * on_boundary[:, None]
-    load = -gathered(faces, through + leaving)
+    load = -summed(faces, through + leaving, count)
     # The interpolant's own part: stiffness, absorption and boundary of the patch, times G at the nodes.
     cells = mesh.tetrahedra[patch.cells]
     values = patch.at_nodes[cells]
-    hats = hat_gradients(mesh.points[cells])
+    hats = mesh.hat_gradients[patch.cells]
     volumes = mesh.volumes[patch.cells]
     slope = np.einsum("mij,mi->mj", hats, values)
     stiff = (medium.diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
     absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    _, areas = triangle_areas(mesh.points, faces)
     exited = robin * (areas * on_boundary)[:, None] * _mass(patch.at_nodes[faces], mass)
-    load += gathered(cells, stiff + absorbed) + gathered(faces, exited)
+    load += summed(cells, stiff + absorbed, count) + summed(faces, exited, count)
     return PatchTerms(
         load,
         exited=float(leaving.sum() - exited.sum()),
@@ -303,22 +320,6 @@ def _mass(values: FloatArray, mass: Mass) -> FloatArray:
     return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
 
 
-def hat_gradients(corners: FloatArray) -> FloatArray:
-    """Gradients of the four hat functions of tetrahedra with corners (m, 4, 3), (m, 4, 3)."""
-    u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
-    a, b, c = np.cross(v, w), np.cross(w, u), np.cross(u, v)
-    six = np.einsum("ij,ij->i", u, a)[:, None]
-    return np.stack([-(a + b + c) / six, a / six, b / six, c / six], axis=1)
-
-
-def _faces(mesh: TetMesh, cells: BoolArray) -> tuple[IntArray, BoolArray]:
-    """The outer faces of a patch, oriented outward, and which of them are of the body's boundary."""
-    if cells.all():
-        return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
-    faces = TetMesh(mesh.points, mesh.tetrahedra[cells], mesh.unit).boundary_faces
-    return faces, np.isin(_keys(faces, len(mesh.points)), _keys(mesh.boundary_faces, len(mesh.points)))
-
-
 def _keys(faces: IntArray, count: int) -> IntArray:
     """One integer for each triangle, whatever the order of its corners; good for two million nodes."""
     low, middle, high = np.sort(faces.astype(np.int64), axis=1).T
@@ -333,7 +334,7 @@ def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, Float
     owner, place = np.arange(len(corners)), np.broadcast_to(np.eye(3), (len(corners), 3, 3))
     for cut in range(_CUTS + 1):
         part = place @ corners[owner]
-        size = _longest_edge(part)
+        size = longest_sides(part)
         near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
         done = np.zeros(len(part), dtype=bool)
         for limit, nodes, weights in _RULES:
@@ -343,7 +344,7 @@ def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, Float
             _add_rule(value, flux, owner[now], place[now], part[now], nodes, weights, charges)
         if done.all():
             break
-        owner, place = np.repeat(owner[~done], 4), _quartered(place[~done])
+        owner, place = np.repeat(owner[~done], 4), quartered(place[~done])
     return value, flux
 
 
@@ -367,11 +368,3 @@ def _add_rule(
     tests = hats @ place
     np.add.at(value, owner, np.einsum("fq,fqi->fi", fluence.reshape(len(part), -1) * area[:, None] * weights, tests))
     np.add.at(flux, owner, np.einsum("fq,fqi->fi", through * weights, tests))
-
-
-def _quartered(place: FloatArray) -> FloatArray:
-    """Four triangles (4 f, 3, 3) out of each of (f, 3, 3)."""
-    a, b, c = place[:, 0], place[:, 1], place[:, 2]
-    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

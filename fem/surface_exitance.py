@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface import Surface, longest_sides
 
 # An edge is split if the exitance in its middle is off the mean of its ends by more than a share of the largest
 # exitance, or by a share of itself where it is not too dark to see; and while it is so much longer than the mesh's own
@@ -41,11 +41,11 @@ def surface_exitance(solution: Solution) -> tuple[Surface, FloatArray]:
     mesh = solution.mesh
     facets = mesh.points[mesh.boundary_faces]
     tree = cKDTree(facets.mean(axis=1))
-    size = np.sqrt(np.square(facets - facets[:, [1, 2, 0]]).sum(axis=2).max(axis=1))
+    size = longest_sides(facets)
     # Edges that were looked at and found short enough stay so.
     known = np.zeros((0, 2), dtype=np.int64)
     while len(flat) < len(given.points) + MOST_ADDED:
-        ends, edge = edges_of(faces)
+        edges = ends, edge = edges_of(faces)
         owner = np.empty(len(ends), dtype=np.int64)
         owner[edge.ravel()] = np.repeat(parents, 3)
         key, done = (e[:, 0] * np.int64(len(flat)) + e[:, 1] for e in (ends, known))
@@ -62,8 +62,8 @@ def surface_exitance(solution: Solution) -> tuple[Surface, FloatArray]:
         if not marked.any():
             break
         known = np.vstack([known, ends[new[~marked[new]]]])
-        marked = with_longest(flat, faces, marked)
-        flat, faces, origin = split_edges(flat, faces, marked)
+        marked = with_longest(flat, edges, marked)
+        flat, faces, origin = split_edges(flat, faces, edges, marked)
         added, _ = given.on_curve(owner[marked], flat[len(points) :])
         parents = parents[origin]
         points, exitance = np.vstack([points, added]), np.concatenate([exitance, solution.exitance_on(added)])

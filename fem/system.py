@@ -114,7 +114,7 @@ class System:
                     patch_of(mesh, charges, inherited(good, coarse, mesh))
                     for charges, good in zip(sources.charges, before.good, strict=True)
                 ]
-            terms = [patch_terms(mesh, medium, patch, self.mass) for patch in patches]
+            terms = [patch_terms(medium, patch, self.mass) for patch in patches]
             solver = self.solver
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
@@ -125,7 +125,7 @@ class System:
             with watch.stage("assemble"):
                 for i in worse:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(mesh, medium, patches[i], self.mass)
+                    terms[i] = patch_terms(medium, patches[i], self.mass)
             with watch.stage("solve"):
                 parts[:, worse] = solver.solve(np.column_stack([terms[i].load for i in worse]))
         return self._solution(sources, parts.sum(axis=1), patches, terms), tuple(good)

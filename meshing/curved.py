@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # Corner i of a triangle is followed by corner i + 1.
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -62,9 +62,7 @@ class CurvedPatches:
         """Of some faces: corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
         corners = self._points[self._faces[faces]]
         normals = self._corner_normals[faces]
-        smooth = np.zeros(3 * len(self._faces), dtype=bool)
-        smooth[np.concatenate(self._joined)] = True
-        smooth = smooth.reshape(-1, 3)[faces]
+        smooth = self._smooth_sides[faces]
         along = np.empty((len(faces), 3, 2, 3))
         for side, (other, edge) in enumerate(((_NEXT, np.arange(3)), (_LAST, _LAST))):
             reach = corners[:, other] - corners
@@ -94,6 +92,13 @@ class CurvedPatches:
         length = np.linalg.norm(total, axis=1, keepdims=True)
         flat = np.repeat(self._normals, 3, axis=0)
         return np.where(length > 0, total / np.where(length > 0, length, 1.0), flat).reshape(-1, 3, 3)
+
+    @cached_property
+    def _smooth_sides(self) -> BoolArray:
+        """Whether the side from each corner to the next bends less than the crease angle, (m, 3)."""
+        smooth = np.zeros(3 * len(self._faces), dtype=bool)
+        smooth[np.concatenate(self._joined)] = True
+        return smooth.reshape(-1, 3)
 
     @cached_property
     def _joined(self) -> tuple[IntArray, IntArray]:

@@ -15,14 +15,14 @@ def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:
     return np.column_stack([key // count, key % count]), number.reshape(-1, 3)
 
 
-def with_longest(points: FloatArray, faces: IntArray, marked: BoolArray) -> BoolArray:
-    """Add to marked edges (e,) of `edges_of` the longest one of every triangle that has one, and so on.
+def with_longest(points: FloatArray, edges: tuple[IntArray, IntArray], marked: BoolArray) -> BoolArray:
+    """Add to marked ones (e,) of the edges from `edges_of` the longest of every triangle that has one, and so on.
 
     Splitting these keeps triangles from becoming ever thinner (Rivara 1984).
     """
-    ends, edge = edges_of(faces)
+    ends, edge = edges
     lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
-    longest = edge[np.arange(len(faces)), lengths[edge].argmax(axis=1)]
+    longest = edge[np.arange(len(edge)), lengths[edge].argmax(axis=1)]
     marked = marked.copy()
     while True:
         missing = marked[edge].any(axis=1) & ~marked[longest]
@@ -31,15 +31,19 @@ def with_longest(points: FloatArray, faces: IntArray, marked: BoolArray) -> Bool
         marked[longest[missing]] = True
 
 
-def split_edges(points: FloatArray, faces: IntArray, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+def split_edges(
+    points: FloatArray, faces: IntArray, edges: tuple[IntArray, IntArray], marked: BoolArray
+) -> tuple[FloatArray, IntArray, IntArray]:
     """Split edges of triangles in the middle, and triangles with them.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     faces : (f, 3) ndarray
+    edges : tuple of ndarray
+        Theirs, from `edges_of`.
     marked : (e,) ndarray of bool
-        The edges of `edges_of` to split, as `with_longest` returns them.
+        Which of them to split, as `with_longest` returns it.
 
     Returns
     -------
@@ -49,7 +53,7 @@ def split_edges(points: FloatArray, faces: IntArray, marked: BoolArray) -> tuple
     parents : (g,) ndarray
         The triangle that each is part of.
     """
-    ends, edge = edges_of(faces)
+    ends, edge = edges
     middle = np.full(len(ends), -1)
     middle[marked] = len(points) + np.arange(int(marked.sum()))
     lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
@@ -71,3 +75,11 @@ def split_edges(points: FloatArray, faces: IntArray, marked: BoolArray) -> tuple
         parts.append(np.column_stack(triangle)[rows])
         parents.append(np.flatnonzero(rows))
     return np.vstack([points, points[ends[marked]].mean(axis=1)]), np.vstack(parts), np.concatenate(parents)
+
+
+def quartered(corners: FloatArray) -> FloatArray:
+    """Four triangles (4 f, 3, 3) out of each of (f, 3, 3)."""
+    a, b, c = (corners[:, i] for i in range(3))
+    ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

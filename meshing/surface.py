@@ -22,6 +22,12 @@ def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
     return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
 
 
+def longest_sides(corners: FloatArray) -> FloatArray:
+    """Longest sides (f,) of triangles (f, 3, 3)."""
+    sides = corners - corners[:, [1, 2, 0]]
+    return np.asarray(np.sqrt(np.einsum("fij,fij->fi", sides, sides).max(axis=1, initial=0.0)))
+
+
 @dataclass(frozen=True, eq=False)
 class Surface:
     """A closed, outward oriented triangle mesh.

@@ -11,7 +11,7 @@ from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint
-from tetlux.meshing.surface import Surface, triangle_areas
+from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 _FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -183,6 +183,15 @@ class TetMesh:
         return sums
 
     @cached_property
+    def hat_gradients(self) -> FloatArray:
+        """Gradients of the barycentric coordinates in each tetrahedron, (m, 4, 3), 1/unit."""
+        corners = self.points[self.tetrahedra]
+        u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
+        inward = np.stack([np.cross(v, w), np.cross(w, u), np.cross(u, v)], axis=1)
+        three = inward / (6.0 * self.volumes)[:, None, None]
+        return np.concatenate([-three.sum(axis=1, keepdims=True), three], axis=1)
+
+    @cached_property
     def area(self) -> float:
         """Area of the boundary, unit²."""
         return float(self.boundary_areas.sum())
@@ -228,12 +237,7 @@ class TetMesh:
     def closest_boundary(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
         """Nearest boundary points of queries (q, 3): points (q, 3), faces (q,), barycentric weights (q, 3)."""
         nearest, face = self._closest(queries)
-        a, b, c = (self.points[self.boundary_faces[face, i]] for i in range(3))
-        normal = np.cross(b - a, c - a)
-        scale = np.einsum("ij,ij->i", normal, normal)
-        wb = np.einsum("ij,ij->i", np.cross(nearest - a, c - a), normal) / scale
-        wc = np.einsum("ij,ij->i", np.cross(b - a, nearest - a), normal) / scale
-        return nearest, face, np.column_stack([1.0 - wb - wc, wb, wc])
+        return nearest, face, barycentric_of(nearest, self.points[self.boundary_faces[face]])
 
     @cached_property
     def tree(self) -> CellTree:

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, linear
 from tetlux.fem.assembly import system_matrix
-from tetlux.fem.linear import Method, MultigridSolver, Product, Solver, direct, jacobi, multigrid, solver_for
+from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
 from tetlux.meshing import RunError, TetMesh, refine
 
 METHODS = [jacobi, multigrid, direct]
@@ -67,7 +67,7 @@ def test_many_loads_are_solved_as_one_by_one(wide: TetMesh) -> None:
     loads = loads_on(wide, 11)
     loads[:, 4] = 0.0
     loads[:, 5] *= 1e6
-    solver = MultigridSolver(system_matrix(wide, TISSUE))
+    solver = Solver(system_matrix(wide, TISSUE), [multigrid])
     together = solver.solve(loads)
     assert together.shape == loads.shape
     assert (together[:, 4] == 0.0).all()
@@ -148,7 +148,7 @@ def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetM
 def test_nodes_without_neighbours_are_no_obstacle() -> None:
     """Where absorption outweighs everything there is nothing to aggregate."""
     matrix = csr_array(diags_array(np.linspace(1.0, 2.0, 1000)))
-    assert MultigridSolver(matrix).solve(np.ones(1000)) == pytest.approx(1.0 / np.linspace(1.0, 2.0, 1000))
+    assert Solver(matrix, [multigrid]).solve(np.ones(1000)) == pytest.approx(1.0 / np.linspace(1.0, 2.0, 1000))
 
 
 @pytest.mark.parametrize(

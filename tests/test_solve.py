@@ -10,7 +10,7 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, linear, solve
 from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.linear import MultigridSolver
+from tetlux.fem.linear import Solver, multigrid
 from tetlux.meshing import InputError, RunError, Surface, TetMesh, slab, sphere
 
 
@@ -95,7 +95,7 @@ def test_exitance_converges_at_second_order_on_a_plate() -> None:
         mesh = block((count, count, count), (2 * half, 2 * half, 2 * half))
         points = mesh.points + np.array([0.0, 0.0, half])
         truth = np.cos(k * points).prod(axis=1)
-        fluence = MultigridSolver(system_matrix(mesh, medium)).solve(mesh.node_volumes * rate * truth)
+        fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(mesh.node_volumes * rate * truth)
         weights, nodes = mesh.boundary_node_areas, mesh.boundary_nodes
         gap = (fluence - truth)[nodes]
         errors.append(math.sqrt(weights @ gap**2 / (weights @ truth[nodes] ** 2)))
@@ -162,7 +162,7 @@ def test_a_pencil_beam_on_a_ball_against_monte_carlo(deposit: str, ball: Surface
 
 def test_the_solver_refuses_what_it_did_not_solve(monkeypatch: pytest.MonkeyPatch, ball_mesh: TetMesh) -> None:
     monkeypatch.setattr(linear, "ITERATIONS", 1)
-    solver = MultigridSolver(system_matrix(ball_mesh, TISSUE))
+    solver = Solver(system_matrix(ball_mesh, TISSUE), [multigrid])
     with pytest.raises(RunError, match="stopped at a relative residual of"):
         solver.solve(np.random.default_rng(0).uniform(size=len(ball_mesh.points)))
 
@@ -171,7 +171,7 @@ def test_the_solver_leaves_the_random_state_alone(ball_mesh: TetMesh) -> None:
     np.random.seed(3)  # noqa: NPY002
     expected = np.random.random()  # noqa: NPY002
     np.random.seed(3)  # noqa: NPY002
-    MultigridSolver(system_matrix(ball_mesh, TISSUE))
+    Solver(system_matrix(ball_mesh, TISSUE), [multigrid])
     assert np.random.random() == expected  # noqa: NPY002
 
 

@@ -24,10 +24,10 @@ def test_a_closed_surface_stays_closed_and_its_triangles_do_not_get_thin() -> No
     points, faces = plate.points, plate.faces
     thinnest = smallest_angle(points, faces)
     for _ in range(12):
-        ends, _ = edges_of(faces)
+        edges = ends, _ = edges_of(faces)
         near = np.linalg.norm(points[ends].mean(axis=1) - [1.0, 2.0, 0.0], axis=1)
         marked = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1) > 0.5 * near
-        points, faces, parents = split_edges(points, faces, with_longest(points, faces, marked))
+        points, faces, parents = split_edges(points, faces, edges, with_longest(points, edges, marked))
         assert len(parents) == len(faces)
     _, edge = edges_of(faces)
     assert (np.bincount(edge.ravel()) == 2).all()

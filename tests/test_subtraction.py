@@ -7,31 +7,39 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.exact import half_space
 from tetlux.fem.sources import sources_of
-from tetlux.fem.subtraction import MOST_CHARGES, charges_of
+from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
+from tetlux.meshing.arrays import FloatArray
 
 PLATE = slab(200.0, 100.0)
 SOURCE = np.array([[0.0, 0.0, -1.0]])
 ONE = np.ones(1)
 
 
+def charged(points: FloatArray, powers: FloatArray, surface: Surface, medium: Medium, *, images: bool) -> Charges:
+    """The charges of some points, which are few enough."""
+    found = charges_of(points, powers, surface, medium, images=images)
+    assert found is not None
+    return found
+
+
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_charges_are_nearly_the_half_space(eta: float) -> None:
     medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=eta)
-    charges = charges_of(SOURCE, ONE, PLATE, medium, images=True)
+    charges = charged(SOURCE, ONE, PLATE, medium, images=True)
     rho = np.linspace(0.0, 3.0, 30)
     points = np.column_stack([rho, 0 * rho, 0 * rho])
     truth = half_space.point_fluence(medium, depth=1.0, points=np.column_stack([rho, 0 * rho, 0 * rho]))
     # Panels of two points: 1 % and 3 % off, and finite elements solve for what is left.
     assert charges.fluence(points) == pytest.approx(truth, rel=0.05)
-    alone = charges_of(SOURCE, ONE, PLATE, medium, images=False)
+    alone = charged(SOURCE, ONE, PLATE, medium, images=False)
     apart = np.hypot(rho, 1.0)
     free = np.exp(-medium.sigma_tr * apart) / (4.0 * np.pi * medium.diffusion * apart)
     np.testing.assert_allclose(alone.fluence(points), free, rtol=1e-12)
 
 
 def test_charges_solve_the_equation_inside() -> None:
-    charges = charges_of(SOURCE, ONE, PLATE, TISSUE, images=True)
+    charges = charged(SOURCE, ONE, PLATE, TISSUE, images=True)
     x, step = np.array([[0.7, -0.4, -2.0]]), 1e-3
     around = np.vstack([x + s * step * e for e in np.eye(3) for s in (-1, 1)])
     here = charges.fluence(x)[0]
@@ -46,13 +54,13 @@ def test_charges_solve_the_equation_inside() -> None:
 def test_images_never_lie_in_another_part_of_the_body(gap: float) -> None:
     """On the inner side of a ring the line of images points across the hole, at the other side."""
     ring = torus(10.0 + 0.5 * gap, 10.0)
-    charges = charges_of(np.array([[1.0 + 0.5 * gap, 0.0, 0.0]]), ONE, ring, TISSUE, images=True)
+    charges = charged(np.array([[1.0 + 0.5 * gap, 0.0, 0.0]]), ONE, ring, TISSUE, images=True)
     images = charges.positions[1:]
     assert not ring.contains(images).any()
     foot = np.array([0.5 * gap, 0.0, 0.0])
     clear = np.linalg.norm(ring.closest(images)[0] - images, axis=1)
     assert (clear >= 0.499 * np.linalg.norm(images - foot, axis=1)).all()
-    assert len(images) < len(charges_of(SOURCE, ONE, PLATE, TISSUE, images=True).positions) - 1
+    assert len(images) < len(charged(SOURCE, ONE, PLATE, TISSUE, images=True).positions) - 1
     # A source deeper than the hole is wide has no image at all.
     assert (len(images) == 0) == (gap < 1)
 
@@ -132,10 +140,17 @@ def test_spheres_of_all_sizes_share_one_shape() -> None:
     """A wide curved body and its images: nothing in it knows a length but the mean free path."""
     for scale in (1e-3, 1e3):
         medium = Medium(sigma_a=0.01 / scale, sigma_s_prime=1.0 / scale, eta=1.4)
-        charges = charges_of(scale * np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0 * scale), medium, images=True)
-        plain = charges_of(np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
+        charges = charged(scale * np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0 * scale), medium, images=True)
+        plain = charged(np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
         np.testing.assert_allclose(charges.positions / scale, plain.positions, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(charges.strengths, plain.strengths, rtol=1e-9)
+
+
+def test_more_charges_than_can_be_afforded_are_none() -> None:
+    few = charged(SOURCE, ONE, PLATE, TISSUE, images=True)
+    count = len(few.positions)
+    assert charges_of(SOURCE, ONE, PLATE, TISSUE, images=True, most=count) is not None
+    assert charges_of(SOURCE, ONE, PLATE, TISSUE, images=True, most=count - 1) is None
 
 
 def two_boxes(gap: float) -> Surface:

@@ -25,11 +25,11 @@ def refined(surface: Surface, faces: int) -> Surface:
     points, triangles, parents = surface.points, surface.faces, np.arange(len(surface.faces))
     flat = points
     while len(triangles) < faces:
-        ends, edge = edges_of(triangles)
+        edges = ends, edge = edges_of(triangles)
         owner = np.empty(len(ends), dtype=np.int64)
         owner[edge.ravel()] = np.repeat(parents, 3)
-        marked = with_longest(flat, triangles, np.ones(len(ends), dtype=bool))
-        flat, triangles, origin = split_edges(flat, triangles, marked)
+        marked = with_longest(flat, edges, np.ones(len(ends), dtype=bool))
+        flat, triangles, origin = split_edges(flat, triangles, edges, marked)
         points = np.vstack([points, surface.on_curve(owner[marked], flat[len(points) :])[0]])
         parents = parents[origin]
     return Surface(points, triangles, surface.unit, f"{surface.name}, refined")
