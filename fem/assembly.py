@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_array
 
+from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners
@@ -44,7 +45,7 @@ def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_a
     (n, n) csr_array
         Symmetric, positive definite, indices sorted.
     """
-    return Assembly(mesh).of(medium, mass)
+    return Assembly(mesh).of(coefficients_of(medium), mass)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +59,9 @@ class Assembly:
 
     mesh: TetMesh
 
-    def of(self, medium: Medium, mass: Mass = "lumped") -> csr_array:
-        """The matrix of a medium, see `system_matrix`."""
-        return self.matrix(medium.diffusion, medium.sigma_a, 0.5 / medium.boundary_factor, mass)
+    def of(self, coefficients: Coefficients, mass: Mass = "lumped") -> csr_array:
+        """The matrix of given coefficients, see `system_matrix`."""
+        return self.matrix(coefficients.diffusion, coefficients.sigma_a, coefficients.escape, mass)
 
     def matrix(
         self,

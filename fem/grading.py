@@ -22,7 +22,7 @@ def lit_points(deposits: list[Deposit], medium: Medium) -> tuple[FloatArray, Flo
     extinction = medium.sigma_a + medium.delta_eddington[0]
     found, resolutions = [np.zeros((0, 3))], [np.zeros(0)]
     for deposit in deposits:
-        rows = [deposit.points]
+        rows = [deposit.points, deposit.lit]
         for start, direction, length in zip(deposit.starts, deposit.directions, deposit.lengths, strict=True):
             reach = min(float(length), FADED / extinction)
             count = max(2, int(reach / (SPACING * deposit.resolution)) + 1)

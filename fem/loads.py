@@ -1,43 +1,48 @@
 """The right-hand side: what deposits put on the nodes, ``∫ Q0 v + (1/sigma_t') ∫ Q1 . grad v``.
 
-Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside.
+Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside; emission adds
+``∫ Q0 v`` by the corners.
 """
 
 import numpy as np
 
+from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.medium import Medium
+from tetlux.fem.paths import cells_of, optical_depths
 from tetlux.meshing.arrays import FloatArray, summed
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.tetmesh import TetMesh
 
 
-def load_vector(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
+def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> FloatArray:
     """Load of a deposit on the nodes of a mesh.
 
     Parameters
     ----------
     mesh : TetMesh
-    medium : Medium
+    coefficients : Coefficients
     deposit : Deposit
+        As it is on this mesh, see `Deposit.on`.
 
     Returns
     -------
     (n,) ndarray
-        Of points and segments, sums to the scattered power that they hold, W, to rounding.
+        Sums to the scattered power that its points and segments hold and its volume emits, W, to rounding.
     """
     load = np.zeros(len(mesh.points))
     if len(deposit.points) or len(deposit.starts):
         tree = mesh.tree
-        line, points, powers = _line_load(mesh, tree, medium, deposit)
+        line, points, powers = _line_load(mesh, tree, coefficients, deposit)
         load += line
         # Points go with what is left of the lines.
         points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
         load += _point_load(mesh, tree, points, powers)
-    if deposit.transmitted_irradiance:
-        _, c2 = moments(medium.eta)
+    if np.any(deposit.transmitted_irradiance):
+        _, c2 = moments(coefficients.outer.eta)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
+    if np.any(deposit.emission):
+        load += mesh.to_nodes(deposit.emission * mesh.volumes)
     return load
 
 
@@ -53,24 +58,26 @@ def _point_load(mesh: TetMesh, tree: CellTree, points: FloatArray, powers: Float
 
 
 def _line_load(
-    mesh: TetMesh, tree: CellTree, medium: Medium, deposit: Deposit
+    mesh: TetMesh, tree: CellTree, coefficients: Coefficients, deposit: Deposit
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, integrated in closed form over every tetrahedron that they pass.
 
     Between the surface and the mesh's facets they may lie outside the mesh: of each such stretch the middle and its
     power are returned besides the load, as points.
     """
-    scattering, cosine = medium.delta_eddington
-    extinction = medium.sigma_a + scattering
     load = np.zeros(len(mesh.points))
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
     for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths):
+        cells = cells_of(mesh, coefficients, part, deposit.starts, deposit.directions)
+        extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter
         x = extinction * step
-        carried = deposit.fluxes[part.paths] * scattering * np.exp(-extinction * part.enter)
+        carried = deposit.fluxes[part.paths] * at_cells(coefficients.scattering, cells)
+        carried *= np.exp(-optical_depths(part, coefficients.extinction, cells))
         mean = carried * step * _phi1(x)
         q0 = mean[:, None] * part.weights + (carried * step**2 * _phi2(x))[:, None] * part.slopes
-        q1 = cosine / medium.sigma_t_prime * mean[:, None] * part.slopes
+        forward = at_cells(coefficients.cosine, cells) / at_cells(coefficients.sigma_t_prime, cells)
+        q1 = (forward * mean)[:, None] * part.slopes
         inside = part.cells >= 0
         load += summed(mesh.tetrahedra[part.cells[inside]], (q0 + q1)[inside], len(load))
         outside, middle = part.paths[~inside], 0.5 * (part.enter + part.leave)[~inside]

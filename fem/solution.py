@@ -1,6 +1,7 @@
 """`Solution`: fluence, exitance, and where the power went."""
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,13 +60,15 @@ class Solution:
     power : Power
     patches : tuple of Patch
         Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.subtraction`.
-    transmitted_irradiance : float
-        Diffuse light that passed to the inside, W/unit².
+    transmitted_irradiance : float or (b,) ndarray
+        Diffuse light that passed to the inside, throughout or at each boundary node, W/unit².
     error_estimate : float
         Estimated relative L2 error of the exitance: see `tetlux.fem.estimate`.
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
+    of_lights : tuple of Solution
+        What each light adds, in their order, if there are several.
     """
 
     mesh: TetMesh
@@ -74,10 +77,11 @@ class Solution:
     fluence: FloatArray
     power: Power
     patches: tuple[Patch, ...] = ()
-    transmitted_irradiance: float = 0.0
+    transmitted_irradiance: float | FloatArray = 0.0
     error_estimate: float = np.nan
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    of_lights: "tuple[Solution, ...]" = ()
 
     @cached_property
     def exitance(self) -> FloatArray:
@@ -86,13 +90,13 @@ class Solution:
         ``M = phi/(2A)``; under diffuse light ``M = E_t + E.n``, where the boundary condition makes
         ``E.n = (phi - 4 E_t/(1 - 2 C1))/(2A)``.
         """
-        return self._exitance_of(self.fluence[self.mesh.boundary_nodes])
+        return self._exitance_of(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
 
-    def _exitance_of(self, fluence: FloatArray) -> FloatArray:
+    def _exitance_of(self, fluence: FloatArray, transmitted: float | FloatArray) -> FloatArray:
         exitance = fluence / (2.0 * self.medium.boundary_factor)
-        if self.transmitted_irradiance:
+        if np.any(transmitted):
             _, c2 = moments(self.medium.eta)
-            exitance = exitance + self.transmitted_irradiance * (1.0 - 2.0 / (1.0 + 3.0 * c2))
+            exitance = exitance + transmitted * (1.0 - 2.0 / (1.0 + 3.0 * c2))
         return np.asarray(exitance)
 
     def exitance_at(self, points: FloatArray) -> FloatArray:
@@ -114,7 +118,10 @@ class Solution:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         _, face, weights = self.mesh.closest_boundary(queries)
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
-        return self._exitance_of(self._interpolated(queries, cells, corners, weights))
+        transmitted = self.transmitted_irradiance
+        if np.ndim(transmitted) > 0:
+            transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
+        return self._exitance_of(self._interpolated(queries, cells, corners, weights), transmitted)
 
     def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> FloatArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
@@ -151,3 +158,18 @@ class Solution:
             queries[found], cells[found], self.mesh.tetrahedra[cells[found]], weights[found]
         )
         return fluence
+
+
+def added(parts: Sequence[Solution]) -> Solution:
+    """The sum of solutions on one mesh, one for each light."""
+    if len(parts) == 1:
+        return parts[0]
+    powers = [astuple(part.power) for part in parts]
+    return replace(
+        parts[0],
+        fluence=np.sum([part.fluence for part in parts], axis=0),
+        power=Power(*(sum(column) for column in zip(*powers, strict=True))),
+        patches=tuple(patch for part in parts for patch in part.patches),
+        transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
+        of_lights=tuple(parts),
+    )

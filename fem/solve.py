@@ -2,18 +2,20 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
-from tetlux.fem.assembly import Mass
+from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.medium import Medium
+from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
-from tetlux.fem.validity import check_scattering, check_size, warnings_for
+from tetlux.fem.validity import check_media, warnings_for
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import tetrahedralize
@@ -35,11 +37,46 @@ SAFETY, POWER_SAFETY = 0.65, 0.4
 MOST_TETRAHEDRA = 1_000_000
 
 
+@overload
 def solve(
     body: Surface | TetMesh,
     medium: Medium,
     lights: Sequence[Light],
     *,
+    regions: Sequence[Region] = ...,
+    tolerance: float = ...,
+    mesh: TetMesh | None = ...,
+    mass: Mass = ...,
+    subtract: Subtract = ...,
+    most_tetrahedra: int = ...,
+    cache: bool = ...,
+    report: Callable[[str], None] = ...,
+) -> Solution: ...
+
+
+@overload
+def solve(
+    body: Surface | TetMesh,
+    medium: Sequence[Medium],
+    lights: Sequence[Light],
+    *,
+    regions: Sequence[Region] = ...,
+    tolerance: float = ...,
+    mesh: TetMesh | None = ...,
+    mass: Mass = ...,
+    subtract: Subtract = ...,
+    most_tetrahedra: int = ...,
+    cache: bool = ...,
+    report: Callable[[str], None] = ...,
+) -> list[Solution]: ...
+
+
+def solve(
+    body: Surface | TetMesh,
+    medium: Medium | Sequence[Medium],
+    lights: Sequence[Light],
+    *,
+    regions: Sequence[Region] = (),
     tolerance: float = 0.02,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
@@ -47,7 +84,7 @@ def solve(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Callable[[str], None] = lambda _: None,
-) -> Solution:
+) -> Solution | list[Solution]:
     """Solve for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
@@ -56,9 +93,13 @@ def solve(
     Parameters
     ----------
     body : Surface or TetMesh
-    medium : Medium
+    medium : Medium or sequence of Medium
+        Of the body. Several are channels (wavelengths, or red, green and blue): all are solved on one mesh that is
+        fine enough for every one of them.
     lights : sequence of Light
         At least one; they add up.
+    regions : sequence of Region
+        Parts of the body with media of their own.
     tolerance : float
         Wanted relative L2 error of the exitance over the surface.
     mesh : TetMesh, optional
@@ -78,7 +119,8 @@ def solve(
 
     Returns
     -------
-    Solution
+    Solution or list of Solution
+        One for each channel, if `medium` is a sequence.
 
     Raises
     ------
@@ -93,10 +135,12 @@ def solve(
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """
-    return solve_each(
+    channels = [medium] if isinstance(medium, Medium) else list(medium)
+    solutions = solve_each(
         body,
-        medium,
-        [lights],
+        channels,
+        [lights] * len(channels),
+        regions=regions,
         tolerance=tolerance,
         mesh=mesh,
         mass=mass,
@@ -104,14 +148,16 @@ def solve(
         most_tetrahedra=most_tetrahedra,
         cache=cache,
         report=report,
-    )[0]
+    )
+    return solutions[0] if isinstance(medium, Medium) else solutions
 
 
 def solve_each(
     body: Surface | TetMesh,
-    medium: Medium,
+    medium: Medium | Sequence[Medium],
     scenes: Sequence[Sequence[Light]],
     *,
+    regions: Sequence[Region] = (),
     tolerance: float = 0.02,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
@@ -124,8 +170,10 @@ def solve_each(
 
     Parameters
     ----------
-    body, medium, tolerance, mesh, mass, subtract, most_tetrahedra, cache, report
+    body, regions, tolerance, mesh, mass, subtract, most_tetrahedra, cache, report
         As in `solve`.
+    medium : Medium or sequence of Medium
+        That of all scenes, or of each.
     scenes : sequence of sequences of Light
         The lights of one scene add up; each scene has a solution of its own.
 
@@ -152,21 +200,32 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
-        check_scattering(medium)
-        check_size(surface, medium)
-        scene_sources = [sources_of(lights, surface, medium, subtract) for lights in scenes]
+        media = media_of(medium, regions, len(scenes))
+        for each in dict.fromkeys(media):
+            check_media(surface, each)
+        uniform = len(regions) == 0
+        scene_sources = [
+            sources_of(lights, surface, each[0], subtract, uniform=uniform)
+            for lights, each in zip(scenes, media, strict=True)
+        ]
 
     def steps_on(mesh: TetMesh, before: list[Step] | None) -> list[Step]:
-        with watch.stage("assemble"):
-            system = System(mesh, medium, surface, mass, expected=len(scenes))
-        return [system.step(sources, watch, before[i] if before else None) for i, sources in enumerate(scene_sources)]
+        assembly = Assembly(mesh)
+        systems = {
+            each: System(mesh, each[0], surface, mass, media.count(each), each[1:], assembly)
+            for each in dict.fromkeys(media)
+        }
+        return [
+            systems[each].step(sources, watch, before[i] if before else None)
+            for i, (each, sources) in enumerate(zip(media, scene_sources, strict=True))
+        ]
 
     given = mesh is not None
     if mesh is None:
         with watch.stage("mesh"):
             mesh = tetrahedralize(surface, cache=cache)
             deposits = [deposit for sources in scene_sources for deposit in sources.deposits]
-            mesh = graded_towards(mesh, surface, *lit_points(deposits, medium), most_tetrahedra)
+            mesh = graded_towards(mesh, surface, *lit_points(deposits, media[0][0]), most_tetrahedra)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     steps = best = steps_on(mesh, None)
     least = np.inf
@@ -196,6 +255,27 @@ def solve_each(
         )
         for step, sources in zip(steps, scene_sources, strict=True)
     ]
+
+
+def media_of(medium: Medium | Sequence[Medium], regions: Sequence[Region], scenes: int) -> list[tuple[Medium, ...]]:
+    """The media of the body and its regions in each scene.
+
+    Raises
+    ------
+    InputError
+        If there are not as many media as scenes, or their refractive indices differ within a body.
+    """
+
+    def of_scenes(given: Medium | Sequence[Medium], whose: str) -> list[Medium]:
+        if isinstance(given, Medium):
+            return [given] * scenes
+        if len(given) != scenes:
+            raise InputError(f"{whose} has {len(given)} media for {scenes} channels; give one, or one for each.")
+        return list(given)
+
+    columns = [of_scenes(medium, "the body")]
+    columns += [of_scenes(region.medium, f"region {number}") for number, region in enumerate(regions, 1)]
+    return list(zip(*columns, strict=True))
 
 
 def _to_split(steps: list[Step], tolerance: float) -> BoolArray:

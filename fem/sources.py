@@ -23,12 +23,15 @@ class Sources:
         What each light leaves in the body.
     charges : tuple of Charges
         The points among that, where these are subtracted.
+    owners : tuple of int
+        The light of each of these.
     on_mesh : tuple of Deposit
-        What is left to be put on the nodes.
+        What of each light is left to be put on the nodes.
     """
 
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
+    owners: tuple[int, ...]
     on_mesh: tuple[Deposit, ...]
 
     @property
@@ -37,8 +40,10 @@ class Sources:
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
 
-def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtract: Subtract) -> Sources:
-    """Let lights fall into a body.
+def sources_of(
+    lights: Sequence[Light], surface: Surface, medium: Medium, subtract: Subtract, *, uniform: bool = True
+) -> Sources:
+    """Let lights fall into a body, which may be of one medium throughout.
 
     Raises
     ------
@@ -49,11 +54,12 @@ def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtra
         raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    deposits = tuple(light.deposit_in(surface, medium) for light in lights)
+    deposits = tuple(light.deposit_in(surface, medium, uniform=uniform) for light in lights)
     charges: list[Charges] = []
+    owners: list[int] = []
     on_mesh: list[Deposit] = []
     left = 0 if subtract == "nothing" else MOST_CHARGES
-    for deposit in deposits:
+    for light, deposit in enumerate(deposits):
         # As many as can be afforded: with images, or at least without.
         for images in (True, False) if subtract == "half-space" else (False,):
             if 0 < len(deposit.points) <= left:
@@ -61,6 +67,7 @@ def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtra
                 if some is not None:
                     left -= len(some.positions)
                     charges.append(some)
+                    owners.append(light)
                     deposit = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])  # noqa: PLW2901
         on_mesh.append(deposit)
-    return Sources(deposits, tuple(charges), tuple(on_mesh))
+    return Sources(deposits, tuple(charges), tuple(owners), tuple(on_mesh))

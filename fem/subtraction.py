@@ -22,6 +22,7 @@ from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
 from tetlux.fem.assembly import Mass
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
@@ -286,7 +287,7 @@ def patch_terms(medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
     mesh, charges = patch.mesh, patch.charges
     sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
     if not patch.cells.any():
-        return PatchTerms(load_vector(mesh, medium, sources), exited=0.0, absorbed=0.0)
+        return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)
     faces, on_boundary = patch.faces
     out_of_faces, through = _integrals(mesh.points[faces], charges)

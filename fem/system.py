@@ -6,13 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.assembly import Mass, system_matrix
+from tetlux.fem.assembly import Assembly, Mass
+from tetlux.fem.coefficients import Coefficients, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
-from tetlux.fem.lights.deposit import Light
+from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
-from tetlux.fem.solution import Power, Solution
+from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
@@ -35,18 +36,23 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """One medium on one mesh.
+    """The media of a body on one mesh.
 
     Parameters
     ----------
     mesh : TetMesh
     medium : Medium
+        Of the body.
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     expected : int
         How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
+    inner : tuple of Medium
+        Those of the mesh's regions 1, 2, ....
+    assembly : Assembly, optional
+        That of another system on the same mesh, to share what does not depend on the media.
     """
 
     mesh: TetMesh
@@ -54,11 +60,19 @@ class System:
     surface: Surface | None = None
     mass: Mass = "lumped"
     expected: int = 1
+    inner: tuple[Medium, ...] = ()
+    assembly: Assembly | None = None
+
+    @cached_property
+    def coefficients(self) -> Coefficients:
+        """Those of its tetrahedra."""
+        return coefficients_on(self.mesh, (self.medium, *self.inner))
 
     @cached_property
     def solver(self) -> Solver:
         """The solver of its matrix."""
-        return solver_for(system_matrix(self.mesh, self.medium, self.mass), LOADS_OF_A_LIGHT * self.expected)
+        assembly = self.assembly or Assembly(self.mesh)
+        return solver_for(assembly.of(self.coefficients, self.mass), LOADS_OF_A_LIGHT * self.expected)
 
     @property
     def body(self) -> Surface:
@@ -88,23 +102,27 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.medium, subtract)
-        solution, _ = self._solved(sources, watch, None)
+            sources = sources_of(lights, self.body, self.medium, subtract, uniform=self.coefficients.uniform)
+        solution, _, _ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=sources.warnings)
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
-        solution, good = self._solved(sources, watch, before)
+        solution, good, load = self._solved(sources, watch, before)
         with watch.stage("solve"):
-            estimate = estimated(solution, self.solver)
+            estimate = estimated(solution, self.coefficients, load, self.solver)
         return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
-    ) -> tuple[Solution, tuple[BoolArray, ...]]:
+    ) -> tuple[Solution, tuple[BoolArray, ...], FloatArray]:
+        """The solution, where its charges are good guesses, and what was put on the nodes."""
         mesh, medium = self.mesh, self.medium
         with watch.stage("assemble"):
-            load = np.sum([load_vector(mesh, medium, deposit) for deposit in sources.on_mesh], axis=0)
+            deposits = [deposit.on(mesh, self.body, self.coefficients) for deposit in sources.on_mesh]
+            loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+            # A light whose points are all subtracted may have nothing on the mesh.
+            lit = [light for light, load in enumerate(loads) if load.any()]
             if before is None:
                 everywhere = np.ones(len(mesh.points), dtype=bool)
                 patches = [patch_of(mesh, charges, everywhere) for charges in sources.charges]
@@ -118,7 +136,8 @@ class System:
             solver = self.solver
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
-            parts = solver.solve(np.column_stack([*(term.load for term in terms), load]))
+            columns = [*(term.load for term in terms), *(loads[light] for light in lit)]
+            parts = solver.solve(np.column_stack(columns or loads))
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
         worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
         if worse:
@@ -128,23 +147,39 @@ class System:
                     terms[i] = patch_terms(medium, patches[i], self.mass)
             with watch.stage("solve"):
                 parts[:, worse] = solver.solve(np.column_stack([terms[i].load for i in worse]))
-        return self._solution(sources, parts.sum(axis=1), patches, terms), tuple(good)
+        owners = np.array([*sources.owners, *lit], dtype=np.int64)
+        of_lights = []
+        for light, deposit in enumerate(deposits):
+            fluence = parts[:, : len(owners)][:, owners == light].sum(axis=1)
+            own = [i for i, owner in enumerate(sources.owners) if owner == light]
+            of_lights.append(self._solution(deposit, fluence, [patches[i] for i in own], [terms[i] for i in own]))
+        return added(of_lights), tuple(good), np.sum(loads, axis=0)
 
     def _solution(
-        self, sources: Sources, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]
+        self, deposit: Deposit, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]
     ) -> Solution:
-        mesh, medium, deposits = self.mesh, self.medium, sources.deposits
-        transmitted = sum(d.transmitted_irradiance for d in deposits)
-        outside = sum(d.irradiance for d in deposits) * mesh.area
+        """The solution of one light, by its deposit on this mesh."""
+        mesh = self.mesh
+        outside = mesh.boundary_node_areas * deposit.irradiance
+        transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
+        emitted = float((mesh.volumes * deposit.emission).sum())
         ledger = Power(
-            incident=sum(d.incident for d in deposits) + outside,
-            specular=sum(d.specular for d in deposits) + outside - transmitted * mesh.area,
-            absorbed=sum(d.absorbed for d in deposits)
-            + medium.sigma_a * float(mesh.node_volumes @ fluence)
-            + sum(term.absorbed for term in terms),
+            incident=deposit.incident + float(outside.sum()) + emitted,
+            specular=deposit.specular + float((outside - transmitted).sum()),
+            absorbed=deposit.absorbed + float(self._absorbing @ fluence) + sum(term.absorbed for term in terms),
             exited=0.0,
-            ballistic=sum(d.ballistic for d in deposits),
+            ballistic=deposit.ballistic,
         )
-        solution = Solution(mesh, self.body, medium, fluence, ledger, tuple(patches), transmitted)
+        solution = Solution(
+            mesh, self.body, self.medium, fluence, ledger, tuple(patches), deposit.transmitted_irradiance
+        )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
+
+    @cached_property
+    def _absorbing(self) -> FloatArray:
+        """What a fluence of 1 at each node loses, (n,), unit²."""
+        sigma_a = self.coefficients.sigma_a
+        if self.coefficients.uniform:
+            return np.asarray(sigma_a * self.mesh.node_volumes)
+        return self.mesh.to_nodes(sigma_a * self.mesh.volumes)

@@ -1,5 +1,7 @@
 """Is diffusion a fair model here? What a user should read before the picture."""
 
+from collections.abc import Sequence
+
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
@@ -42,6 +44,23 @@ def check_size(surface: Surface, medium: Medium) -> None:
         f"of {medium.mean_free_path:.3g} {surface.unit}: absurdly {size} for diffusion; check the unit, the scale "
         f"of the surface, and that coefficients are in 1/{surface.unit}."
     )
+
+
+def check_media(surface: Surface, media: Sequence[Medium]) -> None:
+    """Refuse media that do not go together, or with the body: the body's own first, then those of its regions.
+
+    Raises
+    ------
+    InputError
+    """
+    for medium in media:
+        check_scattering(medium)
+        if (medium.eta, medium.boundary) != (media[0].eta, media[0].boundary):
+            raise InputError(
+                f"a region's refractive index of {medium.eta:g} is not the body's {media[0].eta:g}, or its boundary "
+                "is another; light that is reflected between regions is not modelled: give both the same."
+            )
+    check_size(surface, media[0])
 
 
 def warnings_for(surface: Surface, medium: Medium) -> list[str]:

@@ -82,6 +82,14 @@ class Surface:
         """Diagonal of the bounding box, unit."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
+    @property
+    def extent(self) -> str:
+        """The ranges of its coordinates, to be read."""
+        low, high = self.points.min(axis=0), self.points.max(axis=0)
+        return ", ".join(f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True)) + (
+            f" {self.unit}"
+        )
+
     @cached_property
     def _closest(self) -> ClosestPoint:
         return ClosestPoint(self.points, self.faces)

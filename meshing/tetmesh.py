@@ -11,6 +11,7 @@ from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import ClosestPoint
+from tetlux.meshing.rays import RayCaster
 from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
@@ -238,6 +239,11 @@ class TetMesh:
         """Nearest boundary points of queries (q, 3): points (q, 3), faces (q,), barycentric weights (q, 3)."""
         nearest, face = self._closest(queries)
         return nearest, face, barycentric_of(nearest, self.points[self.boundary_faces[face]])
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """The boundary, ready to be met by rays; faces are numbered as `boundary_faces`."""
+        return RayCaster(self.points, self.boundary_faces)
 
     @cached_property
     def tree(self) -> CellTree:

@@ -17,6 +17,7 @@ from tests.conftest import block
 from tests.convergence import summed
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
 from tetlux.fem.assembly import system_matrix
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import cylinder, half_space, slab, sphere
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
@@ -367,7 +368,7 @@ def test_equation_9_a_beams_first_moment_acts_like_its_divergence() -> None:
         lengths=np.array([LENGTH]),
         fluxes=np.array([1.0]),
     )
-    load = load_vector(SOLVED_MESH, PEAKED, deposit)
+    load = load_vector(SOLVED_MESH, coefficients_of(PEAKED), deposit)
     # The rule does not stop where the beam passes from one tetrahedron to the next: 3e-6 of the largest.
     np.testing.assert_allclose(load, along_beam(SOLVED_MESH, START, DIRECTION, LENGTH), atol=1e-5 * load.max())
 

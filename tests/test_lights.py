@@ -8,6 +8,7 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, solve
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights import pencil
@@ -25,7 +26,7 @@ def total(deposit: Deposit) -> float:
 def test_a_point_source_keeps_its_power(ball: Surface, ball_mesh: TetMesh) -> None:
     deposit = PointSource((1.0, 2.0, 3.0), power=2.5).deposit_in(ball, TISSUE)
     assert (deposit.incident, total(deposit)) == (2.5, 2.5)
-    load = load_vector(ball_mesh, TISSUE, deposit)
+    load = load_vector(ball_mesh, coefficients_of(TISSUE), deposit)
     assert load.sum() == pytest.approx(2.5, rel=1e-14)
     # Linear functions see the source where it is.
     assert load @ ball_mesh.points == pytest.approx([2.5, 5.0, 7.5])
@@ -65,7 +66,9 @@ def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -
     scattered = (1 - lost - deposit.ballistic) * 1.9 / 1.95
     assert deposit.absorbed == pytest.approx((1 - lost - deposit.ballistic) * 0.05 / 1.95, rel=1e-9)
     assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-12)
-    assert load_vector(block((8, 8, 2), (20.0, 20.0, 0.5)), FORWARD, deposit).sum() == pytest.approx(scattered)
+    assert load_vector(block((8, 8, 2), (20.0, 20.0, 0.5)), coefficients_of(FORWARD), deposit).sum() == pytest.approx(
+        scattered
+    )
 
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (2, 2, 3), (3, 5, 7)])
@@ -81,7 +84,7 @@ def test_a_line_is_integrated_exactly_on_any_mesh(counts: tuple[int, int, int]) 
         fluxes=np.array([flux]),
     )
     mesh = block(counts, (6.0, 6.0, depth))
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     scattering, cosine = FORWARD.delta_eddington
     mu = FORWARD.sigma_a + scattering
     decay = math.exp(-mu * depth)
@@ -103,7 +106,7 @@ def test_a_slanting_line_is_integrated_exactly() -> None:
         fluxes=np.array([1.0]),
     )
     mesh = block((5, 4, 6), (12.0, 12.0, 4.0))
-    load = load_vector(mesh, TISSUE, deposit)
+    load = load_vector(mesh, coefficients_of(TISSUE), deposit)
     mu = TISSUE.sigma_t_prime
     decay = math.exp(-mu * 5)
     power = TISSUE.albedo * (1 - decay)
@@ -202,7 +205,7 @@ def test_what_is_still_caught_after_many_reflections_is_booked(monkeypatch: pyte
     deposit = beam.deposit_in(box((2.0, 2.0, 2.0)), clear)
     mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
     mesh = TetMesh(mesh.points + np.array([0.0, 0.0, 1.0]), mesh.tetrahedra)
-    scattered = load_vector(mesh, clear, deposit).sum()
+    scattered = load_vector(mesh, coefficients_of(clear), deposit).sum()
     assert len(deposit.lengths) == 3
     assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-10)
 
@@ -220,7 +223,7 @@ def test_a_line_along_edges_and_faces_of_a_turned_mesh_loses_nothing(seed: int) 
         deposit = Deposit(
             incident=1.0, starts=start[None], directions=direction[None], lengths=np.array([4.0]), fluxes=np.ones(1)
         )
-        load = load_vector(mesh, TISSUE, deposit)
+        load = load_vector(mesh, coefficients_of(TISSUE), deposit)
         mu, decay = TISSUE.sigma_t_prime, math.exp(-4 * TISSUE.sigma_t_prime)
         assert load.sum() == pytest.approx(TISSUE.albedo * (1 - decay), rel=1e-12)
         mean = TISSUE.albedo * (1 - (1 + 4 * mu) * decay) / mu

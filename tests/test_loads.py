@@ -8,6 +8,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import Deposit, Medium, PencilBeam
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.loads import load_vector
 from tetlux.meshing import Surface, TetMesh, cell_tree
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -96,7 +97,7 @@ def test_awkward_paths_are_cut_as_one_by_one(name: str, seed: int | None) -> Non
     if seed is not None:
         mesh, turn = turned(mesh, seed)
     deposit = beams(*(turn @ np.array(end, dtype=float) for end in AWKWARD[name]))
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
 
@@ -106,14 +107,14 @@ def test_many_paths_at_once_are_cut_as_one_by_one() -> None:
     ends = np.array(list(AWKWARD.values()), dtype=float)
     random = np.random.default_rng(4).uniform(-2, 2, size=(40, 2, 3)) - [0, 0, 2]
     deposit = beams(*(np.vstack([ends, random])[:, i] @ turn.T for i in (0, 1)))
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
     # Two half as strong in the place of each.
     ends = deposit.starts + deposit.lengths[:, None] * deposit.directions
     twice = beams(np.repeat(deposit.starts, 2, axis=0), np.repeat(ends, 2, axis=0))
     twice = replace(twice, fluxes=0.5 * twice.fluxes)
-    assert load_vector(mesh, FORWARD, twice) == pytest.approx(load, abs=1e-12)
+    assert load_vector(mesh, coefficients_of(FORWARD), twice) == pytest.approx(load, abs=1e-12)
 
 
 def test_paths_on_a_graded_mesh_are_cut_as_one_by_one() -> None:
@@ -126,7 +127,7 @@ def test_paths_on_a_graded_mesh_are_cut_as_one_by_one() -> None:
     ends[:10, :2] = starts[:10, :2]
     starts[25:], ends[25:] = mesh.points[random.choice(len(mesh.points), 5)], mesh.points[:5]
     deposit = beams(starts, ends)
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
     for part in mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths):
@@ -178,7 +179,7 @@ def test_what_runs_outside_goes_to_the_nearest_nodes() -> None:
     assert part.leave[outside][order] == pytest.approx(
         [0.001, 3.001, 4.003, 0.001, 3.001, 4.003, 0.001, 4.003, 4.003], abs=1e-8
     )
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
 
@@ -187,7 +188,7 @@ def test_a_wide_beam_in_a_ball_is_cut_as_one_by_one(ball: Surface, ball_mesh: Te
     """It enters and leaves through the true surface, outside the mesh's facets."""
     beam = PencilBeam((0.5, -0.3, 20.0), (0.1, 0.2, -1.0), radius=4.0, deposit="line")
     deposit = beam.deposit_in(ball, FORWARD)
-    load = load_vector(ball_mesh, FORWARD, deposit)
+    load = load_vector(ball_mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     some = slice(None, None, 20)
     few = replace(
@@ -197,7 +198,9 @@ def test_a_wide_beam_in_a_ball_is_cut_as_one_by_one(ball: Surface, ball_mesh: Te
         lengths=deposit.lengths[some],
         fluxes=deposit.fluxes[some] / deposit.fluxes[some].sum(),
     )
-    assert load_vector(ball_mesh, FORWARD, few) == pytest.approx(careful_load(ball_mesh, FORWARD, few), abs=CLOSE)
+    assert load_vector(ball_mesh, coefficients_of(FORWARD), few) == pytest.approx(
+        careful_load(ball_mesh, FORWARD, few), abs=CLOSE
+    )
 
 
 @pytest.mark.parametrize("portion", [1, 50, 1000])
@@ -206,9 +209,9 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     random = np.random.default_rng(6)
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
     deposit = beams(starts, ends)
-    load = load_vector(mesh, FORWARD, deposit)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     monkeypatch.setattr(cell_tree, "PORTION", portion)
-    assert load_vector(mesh, FORWARD, deposit) == pytest.approx(load, abs=1e-14)
+    assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(load, abs=1e-14)
     tree = mesh.tree
     parts = list(tree.cut(deposit.starts, deposit.directions, deposit.lengths))
     assert len(parts) > {1: 60, 50: 20, 1000: 2}[portion]
@@ -296,7 +299,7 @@ def test_points_outside_go_to_the_nearest_nodes(ball_mesh: TetMesh) -> None:
     face = ball_mesh.boundary_faces[5]
     middle = ball_mesh.points[face].mean(axis=0)
     points = np.vstack([middle * (10.0 / np.linalg.norm(middle)), 0.5 * middle])
-    load = load_vector(ball_mesh, FORWARD, Deposit(points=points, powers=np.array([2.0, 3.0])))
+    load = load_vector(ball_mesh, coefficients_of(FORWARD), Deposit(points=points, powers=np.array([2.0, 3.0])))
     assert load.sum() == pytest.approx(5.0, rel=1e-12)
     assert load[face].sum() == pytest.approx(2.0, rel=1e-12)
 
@@ -307,5 +310,5 @@ def test_points_and_lines_add_up() -> None:
     points = Deposit(points=np.array([[0.5, 0.4, -0.3]]), powers=np.array([2.0]))
     both = replace(line, points=points.points, powers=points.powers, transmitted_irradiance=3.0)
     diffuse = Deposit(transmitted_irradiance=3.0)
-    apart = sum(load_vector(mesh, FORWARD, deposit) for deposit in (line, points, diffuse))
-    assert load_vector(mesh, FORWARD, both) == pytest.approx(apart, abs=1e-14)
+    apart = sum(load_vector(mesh, coefficients_of(FORWARD), deposit) for deposit in (line, points, diffuse))
+    assert load_vector(mesh, coefficients_of(FORWARD), both) == pytest.approx(apart, abs=1e-14)

@@ -1,8 +1,23 @@
 """Lights, one a file: where each one's power goes."""
 
+from tetlux.fem.lights.collimated import CollimatedBeam
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.diffuse import DiffuseLight
+from tetlux.fem.lights.emission import Emission
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.lights.point import PointSource
+from tetlux.fem.lights.spot import Disc, Gaussian, Image, Rectangle
 
-__all__ = ["Deposit", "DiffuseLight", "Light", "PencilBeam", "PointSource"]
+__all__ = [
+    "CollimatedBeam",
+    "Deposit",
+    "DiffuseLight",
+    "Disc",
+    "Emission",
+    "Gaussian",
+    "Image",
+    "Light",
+    "PencilBeam",
+    "PointSource",
+    "Rectangle",
+]

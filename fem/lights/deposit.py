@@ -1,13 +1,16 @@
-"""What a light leaves in a medium: isotropic points, and beams that fade along straight segments."""
+"""What a light leaves in a medium: points, beams that fade along straight segments, diffuse light, emission."""
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
+from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
 
 
 def _no_vectors() -> FloatArray:
@@ -20,7 +23,10 @@ def _no_values() -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Deposit:
-    """Where the power of a light goes; a deposit knows the body, not its mesh.
+    """Where the power of a light goes.
+
+    What depends on the body alone is known at once; light that falls on each facet of a mesh, and paths through
+    several media, are known on a mesh only: `on`.
 
     Parameters
     ----------
@@ -37,11 +43,18 @@ class Deposit:
     starts, directions, lengths, fluxes : (s, 3), (s, 3), (s,), (s,) ndarray
         Beam segments: start, unit direction, length, and power carried at the start, W. The power fades
         as ``exp(-sigma_t* l)``.
-    irradiance, transmitted_irradiance : float
-        Diffuse light on the outside of the whole surface, and what of it passes to the inside, W/unit².
+    irradiance, transmitted_irradiance : float or (b,) ndarray
+        Diffuse light on the outside, of the whole surface or at each boundary node of a mesh, and what of it
+        passes to the inside, W/unit².
+    emission : float or (m,) ndarray
+        Power that the volume emits, throughout or in each tetrahedron of a mesh, W/unit³.
     resolution : float
         Length near the deposit that a mesh has to resolve, unit.
+    lit : (p, 3) ndarray
+        Other places near which it has to.
     warnings : tuple of str
+    on_mesh : callable, optional
+        What comes to it on a mesh.
     """
 
     incident: float = 0.0
@@ -54,15 +67,59 @@ class Deposit:
     directions: FloatArray = field(default_factory=_no_vectors)
     lengths: FloatArray = field(default_factory=_no_values)
     fluxes: FloatArray = field(default_factory=_no_values)
-    irradiance: float = 0.0
-    transmitted_irradiance: float = 0.0
+    irradiance: float | FloatArray = 0.0
+    transmitted_irradiance: float | FloatArray = 0.0
+    emission: float | FloatArray = 0.0
     resolution: float = np.inf
+    lit: FloatArray = field(default_factory=_no_vectors)
     warnings: tuple[str, ...] = ()
+    on_mesh: Callable[[TetMesh, Surface, Coefficients], "Deposit"] | None = None
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> "Deposit":
+        """What it is on a mesh of the surface with given coefficients."""
+        if self.on_mesh is None:
+            return self
+        return together([replace(self, on_mesh=None), self.on_mesh(mesh, surface, coefficients)])
+
+
+def together(parts: Sequence[Deposit]) -> Deposit:
+    """Several deposits as one."""
+    on_mesh = [part.on_mesh for part in parts if part.on_mesh is not None]
+    return Deposit(
+        incident=sum(p.incident for p in parts),
+        specular=sum(p.specular for p in parts),
+        absorbed=sum(p.absorbed for p in parts),
+        ballistic=sum(p.ballistic for p in parts),
+        points=np.vstack([p.points for p in parts]),
+        powers=np.concatenate([p.powers for p in parts]),
+        starts=np.vstack([p.starts for p in parts]),
+        directions=np.vstack([p.directions for p in parts]),
+        lengths=np.concatenate([p.lengths for p in parts]),
+        fluxes=np.concatenate([p.fluxes for p in parts]),
+        irradiance=sum((p.irradiance for p in parts), 0.0),
+        transmitted_irradiance=sum((p.transmitted_irradiance for p in parts), 0.0),
+        emission=sum((p.emission for p in parts), 0.0),
+        resolution=min(p.resolution for p in parts),
+        lit=np.vstack([p.lit for p in parts]),
+        warnings=tuple(w for p in parts for w in p.warnings),
+        on_mesh=None
+        if not on_mesh
+        else lambda mesh, surface, coefficients: together([one(mesh, surface, coefficients) for one in on_mesh]),
+    )
 
 
 class Light(Protocol):
     """Anything that can say what it leaves in a body."""
 
-    def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
-        """What this light leaves in a body of the given surface and medium."""
+    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+        """What this light leaves in a body.
+
+        Parameters
+        ----------
+        surface : Surface
+        medium : Medium
+            Of the body.
+        uniform : bool
+            Whether the body is of this medium throughout; otherwise paths are followed on its mesh.
+        """
         ...

@@ -1,10 +1,10 @@
 """Uniform diffuse light from all around."""
 
-import math
 from dataclasses import dataclass
 
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.lights.point import check_positive
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
@@ -32,12 +32,11 @@ class DiffuseLight:
     irradiance: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.irradiance) or self.irradiance <= 0:
-            raise InputError(f"irradiance is {self.irradiance:g}; give a number of W/unit² greater than 0.")
+        check_positive(self.irradiance, "irradiance", "W/unit²")
 
-    def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
+    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
         """What passes the surface; its power depends on the mesh's area, and is known when solved."""
-        del surface
+        del surface, uniform
         if medium.boundary != "exact":
             raise InputError(
                 'diffuse light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'

@@ -6,22 +6,26 @@ from typing import Literal
 
 import numpy as np
 
+from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.fresnel import reflectance
-from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.lights.point import as_vector, check_power
+from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
+from tetlux.fem.lights.deposit import Deposit, together
+from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
+from tetlux.fem.lights.spot import Disc
 from tetlux.fem.medium import Medium
+from tetlux.fem.paths import FAINTEST, Rays, beyond, follow
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
 
 # A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path
 # apart, up to the second number: closer than that, what they deposit runs together.
 RAYS = (127, 2000)
 # A beam that meets a surface at less than this, by the sine of the angle, meets its triangles and not their curve.
 GRAZING = 0.1
-# What a beam still carries after this many reflections at the inside, or below this share, stays put.
-REFLECTIONS = 64
-NEGLIGIBLE = 1e-12
+# A mesh's facets lie within this share of the body's diagonal from its surface.
+ASTRAY = 0.02
 
 
 @dataclass(frozen=True)
@@ -59,9 +63,8 @@ class PencilBeam:
 
     def __post_init__(self) -> None:
         as_vector(self.origin, "origin")
-        if not np.linalg.norm(as_vector(self.direction, "direction")) > 0:
-            raise InputError("direction is zero; give the direction in which the beam travels.")
-        check_power(self.power)
+        unit_vector(self.direction, "direction")
+        check_positive(self.power, "power", "watts")
         if not math.isfinite(self.radius) or self.radius < 0:
             raise InputError(f"radius is {self.radius:g}; give 0 or a length greater than 0.")
         if self.deposit not in ("point", "line"):
@@ -82,9 +85,7 @@ class PencilBeam:
             Their common unit direction.
         """
         origin = as_vector(self.origin, "origin")
-        direction = as_vector(self.direction, "direction")
-        direction = direction / np.abs(direction).max()  # its square may be out of range
-        direction /= np.linalg.norm(direction)
+        direction = unit_vector(self.direction, "direction")
         if self.radius == 0:
             return origin[None], direction
         # Vogel's sunflower pattern: equal areas, no two rays on one radius.
@@ -113,10 +114,12 @@ class PencilBeam:
             raise self._missed(surface)
         return np.asarray(origin + distances[0] * direction)
 
-    def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
+    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
-        origins, direction = self.rays(spacing=0.5 * medium.mean_free_path)
         self._check_outside(surface, as_vector(self.origin, "origin"))
+        if self.deposit == "line" and self.radius > 0:
+            return self._as_spot(surface, medium)
+        origins, direction = self.rays(spacing=0.5 * medium.mean_free_path)
         share = self.power / len(origins)
         parts = []
         for origin in origins:
@@ -125,29 +128,37 @@ class PencilBeam:
                 entry, normal = _on_curve(surface, origin + distances[0] * direction, faces[0], direction)
                 enter = _Entry.through(entry, direction, normal, medium.eta, share)
                 parts.append(
-                    _as_point(enter, surface, medium) if self.deposit == "point" else _as_line(enter, surface, medium)
+                    _as_point(enter, surface, medium)
+                    if self.deposit == "point"
+                    else _as_line(enter, surface, medium, uniform=uniform)
                 )
         if not parts:
             raise self._missed(surface)
-        deposit = _joined(parts)
+        deposit = together(parts)
         warnings = list(deposit.warnings)
         if len(parts) < len(origins):
-            warnings.append(
-                f"{1 - len(parts) / len(origins):.0%} of the beam's cross-section misses the body; "
-                "incident power counts the rest."
-            )
+            warnings.append(_partly_missed(1 - len(parts) / len(origins)))
         apart = self.radius * math.sqrt(math.pi / len(origins)) / medium.mean_free_path
         if apart > 1.0:
             warnings.append(
                 f"the beam is so wide that the {len(origins)} thin ones it is made of lie {apart:.2g} mean free paths "
                 "apart: its exitance is spotted close to where it enters."
             )
-        if self.deposit == "line" and self.radius == 0:
+        if self.deposit == "line":
             warnings.append(
                 "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
                 "or read its exitance a mean free path away."
             )
         return replace(deposit, warnings=tuple(dict.fromkeys(warnings)))
+
+    def _as_spot(self, surface: Surface, medium: Medium) -> Deposit:
+        spot = Disc(self.origin, self.radius)
+        beam = CollimatedBeam(self.direction, self.power / spot.area, spot, from_center=True)
+        entries = beam.entries(surface)
+        if len(entries) == 0:
+            raise self._missed(surface)
+        missed = 1.0 - len(entries) / (LOOKS + 1)
+        return replace(beam.deposit_in(surface, medium), warnings=(_partly_missed(missed),) if missed > 0 else ())
 
     def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
         if surface.contains(origin[None])[0]:
@@ -157,11 +168,9 @@ class PencilBeam:
             )
 
     def _missed(self, surface: Surface) -> InputError:
-        low, high = surface.points.min(axis=0), surface.points.max(axis=0)
-        spans = ", ".join(f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True))
         return InputError(
             f"the beam from {tuple(self.origin)} along {tuple(self.direction)} misses the body, which spans "
-            f"{spans} {surface.unit}; change its origin or direction."
+            f"{surface.extent}; change its origin or direction."
         )
 
 
@@ -229,56 +238,48 @@ def _as_point(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
     )
 
 
-def _as_line(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
-    """Follow the beam to the far side, and back and forth for what that reflects."""
+def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) -> Deposit:
+    """Through one medium to the far side at once; the rest, and several media, on the mesh."""
     scattering, _ = medium.delta_eddington
     extinction = medium.sigma_a + scattering
-    starts, directions, lengths, fluxes = [], [], [], []
-    point, direction, flux, ballistic = entry.point, entry.direction, entry.transmitted, 0.0
-    for _ in range(REFLECTIONS):
-        way_out = surface.exit(point, direction)
-        if way_out is None or flux <= NEGLIGIBLE * entry.incident:
-            break
-        length, face = way_out
-        starts.append(point)
-        directions.append(direction)
-        lengths.append(length)
-        fluxes.append(flux)
-        flux *= math.exp(-extinction * length)
-        normal = surface.normals[face]
-        point = point + length * direction
-        cosine = float(direction @ normal)
-        reflected = float(reflectance(cosine, medium.eta))
-        ballistic += (1.0 - reflected) * flux
-        flux *= reflected
-        direction = direction - 2.0 * cosine * normal
-    deposited = entry.transmitted - ballistic - flux
-    return Deposit(
-        incident=entry.incident,
-        specular=entry.specular,
-        # What is left after the last reflection stays where it is.
-        absorbed=deposited * medium.sigma_a / extinction + flux,
-        ballistic=ballistic,
-        starts=np.array(starts).reshape(-1, 3),
-        directions=np.array(directions).reshape(-1, 3),
-        lengths=np.array(lengths),
-        fluxes=np.array(fluxes),
-        resolution=0.5 / extinction,
+    start, direction, power = entry.point, entry.direction, entry.transmitted
+    known = Deposit(incident=entry.incident, specular=entry.specular, lit=start[None], resolution=0.5 / extinction)
+
+    def ray_on(mesh: TetMesh) -> Rays:
+        """The beam from where it meets a facet of the mesh."""
+        back = (start - ASTRAY * surface.diagonal * direction)[None]
+        distance, face = mesh.rays.first(back, direction[None])
+        met = face[0] >= 0 and distance[0] < 2.0 * ASTRAY * surface.diagonal
+        place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
+        return Rays(place, direction[None], np.array([power]))
+
+    if not uniform:
+        return replace(known, on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)))
+    way_out = surface.exit(start, direction)
+    length = way_out[0] if way_out else 0.0
+    end = power * math.exp(-extinction * length)
+    segment = replace(
+        known,
+        absorbed=(power - end) * medium.sigma_a / extinction,
+        starts=start[None],
+        directions=direction[None],
+        lengths=np.array([length]),
+        fluxes=np.array([power]),
     )
+    if end <= FAINTEST * power:
+        return replace(segment, absorbed=segment.absorbed + end)
+
+    def rest_on(mesh: TetMesh, _: Surface, coefficients: Coefficients) -> Deposit:
+        ray = ray_on(mesh)
+        distance, face = mesh.rays.first(ray.starts, ray.directions)
+        if face[0] < 0:
+            return Deposit(ballistic=end)
+        arrived = Rays(ray.starts + distance[:, None] * direction, ray.directions, np.array([end]))
+        rays, ballistic, specular = beyond(mesh, coefficients, arrived, face)
+        return together([Deposit(ballistic=ballistic, specular=specular), follow(mesh, coefficients, rays)])
+
+    return replace(segment, on_mesh=rest_on)
 
 
-def _joined(parts: list[Deposit]) -> Deposit:
-    return Deposit(
-        incident=sum(p.incident for p in parts),
-        specular=sum(p.specular for p in parts),
-        absorbed=sum(p.absorbed for p in parts),
-        ballistic=sum(p.ballistic for p in parts),
-        points=np.vstack([p.points for p in parts]),
-        powers=np.concatenate([p.powers for p in parts]),
-        starts=np.vstack([p.starts for p in parts]),
-        directions=np.vstack([p.directions for p in parts]),
-        lengths=np.concatenate([p.lengths for p in parts]),
-        fluxes=np.concatenate([p.fluxes for p in parts]),
-        resolution=min(p.resolution for p in parts),
-        warnings=tuple(w for p in parts for w in p.warnings),
-    )
+def _partly_missed(share: float) -> str:
+    return f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."

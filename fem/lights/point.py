@@ -20,10 +20,20 @@ def as_vector(value: Vector, name: str) -> FloatArray:
     return vector
 
 
-def check_power(power: float) -> None:
-    """Refuse a power that is not a positive number."""
-    if not math.isfinite(power) or power <= 0:
-        raise InputError(f"power is {power:g}; give a number of watts greater than 0.")
+def unit_vector(value: Vector, name: str) -> FloatArray:
+    """A direction of length 1, or an InputError that names it."""
+    vector = as_vector(value, name)
+    largest = np.abs(vector).max()
+    if not largest > 0:
+        raise InputError(f"{name} is zero; give the {name} in which the light travels.")
+    vector = vector / largest  # its square may be out of range
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def check_positive(value: float, name: str, unit: str) -> None:
+    """Refuse what is not a positive number."""
+    if not math.isfinite(value) or value <= 0:
+        raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.")
 
 
 @dataclass(frozen=True)
@@ -48,15 +58,15 @@ class PointSource:
 
     def __post_init__(self) -> None:
         as_vector(self.position, "position")
-        check_power(self.power)
+        check_positive(self.power, "power", "watts")
 
-    def deposit_in(self, surface: Surface, medium: Medium) -> Deposit:
+    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
         """All of its power at one point."""
+        del uniform
         position = as_vector(self.position, "position")
         if not surface.contains(position[None])[0]:
             raise InputError(
-                f"the point source at {_text(position)} lies outside the body, which spans "
-                f"{_text(surface.points.min(axis=0))} to {_text(surface.points.max(axis=0))} {surface.unit}; "
+                f"the point source at {_text(position)} lies outside the body, which spans {surface.extent}; "
                 "move it inside."
             )
         nearest, _ = surface.closest(position[None])

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem import DiffuseLight, Light, Medium, PointSource, Solution
+from tetlux.fem import CollimatedBeam, DiffuseLight, Light, Medium, PointSource, Solution
 from tetlux.fem.exact import cylinder as exact_cylinder
 from tetlux.fem.exact import slab as exact_slab
 from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.exact import sphere_light as exact_sphere_light
 from tetlux.meshing import Surface, cylinder, slab, sphere
 from tetlux.meshing.arrays import FloatArray
 
@@ -101,6 +102,18 @@ def furnace(name: str, medium: Medium) -> Scene:
     return Scene(name, scene.surface, medium, light, scene.points, scene.weights, truth)
 
 
+def lit_ball(name: str, medium: Medium, *, radius: float) -> Scene:
+    """Parallel light on a sphere; indices match."""
+    scene = ball(name, radius=radius, depth=radius, medium=medium)
+    share = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    # Evenly over the sphere.
+    gamma, around = np.arccos(1.0 - 2.0 * share), TURN * np.arange(SAMPLES)
+    out = np.column_stack([np.sin(gamma) * np.cos(around), np.sin(gamma) * np.sin(around), np.cos(gamma)])
+    truth = exact_sphere_light.beam_exitance(medium, radius=radius, gamma=gamma)
+    light = CollimatedBeam((0.0, 0.0, -1.0))
+    return Scene(name, scene.surface, medium, light, radius * out, np.ones(SAMPLES), truth)
+
+
 def turbid(albedo: float, eta: float = 1.4) -> Medium:
     """A medium of one mean free path per unit."""
     return Medium(sigma_a=1.0 - albedo, sigma_s_prime=albedo, eta=eta)
@@ -121,4 +134,9 @@ SCENES: dict[str, Callable[[str], Scene]] = {
     "slab of 3": lambda name: plate(name, thickness=3.0),
     "cylinder": rod,
     "sphere in diffuse light": lambda name: furnace(name, TISSUE),
+    "sphere of radius 10 in a beam": lambda name: lit_ball(name, turbid(0.99, 1.0), radius=10.0),
+    "sphere of radius 2 in a beam": lambda name: lit_ball(name, turbid(0.99, 1.0), radius=2.0),
+    "sphere in a beam, g .8": lambda name: lit_ball(
+        name, Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.0), radius=5.0
+    ),
 }

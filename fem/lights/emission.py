@@ -1,0 +1,49 @@
+"""Light that the volume itself emits: a glow, or a fluorescent dye."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.coefficients import Coefficients
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.lights.point import check_positive
+from tetlux.fem.medium import Medium
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+
+@dataclass(frozen=True)
+class Emission:
+    """An even isotropic emission of the whole body, or of one of its regions: ``Q0 = density``.
+
+    Parameters
+    ----------
+    density : float
+        W/unit³.
+    region : int, optional
+        Of this region only: 0 is the body without the regions in it, i the i-th of these.
+
+    Raises
+    ------
+    InputError
+        If the density is not positive; and, when solved, if there is no such region.
+    """
+
+    density: float
+    region: int | None = None
+
+    def __post_init__(self) -> None:
+        check_positive(self.density, "density", "W/unit³")
+
+    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+        """The same everywhere, or known on the mesh that has the region."""
+        del surface, medium, uniform
+        return Deposit(emission=self.density) if self.region is None else Deposit(on_mesh=self._on_mesh)
+
+    def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        del surface, coefficients
+        inside = mesh.regions == self.region
+        if not inside.any():
+            raise InputError(f"emission is of region {self.region}, and there is none; give one of the body's regions.")
+        return Deposit(emission=np.where(inside, self.density, 0.0))

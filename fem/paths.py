@@ -1,0 +1,200 @@
+"""Beams followed through the tetrahedra of a mesh: faded, reflected at the inside, let out, and met again.
+
+Rays refract and reflect at the mesh's own flat facets, whose tilt is right on average to second order in their size.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.coefficients import Coefficients, at_cells
+from tetlux.fem.fresnel import reflectance
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.cell_tree import Stretches
+from tetlux.meshing.surface import triangle_areas
+from tetlux.meshing.tetmesh import TetMesh
+
+# A beam is followed until it has faded to this share of the average ray's power; what is left stays where it is.
+FAINTEST = 1e-10
+# And through so many reflections and crossings of gaps.
+MOST_MEETINGS = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Thin beams.
+
+    Parameters
+    ----------
+    starts, directions : (r, 3) ndarray
+        Directions are unit vectors.
+    powers : (r,) ndarray
+        W.
+    """
+
+    starts: FloatArray
+    directions: FloatArray
+    powers: FloatArray
+
+    def __getitem__(self, some: object) -> "Rays":
+        return Rays(self.starts[some], self.directions[some], self.powers[some])  # type: ignore[index]
+
+
+def joined(parts: list[Rays]) -> Rays:
+    """All rays of several parts."""
+    return Rays(
+        np.vstack([np.zeros((0, 3)), *(part.starts for part in parts)]),
+        np.vstack([np.zeros((0, 3)), *(part.directions for part in parts)]),
+        np.concatenate([np.zeros(0), *(part.powers for part in parts)]),
+    )
+
+
+def entered(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
+    """Rays that met facets from outside, refracted by Snell's law, and the power that was reflected (Fresnel), W."""
+    cosine = np.clip(-np.einsum("ij,ij->i", rays.directions, normals), 0.0, 1.0)
+    lost = reflectance(cosine, 1.0 / eta)
+    inside = np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / eta**2, 0.0))
+    refracted = rays.directions / eta + (cosine / eta - inside)[:, None] * normals
+    refracted /= np.linalg.norm(refracted, axis=1, keepdims=True)
+    # From a denser medium into a thinner one nothing passes beyond the critical angle.
+    passed = lost < 1.0
+    specular = float(rays.powers @ lost)
+    return Rays(rays.starts, refracted, (1.0 - lost) * rays.powers)[passed], specular
+
+
+def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
+    """Optical depth at which each stretch begins, on its own path, (s,)."""
+    if np.ndim(extinction) == 0:
+        return np.asarray(extinction * part.enter)
+    depth = at_cells(extinction, cells) * (part.leave - part.enter)
+    order = np.lexsort((part.enter, part.paths))
+    total = np.cumsum(depth[order])
+    before = total - depth[order]
+    first = np.diff(part.paths[order], prepend=-1) > 0
+    before -= before[first][np.cumsum(first) - 1]
+    result = np.empty(len(before))
+    result[order] = before
+    return result
+
+
+def cells_of(
+    mesh: TetMesh, coefficients: Coefficients, part: Stretches, starts: FloatArray, directions: FloatArray
+) -> IntArray:
+    """The tetrahedron whose coefficients each stretch has: the nearest one where the stretch is outside the mesh."""
+    if coefficients.uniform:
+        return part.cells
+    cells = part.cells.copy()
+    lost = np.flatnonzero(cells < 0)
+    if len(lost):
+        paths, middle = part.paths[lost], 0.5 * (part.enter + part.leave)[lost]
+        places = starts[paths] + middle[:, None] * directions[paths]
+        cells[lost] = mesh.boundary_cells[mesh.closest_boundary(places)[1]]
+    return cells
+
+
+def _fade(mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatArray) -> tuple[FloatArray, float]:
+    """Power at the end of each path, and what is absorbed along all of them, W."""
+    extinction, sigma_a = coefficients.extinction, coefficients.sigma_a
+    if coefficients.uniform:
+        ends = rays.powers * np.exp(-extinction * lengths)
+        return ends, float(((rays.powers - ends) * sigma_a / extinction).sum())
+    depth, absorbed = np.zeros(len(lengths)), 0.0
+    for part in mesh.tree.cut(rays.starts, rays.directions, lengths):
+        cells = cells_of(mesh, coefficients, part, rays.starts, rays.directions)
+        here, step = at_cells(extinction, cells), part.leave - part.enter
+        carried = rays.powers[part.paths] * np.exp(-optical_depths(part, extinction, cells))
+        absorbed += float((carried * -np.expm1(-here * step) * at_cells(sigma_a, cells) / here).sum())
+        depth += np.bincount(part.paths, here * step, minlength=len(depth))
+    return rays.powers * np.exp(-depth), absorbed
+
+
+def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
+    """Follow beams that start just inside the boundary of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    coefficients : Coefficients
+    rays : Rays
+
+    Returns
+    -------
+    Deposit
+        Their segments, and what of their power was absorbed, left the body, or was reflected at it from outside.
+    """
+    faintest = FAINTEST * float(rays.powers.sum()) / max(len(rays.powers), 1)
+    # Nothing is left after so long a way.
+    longest = -np.log(FAINTEST) / float(np.min(coefficients.extinction))
+    segments, lengths_of, absorbed, ballistic, specular = [], [], 0.0, 0.0, 0.0
+    for _ in range(MOST_MEETINGS):
+        if len(rays.powers) == 0:
+            break
+        distances, met = mesh.rays.first(rays.starts, rays.directions)
+        # At the very rim of a facet a ray may be out before it was in.
+        slipped = met < 0
+        ballistic += float(rays.powers[slipped].sum())
+        rays, distances, met = rays[~slipped], distances[~slipped], met[~slipped]
+        lengths = np.minimum(distances, longest)
+        ends, lost = _fade(mesh, coefficients, rays, lengths)
+        absorbed += lost
+        segments.append(rays)
+        lengths_of.append(lengths)
+        going_on = (ends > faintest) & (lengths == distances)
+        absorbed += float(ends[~going_on].sum())
+        arrived = Rays(rays.starts + lengths[:, None] * rays.directions, rays.directions, ends)[going_on]
+        rays, gone, reflected = beyond(mesh, coefficients, arrived, met[going_on])
+        ballistic += gone
+        specular += reflected
+    absorbed += float(rays.powers.sum())
+    every = joined(segments)
+    return Deposit(
+        specular=specular,
+        absorbed=absorbed,
+        ballistic=ballistic,
+        starts=every.starts,
+        directions=every.directions,
+        lengths=np.concatenate([np.zeros(0), *lengths_of]),
+        fluxes=every.powers,
+    )
+
+
+def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArray) -> tuple[Rays, float, float]:
+    """What becomes of rays that meet boundary facets from inside.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    coefficients : Coefficients
+    arrived : Rays
+        They end on facets.
+    met : (r,) ndarray
+        These facets.
+
+    Returns
+    -------
+    rays : Rays
+        Reflected there, or let out and in again where they meet another part of the body.
+    ballistic, specular : float
+        Power that is gone, and that was reflected where rays came in again, W.
+    """
+    eta = coefficients.outer.eta
+    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
+    inner, outer = _at_boundary(arrived, normals[met], eta)
+    distances, hit = mesh.rays.first(outer.starts, outer.directions)
+    again = (hit >= 0) & (np.einsum("ij,ij->i", outer.directions, normals[hit]) < 0)
+    places = outer.starts + np.where(again, distances, 0.0)[:, None] * outer.directions
+    coming, specular = entered(Rays(places, outer.directions, outer.powers)[again], normals[hit[again]], eta)
+    return joined([inner, coming]), float(outer.powers[~again].sum()), specular
+
+
+def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Rays]:
+    """What of rays that meet the boundary from inside stays in, and what goes out."""
+    cosine = np.clip(np.einsum("ij,ij->i", rays.directions, normals), 0.0, 1.0)
+    reflected = reflectance(cosine, eta)
+    back = rays.directions - 2.0 * cosine[:, None] * normals
+    inner = Rays(rays.starts, back, reflected * rays.powers)[reflected > 0]
+    outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
+    out = eta * rays.directions + (outside - eta * cosine)[:, None] * normals
+    out /= np.linalg.norm(out, axis=1, keepdims=True)
+    return inner, Rays(rays.starts, out, (1.0 - reflected) * rays.powers)[reflected < 1]

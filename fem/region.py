@@ -1,0 +1,23 @@
+"""A part of a body that has a medium of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tetlux.fem.medium import Medium
+from tetlux.meshing.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """A closed surface within the body, or within another region, and what it holds.
+
+    Parameters
+    ----------
+    surface : Surface
+        Inside the body's.
+    medium : Medium or sequence of Medium
+        Of the refractive index of the body's; one for each of the body's where that is a sequence.
+    """
+
+    surface: Surface
+    medium: Medium | Sequence[Medium]
