@@ -5,12 +5,16 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
 Subtract = Literal["half-space", "free-space", "nothing"]
+
+# A beam without width is one segment and one for each of its reflections. Beams of more rays than this stay lines.
+MOST_LINES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +24,7 @@ class Sources:
     Attributes
     ----------
     deposits : tuple of Deposit
-        What each light leaves in the body.
+        What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
         The points among that, where these are subtracted.
     on_mesh : tuple of Deposit
@@ -49,18 +53,28 @@ def sources_of(lights: Sequence[Light], surface: Surface, medium: Medium, subtra
         raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    deposits = tuple(light.deposit_in(surface, medium) for light in lights)
+    deposits: list[Deposit] = []
     charges: list[Charges] = []
     on_mesh: list[Deposit] = []
     left = 0 if subtract == "nothing" else MOST_CHARGES
-    for deposit in deposits:
-        # As many as can be afforded: with images, or at least without.
-        for images in (True, False) if subtract == "half-space" else (False,):
-            if 0 < len(deposit.points) <= left:
-                some = charges_of(deposit.points, deposit.powers, surface, medium, images=images, most=left)
-                if some is not None:
-                    left -= len(some.positions)
-                    charges.append(some)
-                    deposit = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])  # noqa: PLW2901
-        on_mesh.append(deposit)
-    return Sources(deposits, tuple(charges), tuple(on_mesh))
+    images = subtract == "half-space"
+    for light in lights:
+        deposit = light.deposit_in(surface, medium)
+        no_points = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])
+        # As many as can be afforded: beams too and with images, or points alone, at least without.
+        trials = [(deposit, no_points, images), (deposit, no_points, False)]
+        if 0 < len(deposit.starts) <= MOST_LINES:
+            trials.insert(0, (*in_points(deposit, medium), images))
+        known, rest = deposit, deposit
+        for bright, faint, with_images in trials:
+            if not 0 < len(bright.points) <= left:
+                continue
+            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=left)
+            if some is not None:
+                left -= len(some.positions)
+                charges.append(some)
+                known, rest = bright, faint
+                break
+        deposits.append(known)
+        on_mesh.append(rest)
+    return Sources(tuple(deposits), tuple(charges), tuple(on_mesh))
