@@ -182,6 +182,8 @@ def test_only_beams_without_width_are_points(ball: Surface) -> None:
     assert len(one.deposits[0].starts) == 0
     assert one.deposits[0].resolution == FORWARD.mean_free_path
     assert len(other.charges) == 0
+    # Without images its rays' points could be afforded.
+    assert len(sources_of([wide], ball, FORWARD, "free-space").charges) == 0
     assert len(other.on_mesh[0].starts) >= 127
     plain = sources_of([thin], ball, FORWARD, "nothing")
     assert len(plain.charges) == 0
