@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
 from tetlux.meshing.errors import InputError
@@ -20,7 +21,7 @@ class Sources:
     Attributes
     ----------
     deposits : tuple of Deposit
-        What each light leaves in the body.
+        What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
         The points among that, where these are subtracted.
     owners : tuple of int
@@ -54,20 +55,30 @@ def sources_of(
         raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    deposits = tuple(light.deposit_in(surface, medium, uniform=uniform) for light in lights)
+    deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
     on_mesh: list[Deposit] = []
     left = 0 if subtract == "nothing" else MOST_CHARGES
-    for light, deposit in enumerate(deposits):
-        # As many as can be afforded: with images, or at least without.
-        for images in (True, False) if subtract == "half-space" else (False,):
-            if 0 < len(deposit.points) <= left:
-                some = charges_of(deposit.points, deposit.powers, surface, medium, images=images, most=left)
-                if some is not None:
-                    left -= len(some.positions)
-                    charges.append(some)
-                    owners.append(light)
-                    deposit = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])  # noqa: PLW2901
-        on_mesh.append(deposit)
-    return Sources(deposits, tuple(charges), tuple(owners), tuple(on_mesh))
+    images = subtract == "half-space"
+    for number, light in enumerate(lights):
+        deposit = light.deposit_in(surface, medium, uniform=uniform)
+        no_points = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])
+        # As many as can be afforded: beams too and with images, or points alone, at least without.
+        trials = [(deposit, no_points, images), (deposit, no_points, False)]
+        if len(deposit.starts):
+            trials.insert(0, (*in_points(deposit, medium), images))
+        known, rest = deposit, deposit
+        for bright, faint, with_images in trials:
+            if not 0 < len(bright.points) <= left:
+                continue
+            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=left)
+            if some is not None:
+                left -= len(some.positions)
+                charges.append(some)
+                owners.append(number)
+                known, rest = bright, faint
+                break
+        deposits.append(known)
+        on_mesh.append(rest)
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))

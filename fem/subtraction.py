@@ -11,6 +11,8 @@ Finite elements solve for the rest. G is used on a patch of tetrahedra only, tho
 the fluence is ``phi_h = u_h + (G - I_h G)`` there, with ``I_h G`` the linear interpolant: u_h has the fluence's own
 values at the nodes, and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G - I_h G, v)``,
 and ``a(G, v)`` is, by Gauss, the source's own load and integrals over the patch's faces alone.
+
+Beams without width are sums of such sources too, some of them negative: `tetlux.fem.line_charges`.
 """
 
 from dataclasses import dataclass, replace
@@ -229,7 +231,13 @@ class PatchTerms:
 
 def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
     """Where the charges are a good guess of a fluence (n,) at the nodes, (n,)."""
-    return np.asarray(np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes))
+    good = np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes)
+    charges = patch.charges
+    negative = charges.positions[: charges.sources][charges.strengths[: charges.sources] < 0]
+    if len(negative):
+        # Round them the charges' fluence passes through zero, and a share of that says nothing.
+        good |= cKDTree(negative).query(patch.mesh.points)[0] <= charges.medium.mean_free_path
+    return np.asarray(good)
 
 
 def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:

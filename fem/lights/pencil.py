@@ -243,7 +243,7 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) 
     scattering, _ = medium.delta_eddington
     extinction = medium.sigma_a + scattering
     start, direction, power = entry.point, entry.direction, entry.transmitted
-    known = Deposit(incident=entry.incident, specular=entry.specular, lit=start[None], resolution=0.5 / extinction)
+    known = Deposit(incident=entry.incident, specular=entry.specular, resolution=0.5 / extinction)
 
     def ray_on(mesh: TetMesh) -> Rays:
         """The beam from where it meets a facet of the mesh."""
@@ -254,7 +254,9 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) 
         return Rays(place, direction[None], np.array([power]))
 
     if not uniform:
-        return replace(known, on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)))
+        on_the_way = start + np.linspace(0.0, 4.0 / extinction, 9)[:, None] * direction
+        lit = on_the_way[surface.contains(on_the_way)]
+        return replace(known, lit=lit, on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)))
     way_out = surface.exit(start, direction)
     length = way_out[0] if way_out else 0.0
     end = power * math.exp(-extinction * length)
