@@ -182,7 +182,7 @@ def _pages(file: Path) -> list[tuple[str, npt.NDArray[np.generic]]]:
     from PIL import Image, ImageSequence  # noqa: PLC0415
 
     try:
-        # Of what a file cut short lacks, Pillow only warns at times.
+        # Of pages that a file cut short lacks, Pillow only warns.
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
             with Image.open(file) as image:
