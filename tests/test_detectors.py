@@ -131,6 +131,8 @@ def test_radiance_along_the_normal_and_from_behind(ball: Surface) -> None:
     seen = radiance(solution, [[0.0, 0.0, 10.0], [0.0, 0.0, -10.0]], [0.0, 0.0, 50.0])
     assert seen[0] == pytest.approx(4 * 1.4 / 2.4**2 * float(series(0.0)) / math.pi, rel=1e-4)
     assert seen[1] == 0.0
+    # Where indices match nothing is reflected, at no angle.
+    assert radiance(known(ball, eta=1.0), [[0.0, 0.0, -10.0]], [0.0, 0.0, 50.0])[0] == 0.0
     for points, viewer, message in (
         ([0.0, 0.0, 10.0], [0, 0, 50], r"points must be finite coordinates \(n, 3\)"),
         ([[0.0, 0.0, math.nan]], [0, 0, 50], "points must be finite"),

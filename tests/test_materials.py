@@ -26,7 +26,7 @@ REFLECTANCES = {
 
 
 def dipole_reflectance(medium: Medium) -> float:
-    """Jensen 2001, eq. 15 of its total diffuse reflectance, with the fit of A that it uses."""
+    """The total diffuse reflectance of the dipole (Jensen 2001), with the fit of A that it uses."""
     a = replace(medium, boundary="classic").boundary_factor
     q = math.sqrt(3.0 * (1.0 - medium.albedo))
     return 0.5 * medium.albedo * (1.0 + math.exp(-4.0 / 3.0 * a * q)) * math.exp(-q)
