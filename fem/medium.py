@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Literal
 
 from tetlux.fem.fresnel import boundary_factor_classic, boundary_factor_exact
+from tetlux.fem.phase import PhaseFunction
 from tetlux.meshing.errors import InputError
 
 Boundary = Literal["exact", "classic"]
@@ -15,7 +16,7 @@ Boundary = Literal["exact", "classic"]
 class Medium:
     """A homogeneous scattering medium.
 
-    Scattering is given either as `sigma_s_prime`, or as `sigma_s` together with `g`.
+    Scattering is given either as `sigma_s_prime`, or as `sigma_s` together with `g` or `phase`.
 
     Parameters
     ----------
@@ -29,6 +30,8 @@ class Medium:
         Scattering coefficient, 1/unit.
     g : float, optional
         Mean cosine of the scattering angle (CS667 notes, definition 1.9 iv), between -1 and 1.
+    phase : PhaseFunction, optional
+        How scattering distributes light over angles, see `tetlux.fem.phase`; g alone stands for Henyey-Greenstein's.
     boundary : {"exact", "classic"}
         How internal reflection enters the boundary factor A: by the Fresnel moments, or by the fit
         that the published dipole uses.
@@ -44,6 +47,7 @@ class Medium:
     sigma_s_prime: float | None = None
     sigma_s: float | None = None
     g: float | None = None
+    phase: PhaseFunction | None = None
     boundary: Boundary = "exact"
 
     def __post_init__(self) -> None:
@@ -66,18 +70,30 @@ class Medium:
             boundary_factor_classic(self.eta)
 
     def _check_scattering(self) -> None:
-        if self.sigma_s_prime is not None and (self.sigma_s is not None or self.g is not None):
-            other = "sigma_s" if self.sigma_s is not None else "g"
-            raise InputError(
-                f"{other} is given together with sigma_s_prime; give either sigma_s_prime, or sigma_s and g."
-            )
-        if self.sigma_s_prime is None:
-            if self.sigma_s is None:
-                raise InputError("scattering is missing; give either sigma_s_prime, or sigma_s and g.")
-            if self.g is None:
-                raise InputError("g is missing; sigma_s needs it (0 for isotropic scattering).")
-            if not -1 < self.g < 1:
-                raise InputError(f"g is {self.g:g}; it must be greater than -1 and less than 1.")
+        given = [name for name in ("sigma_s", "g", "phase") if getattr(self, name) is not None]
+        if self.sigma_s_prime is not None:
+            if given:
+                raise InputError(
+                    f"{given[0]} is given together with sigma_s_prime; "
+                    "give either sigma_s_prime, or sigma_s and g or a phase function."
+                )
+            return
+        if self.sigma_s is None:
+            raise InputError("scattering is missing; give either sigma_s_prime, or sigma_s and g or a phase function.")
+        if len(given) == 1:
+            raise InputError("g is missing; sigma_s needs it (0 for isotropic scattering), or a phase function.")
+        if len(given) == 3:
+            raise InputError("g is given together with phase, which has a mean cosine of its own; give one of them.")
+        if not -1 < self.mean_cosine < 1:
+            name = "g" if self.phase is None else "phase has a mean cosine that"
+            raise InputError(f"{name} is {self.mean_cosine:g}; it must be greater than -1 and less than 1.")
+
+    @cached_property
+    def mean_cosine(self) -> float:
+        """Mean cosine of the scattering angle; 0 for a medium given by sigma_s' alone, which counts as isotropic."""
+        if self.phase is not None:
+            return self.phase.mean_cosine
+        return 0.0 if self.g is None else self.g
 
     @cached_property
     def reduced_scattering(self) -> float:
@@ -85,8 +101,7 @@ class Medium:
         if self.sigma_s_prime is not None:
             return self.sigma_s_prime
         assert self.sigma_s is not None
-        assert self.g is not None
-        return (1.0 - self.g) * self.sigma_s
+        return (1.0 - self.mean_cosine) * self.sigma_s
 
     @property
     def sigma_t_prime(self) -> float:
@@ -129,11 +144,15 @@ class Medium:
     def delta_eddington(self) -> tuple[float, float]:
         """Scattering coefficient and mean cosine with the forward peak taken out (Joseph 1976).
 
-        ``sigma_s* = sigma_s (1 - g²)`` and ``g* = g/(1 + g)``; a medium given by sigma_s' alone counts
-        as isotropic. For g < 0 there is no forward peak, and both stay as they are.
+        ``sigma_s* = sigma_s (1 - f)`` and ``g* = (g - f)/(1 - f)``, which keep sigma_s'. The share f of the peak is the
+        phase function's second Legendre moment: ``g²`` for Henyey-Greenstein's, so that ``g* = g/(1 + g)``. It is
+        never below 0, nor so large that what is left scatters backward: for g < 0 there is no forward peak, and both
+        stay as they are; and an f above g, of two lobes say, is backward scattering too, and f = g is taken. A medium
+        given by sigma_s' alone counts as isotropic.
         """
-        if self.sigma_s is None or self.g is None:
+        if self.sigma_s is None:
             return self.reduced_scattering, 0.0
-        if self.g < 0:
-            return self.sigma_s, self.g
-        return self.sigma_s * (1.0 - self.g**2), self.g / (1.0 + self.g)
+        g = self.mean_cosine
+        second = g**2 if self.phase is None else self.phase.second_moment
+        peak = min(max(second, 0.0), max(g, 0.0))
+        return self.sigma_s * (1.0 - peak), (g - peak) / (1.0 - peak)

@@ -1,0 +1,200 @@
+"""Coefficients that vary in space, from files: tetrahedra with values, stacks of images, and arrays."""
+
+import re
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.fem.fields import grid_field, mesh_field
+from tetlux.fem.varying import Field
+from tetlux.meshing.arrays import Vector
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+
+if TYPE_CHECKING:
+    import meshio
+
+IMAGES = (".png", ".tif", ".tiff")
+# White of the grey images that Pillow reads, by their mode.
+WHITE = {"1": 1, "L": 255, "I;16": 65535, "I;16B": 65535}
+
+
+def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field:
+    """A field from values at the nodes or in the tetrahedra of a volume mesh.
+
+    Parameters
+    ----------
+    path : str or Path
+        VTU.
+    name : str
+        Of the array of values; of two that share it, the one at the nodes.
+    scale : float
+        Factor on the file's coordinates.
+
+    Returns
+    -------
+    Field
+        See `tetlux.fem.fields.mesh_field`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or unreadable, holds no tetrahedra or no such array, or a value is not finite.
+    """
+    path = _existing(path, (".vtu",))
+    if not np.isfinite(scale) or scale <= 0:
+        raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
+    data = _read_mesh(path)
+    blocks = [number for number, block in enumerate(data.cells) if block.type == "tetra"]
+    if not blocks:
+        raise InputError(f"{path} holds no tetrahedra; give a tetrahedral mesh.")
+    if name not in data.point_data and name not in data.cell_data:
+        known = ", ".join(dict.fromkeys([*data.point_data, *data.cell_data])) or "none"
+        raise InputError(f'{path} holds no array "{name}"; the arrays there are: {known}.')
+    points = scale * np.asarray(data.points, dtype=np.float64)
+    tetrahedra = np.vstack([data.cells[block].data for block in blocks]).astype(np.int64)
+    negative = tetrahedron_volumes(points, tetrahedra) < 0
+    tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
+    # Nodes of other cells, whose values may be anything, are left out.
+    used, compact = np.unique(tetrahedra, return_inverse=True)
+    try:
+        mesh = TetMesh(points[used], compact.reshape(tetrahedra.shape))
+        if name in data.point_data:
+            return mesh_field(mesh, data.point_data[name][used], at="nodes")
+        values = np.concatenate([data.cell_data[name][block] for block in blocks])
+        return mesh_field(mesh, values, at="tetrahedra")
+    except InputError as error:
+        raise InputError(f'{path}, array "{name}": {error}') from error
+
+
+def read_image_field(
+    path: str | Path, *, origin: Vector, spacing: float | Vector, values: tuple[float, float]
+) -> Field:
+    """A field from a stack of grey images.
+
+    Columns run along x, rows along y (the first row has the smallest y), and slices along z.
+
+    Parameters
+    ----------
+    path : str or Path
+        A folder of PNG or TIFF images, taken in the order of their names, where 2 comes before 10; or one file, all
+        of its pages.
+    origin : (3,) floats
+        Middle of the first slice's first pixel, unit.
+    spacing : float or (3,) floats
+        Width of a pixel, its height, and the distance of slices, unit.
+    values : (2,) floats
+        What black and white stand for; greys lie between, in proportion.
+
+    Returns
+    -------
+    Field
+        See `tetlux.fem.fields.grid_field`.
+
+    Raises
+    ------
+    InputError
+        If an image is missing, unreadable or not grey, or they differ in size or depth.
+    """
+    path = Path(path)
+    if path.is_dir():
+        files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=_in_order)
+        if not files:
+            raise InputError(f"{path} holds no images; give a folder of PNG or TIFF slices.")
+    else:
+        files = [_existing(path, IMAGES)]
+    low, high = np.asarray(values, dtype=float)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        raise InputError(f"values are {values}; give two finite numbers, what black and white stand for.")
+    slices: list[npt.NDArray[np.float32]] = []
+    first = ""
+    for file in files:
+        for mode, pixels in _pages(file):
+            rows, columns = pixels.shape
+            kind = f"{columns} x {rows} pixels, mode {mode}"
+            first = first or kind
+            if kind != first:
+                raise InputError(f"{file} has {kind}, and {files[0]} has {first}; slices must be alike.")
+            slices.append((low + (high - low) / WHITE[mode] * pixels).astype(np.float32))
+    # Rows and columns of a picture are y and x.
+    try:
+        return grid_field(np.stack(slices).transpose(2, 1, 0), origin=origin, spacing=spacing)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vector) -> Field:
+    """A field from a three-dimensional NumPy array.
+
+    Parameters
+    ----------
+    path : str or Path
+        An .npy file of values ``[x, y, z]``.
+    origin : (3,) floats
+        Middle of the first voxel, unit.
+    spacing : float or (3,) floats
+        Distance between neighbouring values, unit.
+
+    Returns
+    -------
+    Field
+        See `tetlux.fem.fields.grid_field`.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or unreadable, or its array not three-dimensional, real and finite.
+    """
+    path = _existing(path, (".npy",))
+    try:
+        values = np.load(path, allow_pickle=False)
+    except Exception as error:  # NumPy raises whatever its parsing ran into
+        raise InputError(f"{path} is not a readable array of numbers; save it again with numpy.save.") from error
+    try:
+        return grid_field(values, origin=origin, spacing=spacing)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path} does not exist or is no file; check its path.")
+    if path.suffix.lower() not in suffixes:
+        raise InputError(f'{path}: "{path.suffix}" files are not read here; give {" or ".join(suffixes)}.')
+    return path
+
+
+def _read_mesh(path: Path) -> "meshio.Mesh":
+    import meshio  # noqa: PLC0415
+
+    try:
+        return meshio.read(path, file_format="vtu")
+    except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
+        raise InputError(f"{path} is not a readable VTU mesh; export it again.") from error
+
+
+def _pages(file: Path) -> list[tuple[str, npt.NDArray[np.generic]]]:
+    """Pages of a grey image file: their mode, as Pillow calls it, and pixels (rows, columns)."""
+    from PIL import Image, ImageSequence  # noqa: PLC0415
+
+    try:
+        # Of pages that a file cut short lacks, Pillow only warns.
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)
+            with Image.open(file) as image:
+                pages = [(page.mode, np.asarray(page)) for page in ImageSequence.Iterator(image)]
+    except Exception as error:  # Pillow raises whatever its decoders ran into
+        raise InputError(f"{file} is not a readable image; export it again as PNG or TIFF.") from error
+    for mode, _ in pages:
+        if mode not in WHITE:
+            raise InputError(f"{file} is not a grey image of 8 or 16 bits (its mode is {mode}); convert it.")
+    return pages
+
+
+def _in_order(file: Path) -> list[tuple[int, str]]:
+    """Names by letters, and by number where they have one."""
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", file.name)]

@@ -1,0 +1,198 @@
+"""Detectors on the surface: what they read of a solution."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.lights.point import as_vector
+from tetlux.fem.radiance import collected_share
+from tetlux.fem.solution import Solution
+from tetlux.fem.varying import as_text
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.errors import InputError
+
+# How far from the surface a point may be, as a share of the body's diagonal.
+FARTHEST = 0.05
+# How far from a flat disc the surface may run, as a share of its radius: on a sphere, a disc of half its radius.
+FLATNESS = 0.25
+# Circles of a disc, and points on each: Gauss points in the square of the radius, so that areas come out equal.
+CIRCLES, SPOKES = 16, 32
+
+
+@dataclass(frozen=True)
+class PointDetector:
+    """Reads the exitance at one point.
+
+    Parameters
+    ----------
+    position : (3,) floats
+        Taken to the nearest point of the surface, unit.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite.
+    """
+
+    position: Vector
+
+    def __post_init__(self) -> None:
+        as_vector(self.position, "position")
+
+
+@dataclass(frozen=True)
+class DiscDetector:
+    """Reads what leaves through a round patch, at any angle.
+
+    Parameters
+    ----------
+    center : (3,) floats
+        Taken to the nearest point of the surface, unit; the disc is flat and touches the surface there.
+    radius : float
+        unit.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or the radius not greater than 0.
+    """
+
+    center: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        as_vector(self.center, "center")
+        if not math.isfinite(self.radius) or self.radius <= 0:
+            raise InputError(f"radius is {self.radius:g}; give a length greater than 0.")
+
+
+@dataclass(frozen=True)
+class FibreDetector(DiscDetector):
+    """Reads what a fibre collects that stands on the surface, at right angles to it.
+
+    Parameters
+    ----------
+    center : (3,) floats
+        Taken to the nearest point of the surface, unit.
+    radius : float
+        Of the fibre's core, unit.
+    numerical_aperture : float
+        Sine of the largest angle to the fibre that it accepts, in the outside medium: greater than 0, up to 1.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite, the radius not greater than 0 or the aperture out of range.
+    """
+
+    numerical_aperture: float
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.numerical_aperture <= 1:
+            raise InputError(
+                f"numerical_aperture is {self.numerical_aperture:g}; it must be greater than 0 and at most 1."
+            )
+
+
+Detector = PointDetector | DiscDetector | FibreDetector
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a detector reads.
+
+    Attributes
+    ----------
+    position : (3,) floats
+        Where on the surface it is, unit.
+    normal : (3,) floats
+        Outward unit normal there.
+    exitance : float
+        At the point, or the mean over the disc, W/unit².
+    area : float or None
+        Of the flat disc, unit²; None for a point.
+    power : float or None
+        Exitance times area, and for a fibre the share of it within its aperture, W; None for a point.
+    """
+
+    position: Vector
+    normal: Vector
+    exitance: float
+    area: float | None = None
+    power: float | None = None
+
+
+def read(detector: Detector, solution: Solution) -> Reading:
+    """Read a detector.
+
+    A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
+    the disc's. A fibre collects the radiance ``F_t(eta, theta) M/pi`` up to the angle whose sine is its aperture, see
+    `tetlux.fem.radiance`; it changes nothing of the light that it reads.
+
+    Parameters
+    ----------
+    detector : PointDetector, DiscDetector or FibreDetector
+    solution : Solution
+
+    Returns
+    -------
+    Reading
+
+    Raises
+    ------
+    InputError
+        If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
+        radius; or if the surface is not flat enough for the disc, or ends under it.
+    """
+    if isinstance(detector, PointDetector):
+        reach = FARTHEST * solution.surface.diagonal
+        place, normal = _on_surface(solution, "position", detector.position, reach, f"{FARTHEST:.0%} of the diagonal")
+        return Reading(_vector(place), _vector(normal), float(solution.exitance_on(place[None])[0]))
+    place, normal = _on_surface(solution, "center", detector.center, detector.radius, "its radius")
+    flat = place + detector.radius * _unit_disc(normal)
+    points, _ = solution.surface.project(flat)
+    gap = float(np.linalg.norm(points - flat, axis=1).max())
+    if gap > FLATNESS * detector.radius:
+        raise InputError(
+            f"the disc of radius {detector.radius:.3g} at {as_text(place)} does not lie on the surface, which bends "
+            f"away or ends {gap:.3g} {solution.surface.unit} from it; make it smaller or move it."
+        )
+    weights = np.repeat(np.polynomial.legendre.leggauss(CIRCLES)[1], SPOKES) / (2.0 * SPOKES)
+    exitance, area = float(weights @ solution.exitance_on(points)), math.pi * detector.radius**2
+    share = 1.0
+    if isinstance(detector, FibreDetector):
+        share = collected_share(solution.medium.eta, detector.numerical_aperture)
+    return Reading(_vector(place), _vector(normal), exitance, area, share * exitance * area)
+
+
+def _on_surface(solution: Solution, name: str, given: Vector, reach: float, what: str) -> tuple[FloatArray, FloatArray]:
+    """The nearest point of the surface and the normal there, unless it is out of reach."""
+    wanted = as_vector(given, name)
+    (place,), (normal,) = solution.surface.project(wanted[None])
+    away = float(np.linalg.norm(wanted - place))
+    if away > reach:
+        raise InputError(
+            f"the detector's {name} {as_text(wanted)} is {away:.3g} {solution.surface.unit} from the surface, more "
+            f"than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
+        )
+    return place, normal
+
+
+def _unit_disc(normal: FloatArray) -> FloatArray:
+    """Points (CIRCLES * SPOKES, 3) of the unit disc across a normal, circle by circle."""
+    radius = np.sqrt(0.5 * (np.polynomial.legendre.leggauss(CIRCLES)[0] + 1.0))
+    # Every other circle is turned, so that points do not line up.
+    turn = 0.5 * (np.arange(CIRCLES) % 2)
+    angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + turn[:, None])
+    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    across /= np.linalg.norm(across)
+    up = np.cross(normal, across)
+    spread = np.cos(angle)[:, :, None] * across + np.sin(angle)[:, :, None] * up
+    return np.asarray((radius[:, None, None] * spread).reshape(-1, 3))
+
+
+def _vector(values: FloatArray) -> Vector:
+    x, y, z = values.tolist()
+    return x, y, z

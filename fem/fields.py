@@ -1,0 +1,147 @@
+"""Fields known at the points of a grid or on a mesh of tetrahedra, and interpolated between."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import map_coordinates
+
+from tetlux.fem.varying import Field, as_text
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.tetmesh import TetMesh
+
+# Two meshes of one curved body differ by about this share of its diagonal: so far outside, the nearest value holds.
+MARGIN = 0.01
+# A point on the rim of a grid, rounded, is still on it: in spacings.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    values: FloatArray | npt.NDArray[np.float32]
+    origin: FloatArray
+    spacing: FloatArray
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        place = (points - self.origin) / self.spacing
+        counts = np.array(self.values.shape)
+        covered = ((place >= -0.5 - ROUNDING) & (place <= counts - 0.5 + ROUNDING)).all(axis=1)
+        if not covered.all():
+            low, high = self.origin - 0.5 * self.spacing, self.origin + (counts - 0.5) * self.spacing
+            raise InputError(
+                f"the grid from {as_text(low)} to {as_text(high)} does not cover the body: at "
+                f"{as_text(points[np.argmin(covered)])} it has no value; check its origin, spacing and unit."
+            )
+        # "nearest" is what holds in the outer half of the outermost voxels.
+        return np.asarray(map_coordinates(self.values, place.T, output=np.float64, order=1, mode="nearest"))
+
+
+def grid_field(values: npt.ArrayLike, *, origin: Vector, spacing: float | Vector) -> Field:
+    """A field from values on a regular grid, trilinear between them.
+
+    A value belongs to the middle of its voxel; the grid covers its outermost voxels to their far sides, with the
+    outermost values.
+
+    Parameters
+    ----------
+    values : (nx, ny, nz) array_like
+        Value ``[i, j, k]`` is at ``origin + (i, j, k) * spacing``.
+    origin : (3,) floats
+        Middle of the first voxel, unit.
+    spacing : float or (3,) floats
+        Distance between neighbouring values, unit.
+
+    Returns
+    -------
+    Field
+        It raises InputError at points that the grid does not cover.
+
+    Raises
+    ------
+    InputError
+        If the values are not a three-dimensional array of finite numbers, or origin or spacing are wrong.
+    """
+    array = _finite(values, "the grid")
+    if array.ndim != 3 or array.size == 0:
+        raise InputError(f"a grid needs values along x, y and z, and has the shape {array.shape}.")
+    start = np.asarray(origin, dtype=float)
+    if start.shape != (3,) or not np.isfinite(start).all():
+        raise InputError(f"origin is {origin}; give three finite coordinates, the middle of the first voxel.")
+    step = np.asarray(spacing, dtype=float)
+    if step.shape not in ((), (3,)) or not (np.isfinite(step) & (step > 0)).all():
+        raise InputError(f"spacing is {spacing}; give one length greater than 0, or three.")
+    return _Grid(array, start, np.broadcast_to(step, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class _OnMesh:
+    mesh: TetMesh
+    values: FloatArray | npt.NDArray[np.float32]
+    at: Literal["nodes", "tetrahedra"]
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        cells, weights = self.mesh.locate(points)
+        lost = np.flatnonzero(cells < 0)
+        if len(lost):
+            nearest, faces, _ = self.mesh.closest_boundary(points[lost])
+            distance = np.linalg.norm(nearest - points[lost], axis=1)
+            if distance.max() > MARGIN * self.mesh.diagonal:
+                worst = int(distance.argmax())
+                raise InputError(
+                    f"the mesh of the values does not cover the body: at {as_text(points[lost[worst]])} it has no "
+                    f"value, {distance[worst]:.3g} {self.mesh.unit} outside; check its coordinates and unit."
+                )
+            cells[lost] = self.mesh.boundary_cells[faces]
+            weights[lost] = self.mesh.barycentric(nearest, cells[lost])
+        if self.at == "tetrahedra":
+            return self.values[cells].astype(np.float64)
+        # Rounding may put a weight below 0, and the value below all values.
+        weights = weights.clip(0.0)
+        weights /= weights.sum(axis=1, keepdims=True)
+        return np.asarray((weights * self.values[self.mesh.tetrahedra[cells]]).sum(axis=1))
+
+
+def mesh_field(mesh: TetMesh, values: npt.ArrayLike, *, at: Literal["nodes", "tetrahedra"] = "nodes") -> Field:
+    """A field from values on a mesh of tetrahedra.
+
+    Points outside it by less than a hundredth of its diagonal, between a curved body and its facets, take the value
+    of the nearest point of the mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    values : (n,) or (m,) array_like
+        At the nodes, linear between them; or one for each tetrahedron.
+    at : {"nodes", "tetrahedra"}
+        What the values belong to.
+
+    Returns
+    -------
+    Field
+        It raises InputError at points that the mesh does not cover.
+
+    Raises
+    ------
+    InputError
+        If there is not one finite value for each node or tetrahedron.
+    """
+    if at not in ("nodes", "tetrahedra"):
+        raise InputError(f'values are at "{at}"; they are at "nodes" or "tetrahedra".')
+    count = len(mesh.points) if at == "nodes" else len(mesh.tetrahedra)
+    array = _finite(values, "the mesh")
+    if array.shape != (count,):
+        raise InputError(f"a mesh of {count} {at} needs as many values, and not an array of shape {array.shape}.")
+    return _OnMesh(mesh, array, at)
+
+
+def _finite(values: npt.ArrayLike, what: str) -> FloatArray | npt.NDArray[np.float32]:
+    array = np.asarray(values)
+    if array.dtype.kind not in "buif":
+        raise InputError(f"the values of {what} are of type {array.dtype}; give real numbers.")
+    bad = array.size - int(np.isfinite(array).sum())
+    if bad:
+        raise InputError(f"{bad} of {array.size} values of {what} are not finite; give a number at each place.")
+    # Half the memory for what was given so: image stacks are large.
+    return array if array.dtype == np.float32 else array.astype(np.float64)

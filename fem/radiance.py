@@ -1,0 +1,74 @@
+"""The light that leaves the surface in one direction.
+
+Outside, diffuse light of exitance M has the radiance ``L = F_t(eta, theta) M/pi``, with Fresnel's transmittance on the
+way out (Jensen 2001, eq. 5). Over all directions that adds up to ``collected_share(eta, 1) M``: to the M that leaves
+where indices match, but to 0.934 of it at an index of 1.33 and 0.908 at 1.5, because M has passed the boundary already.
+Divide by that share for a radiance that adds up to M.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.fem.fresnel import reflectance
+from tetlux.fem.solution import Solution
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+
+
+def radiance(solution: Solution, points: npt.ArrayLike, viewer: npt.ArrayLike) -> FloatArray:
+    """Radiance that leaves the surface towards a viewer.
+
+    What of the body stands in between is not looked at, nor what the surface reflects.
+
+    Parameters
+    ----------
+    solution : Solution
+    points : (n, 3) array_like
+        Taken to the nearest points of the surface.
+    viewer : (3,) or (n, 3) array_like
+        Where it is seen from: one place, or one for each point.
+
+    Returns
+    -------
+    (n,) ndarray
+        W/(unit² sr), 0 where the surface faces away.
+
+    Raises
+    ------
+    InputError
+        If coordinates are not finite or do not go together.
+    """
+    wanted, eye = np.asarray(points, dtype=float), np.asarray(viewer, dtype=float)
+    if wanted.ndim != 2 or wanted.shape[1] != 3 or not np.isfinite(wanted).all():
+        raise InputError("points must be finite coordinates (n, 3).")
+    if eye.shape not in ((3,), wanted.shape) or not np.isfinite(eye).all():
+        raise InputError("viewer must be three finite coordinates, or three for each point.")
+    places, normals = solution.surface.project(wanted)
+    towards = eye - places
+    distance = np.linalg.norm(towards, axis=1)
+    cosine = np.einsum("ij,ij->i", towards, normals) / np.where(distance > 0, distance, 1.0)
+    seen = (1.0 - reflectance(cosine, 1.0 / solution.medium.eta)) * (cosine > 0)
+    return np.asarray(seen * solution.exitance_on(places) / np.pi)
+
+
+def collected_share(eta: float, numerical_aperture: float) -> float:
+    """Share of the exitance that leaves within a cone round the normal: ``2 ∫ F_t(eta, theta) cos sin dtheta``.
+
+    Parameters
+    ----------
+    eta : float
+        Refractive index of the medium relative to the outside.
+    numerical_aperture : float
+        Sine of the cone's half angle outside, from 0 to 1.
+
+    Returns
+    -------
+    float
+    """
+    # For eta < 1 no light leaves beyond the critical angle, before which F_t falls like a square root:
+    # mu = low + (1 - low) t² takes that away.
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    low = np.sqrt(max(1.0 - min(numerical_aperture, eta) ** 2, 0.0))
+    t, w = 0.5 * (nodes + 1.0), 0.5 * weights
+    mu = low + (1.0 - low) * t**2
+    return float(2.0 * (w * 2.0 * (1.0 - low) * t * mu) @ (1.0 - reflectance(mu, 1.0 / eta)))
