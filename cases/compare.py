@@ -102,7 +102,7 @@ def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], 
         if name not in known:
             have = f"for a {kind} there is {', '.join(known)}" if known else f"there is none for a {kind}"
             raise InputError(f'"{name}" is no closed form here; {have}.')
-    if any(len(d.starts) or d.irradiance for d in deposits):
+    if any(len(d.points) == 0 or len(d.starts) or d.on_mesh is not None for d in deposits):
         raise InputError(
             'closed forms here are those of point sources; give pencil beams deposit: "point", and no diffuse light.'
         )
