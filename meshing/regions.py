@@ -108,14 +108,16 @@ def _touches_inside(inner: Surface, body: Surface, name: str, body_name: str, ne
     if place is None and len(sides.answers) == 0:
         raise InputError(f"{name} is the whole body; give its medium to the body and leave it out.")
     if place is None and not sides.answers.any():
-        around = _written(inner.points.mean(axis=0))
+        around = _written(inner.points.mean(axis=0), near)
+        if _inside(body, inner, near).answers.any():
+            raise InputError(f"{name} holds {body_name} and not the other way round; exchange or shrink it.")
         raise InputError(f"{name} lies outside {body_name}, around {around}; move it inside, or leave it out.")
     if place is None and not sides.answers.all():
         place = sides.places[~sides.answers][0]
     if place is not None:
         raise InputError(
-            f"{name} crosses the surface of {body_name} around {_written(place)}; move or shrink it until it lies "
-            "inside."
+            f"{name} crosses the surface of {body_name} around {_written(place, near)}; "
+            "move or shrink it until it lies inside."
         )
     return sides.touches or bool(_on(body.points, inner, near).any())
 
@@ -131,14 +133,14 @@ def _pair(first: Surface, second: Surface, name: str, other_name: str, near: flo
             place = sides.places[sides.answers][0]
     if place is not None:
         raise InputError(
-            f"{name} and {other_name} cross each other around {_written(place)}; "
+            f"{name} and {other_name} cross each other around {_written(place, near)}; "
             "move them apart, or put one wholly inside the other."
         )
     return one, other
 
 
-def _written(place: FloatArray) -> str:
-    return f"({', '.join(f'{x:.4g}' for x in place)})"
+def _written(place: FloatArray, near: float) -> str:
+    return f"({', '.join(f'{x:.4g}' for x in np.round(place / near) * near + 0.0)})"
 
 
 def _box(surface: Surface) -> tuple[FloatArray, FloatArray]:
