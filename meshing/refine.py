@@ -16,7 +16,7 @@ from tetlux.meshing.tetmesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_v
 SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
 # A node on two surfaces goes to one and the other in turn so often, which ends where they meet.
-ROUNDS = 5
+ROUNDS = 10
 # The edges of a tetrahedron, and of each of its faces.
 _GROUPS = [list(range(6)), *EDGES_OF_FACES.tolist()]
 # Even permutations of the corners that put each edge first, and where they put the edges.

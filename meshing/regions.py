@@ -18,14 +18,14 @@ from tetlux.meshing.blocks import grouped
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface import Surface
-from tetlux.meshing.tetmesh import FACES, TetMesh
+from tetlux.meshing.tetmesh import FACES, TetMesh, tetrahedron_volumes
 
 # Surfaces nearer than this share of the body's diagonal touch: files round at about a tenth of it.
 TOUCH = 1e-6
 # Places of a surface that are asked on which side of another they lie; without a crossing one would do.
 LOOKS = 64
-# Tetrahedra of a compartment that are asked whether they lie in a region; and the share that may answer otherwise
-# than the rest, because their middles lie between the surface and what the mesher made of it.
+# Tetrahedra of a compartment that are asked whether they lie in a region; and the share of a volume that may answer
+# otherwise than the rest, because their middles lie between the surface and what the mesher made of it.
 ASKED = 500
 DISSENT = 0.1
 # The mesher writes its walls with seven digits, for a body of unit size.
@@ -265,30 +265,31 @@ def tagged(
         These as the mesher got them.
     """
     compartment = _compartments(points, tetrahedra, walls, SAME_NODE * surface.diagonal)
-    middles = points[tetrahedra].mean(axis=1)
-    inside = _held(middles, compartment, surface)
+    middles, volumes = points[tetrahedra].mean(axis=1), tetrahedron_volumes(points, tetrahedra)
+    inside = _held(middles, volumes, compartment, surface)
     result = np.where(inside, 0, -1)
     for i in by_volume(regions):
-        result[inside & _held(middles, compartment, regions[i - 1])] = i
+        result[inside & _held(middles, volumes, compartment, regions[i - 1])] = i
     return result
 
 
-def _held(middles: FloatArray, compartment: IntArray, surface: Surface) -> BoolArray:
-    """Whether each tetrahedron, of that middle (m, 3) and compartment (m,), lies inside a surface."""
+def _held(middles: FloatArray, volumes: FloatArray, compartment: IntArray, surface: Surface) -> BoolArray:
+    """Whether each tetrahedron, of that middle (m, 3), volume (m,) and compartment (m,), lies inside a surface."""
     low, high = _box(surface)
     near = np.flatnonzero(((middles >= low) & (middles <= high)).all(axis=1))
     near = near[np.argsort(compartment[near], kind="stable")]
     starts = np.flatnonzero(np.diff(compartment[near], prepend=-1))
-    sizes = np.bincount(compartment)
+    sizes = np.bincount(compartment, volumes)
     result = np.zeros(len(middles), dtype=bool)
     for those in np.split(near, starts[1:]):
         if len(those) == 0:
             continue
-        share = float(surface.contains(middles[those[_evenly(len(those), ASKED)]]).mean())
         own = compartment[those[0]]
-        if share >= 1.0 - DISSENT and len(those) >= (1.0 - DISSENT) * sizes[own]:
+        share = surface.contains(middles[those[_evenly(len(those), ASKED)]]).mean()
+        held = float(share * volumes[those].sum())
+        if held >= (1.0 - DISSENT) * sizes[own]:
             result[compartment == own] = True
-        elif share > DISSENT:
+        elif held > DISSENT * surface.volume:
             # A gap in the walls has made one compartment of two.
             result[those] = surface.contains(middles[those])
     return result
@@ -327,9 +328,9 @@ def nodes_of(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> lis
     """
     boundary = np.zeros(len(mesh.points), dtype=bool)
     boundary[mesh.boundary_nodes] = True
-    faces, pairs = mesh.interfaces
-    if len(faces) == 0 or len(regions) == 0:
+    if len(regions) == 0 or len(mesh.interfaces[0]) == 0:
         return [(surface, boundary)]
+    faces, pairs = mesh.interfaces
     if int(pairs.max()) > len(regions):
         raise InputError(
             f"the mesh has a region {int(pairs.max())}, and {len(regions)} inner surfaces are given; "

@@ -156,20 +156,17 @@ class TetMesh:
         regions : (f, 2) ndarray
             The regions on either side, the smaller number first.
         """
-        nodes = np.zeros(len(self.points), dtype=np.int64)
-        kinds = np.unique(self.regions)
-        if len(kinds) > 1:
-            for kind in kinds:
-                touched = np.zeros(len(nodes), dtype=bool)
-                touched[self.tetrahedra[self.regions == kind]] = True
-                nodes += touched
-        # Both sides of every interface are among the faces whose corners are all of several regions.
-        shared = (nodes > 1)[self.tetrahedra]
-        cells = np.flatnonzero(shared.sum(axis=1) > 2)
+        kinds_at = np.zeros(len(self.points), dtype=np.int64)
+        for kind in np.unique(self.regions):
+            touched = np.zeros(len(kinds_at), dtype=bool)
+            touched[self.tetrahedra[self.regions == kind]] = True
+            kinds_at += touched
+        # Both sides of every such triangle are among those whose corners are all of several regions.
+        between = kinds_at > 1
+        cells = np.flatnonzero(between[self.tetrahedra].sum(axis=1) > 2)
         faces = self.tetrahedra[cells][:, FACES].reshape(-1, 3)
-        cells = np.repeat(cells, 4)
-        chosen = (nodes > 1)[faces].all(axis=1)
-        faces, region = faces[chosen], self.regions[cells[chosen]]
+        chosen = between[faces].all(axis=1)
+        faces, region = faces[chosen], self.regions[np.repeat(cells, 4)[chosen]]
         key = np.sort(faces, axis=1)
         order = np.lexsort((region, key[:, 2], key[:, 1], key[:, 0]))
         first, second = order[:-1], order[1:]

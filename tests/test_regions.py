@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from tetlux.meshing import regions as regions_module
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.cache import mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
 
 OUTER, INNER = sphere(10.0, subdivisions=3), sphere(5.0, subdivisions=3)
@@ -45,7 +47,7 @@ def layered() -> TetMesh:
 
 
 def volumes(mesh: TetMesh, count: int) -> FloatArray:
-    return np.asarray(np.bincount(mesh.regions, mesh.volumes, count))
+    return np.asarray(np.bincount(mesh.regions, mesh.volumes, count), dtype=np.float64)
 
 
 def middles(mesh: TetMesh) -> FloatArray:
@@ -63,6 +65,7 @@ def test_a_mesh_has_one_region_unless_told() -> None:
     mesh = block((1, 1, 1), (1.0, 1.0, 1.0))
     assert mesh.regions.tolist() == [0] * 6
     assert len(mesh.interfaces[0]) == 0
+    wrong: Any
     for wrong in (np.zeros(5, dtype=int), np.zeros(6), np.full(6, -1)):
         with pytest.raises(InputError, match="numbers of regions"):
             replace(mesh, regions=wrong)
@@ -81,20 +84,22 @@ def test_interfaces_are_the_triangles_between_regions() -> None:
 
 
 def test_concentric_spheres(concentric: TetMesh) -> None:
-    # Over ten runs: SPREAD_CONCENTRIC
-    assert volumes(concentric, 2)[1] == pytest.approx(INNER.volume, rel=0.06)
+    # Over seven runs the region was 3.1 to 3.2 % small, the whole body 2.3 to 2.4 %, the worst quality 0.28 to 0.39,
+    # and middles of tetrahedra were within 4.63 of the centre or beyond 5.15.
+    assert volumes(concentric, 2)[1] == pytest.approx(INNER.volume, rel=0.045)
     assert concentric.volume == pytest.approx(OUTER.volume, rel=0.03)
-    assert concentric.quality.min() > 0.08
+    assert concentric.quality.min() > 0.1
     away = np.linalg.norm(middles(concentric), axis=1)
-    assert away[concentric.regions == 1].max() < 5.0
-    assert away[concentric.regions == 0].min() > 4.5
+    assert away[concentric.regions == 1].max() < 4.9
+    assert away[concentric.regions == 0].min() > 4.9
 
 
 def test_nodes_between_regions_are_on_the_inner_surface(concentric: TetMesh) -> None:
     points = concentric.points[np.unique(concentric.interfaces[0])]
     off = np.abs(np.linalg.norm(points, axis=1) - 5.0)
-    # The smooth surface of 1,280 triangles is the sphere to 1e-4 of its radius; the mesher's is a hundredth off.
-    assert (off < 1e-3).mean() > 0.97
+    # Over seven runs: all, by 1.5e-4 at most, since the smooth surface of 1,280 triangles is no exact sphere; the
+    # mesher's own nodes are up to a hundredth of the radius off.
+    assert (off < 3e-4).mean() > 0.97
 
 
 def test_two_inclusions_off_centre() -> None:
@@ -104,14 +109,14 @@ def test_two_inclusions_off_centre() -> None:
         sphere(3.0, center=(-3.0, -4.0, -5.0), subdivisions=2),
     ]
     mesh = tetrahedralize(body, inner)
-    # Over ten runs: SPREAD_TWO
+    # Over seven runs: -0.9 to -0.1 %, the whole -0.03 to -0.01 %, and middles below 0.97 or above 1.04 radii.
     for found, surface in zip(volumes(mesh, 3)[1:], inner, strict=True):
-        assert found == pytest.approx(surface.volume, rel=0.1)
-    assert mesh.volume == pytest.approx(8000.0, rel=0.01)
+        assert found == pytest.approx(surface.volume, rel=0.02)
+    assert mesh.volume == pytest.approx(8000.0, rel=0.002)
     for region, (centre, radius) in enumerate((((3.0, 4.0, 5.0), 2.0), ((-3.0, -4.0, -5.0), 3.0)), 1):
         away = np.linalg.norm(middles(mesh) - centre, axis=1)
         assert away[mesh.regions == region].max() < radius
-        assert away[mesh.regions != region].min() > 0.8 * radius
+        assert away[mesh.regions != region].min() > radius
 
 
 def test_three_levels_in_any_order() -> None:
@@ -128,16 +133,16 @@ def test_three_levels_in_any_order() -> None:
     for i, r in enumerate(order, 1):
         below = {8.0: 6.0, 6.0: 3.0, 3.0: 0.0}[r]
         of_shells = levels[r].volume - (levels[below].volume if below else 0.0)
-        # Over ten runs: SPREAD_THREE
-        assert volumes(mesh, 4)[i] == pytest.approx(of_shells, rel=0.12)
+        # Over seven runs: -0.9 to +0.1 %, and middles below 0.97 of the outer radius or above 1.01 of the inner one.
+        assert volumes(mesh, 4)[i] == pytest.approx(of_shells, rel=0.02)
         assert away[mesh.regions == i].max() < r
-        assert away[mesh.regions == i].min() > 0.9 * below
+        assert away[mesh.regions == i].min() > below
 
 
 def test_layers_that_share_sides_with_the_body_and_each_other(layered: TetMesh) -> None:
-    # Over ten runs: SPREAD_LAYERS
-    assert volumes(layered, 3) == pytest.approx([18000.0, 7200.0, 10800.0], rel=0.005)
-    assert layered.quality.min() > 0.08
+    # Over seven runs: 0.1 % off at most, the worst quality 0.09 to 0.21, and all nodes in their planes.
+    assert volumes(layered, 3) == pytest.approx([18000.0, 7200.0, 10800.0], rel=0.003)
+    assert layered.quality.min() > 0.05
     faces, pairs = layered.interfaces
     for pair, height in (([1, 2], -2.0), ([0, 2], -5.0)):
         z = layered.points[faces[(pairs == pair).all(axis=1)]][:, :, 2]
@@ -145,10 +150,26 @@ def test_layers_that_share_sides_with_the_body_and_each_other(layered: TetMesh) 
         assert (np.abs(z - height) < 1e-9).mean() > 0.97
 
 
+def test_nodes_where_surfaces_meet_aslant_go_to_both() -> None:
+    """A wedge on the body; going to one surface and then to the other once would leave the first."""
+    mesh = block((4, 4, 4), (10.0, 10.0, 10.0))
+    upper = middles(mesh)[:, 2] > -5.0
+    x, y, z = mesh.points.T
+    sheared = np.column_stack([0.98 * x, y, z + 0.5 * x * (1.0 - np.abs(z + 5.0) / 5.0)])
+    top = box((10.0, 10.0, 5.0), center=(0.0, 0.0, -2.5))
+    wedge = Surface(top.points + np.outer(top.points[:, 2] < -1.0, [0.0, 0.0, 0.5]) * top.points[:, :1], top.faces)
+    mesh = TetMesh(sheared, mesh.tetrahedra, regions=upper.astype(np.int64))
+    moved = moved_to_surface(mesh, slab(10.0, 10.0), [wedge])
+    points = moved.points[np.unique(mesh.interfaces[0])]
+    assert points[:, 2] == pytest.approx(0.5 * points[:, 0] - 5.0, abs=1e-6)
+    assert np.abs(points[:, 0]).max() == pytest.approx(5.0, abs=1e-6)
+
+
 def test_layers_may_fill_the_body() -> None:
     mesh = tetrahedralize(slab(60.0, 5.0), LAYERS)
+    # Over seven runs: 0.07 % off at most.
     assert not (mesh.regions == 0).any()
-    assert volumes(mesh, 3)[1:] == pytest.approx([7200.0, 10800.0], rel=0.005)
+    assert volumes(mesh, 3)[1:] == pytest.approx([7200.0, 10800.0], rel=0.003)
 
 
 def test_finely_divided_surfaces_that_touch_are_not_decimated_apart() -> None:
@@ -156,17 +177,17 @@ def test_finely_divided_surfaces_that_touch_are_not_decimated_apart() -> None:
     end = cylinder(4.0, 2.0, center=(0.0, 0.0, 3.0), segments=48)
     assert nesting(rod, [end]).touching == (True, True)
     mesh = tetrahedralize(rod, [end])
-    # Over ten runs: SPREAD_ROD
-    assert volumes(mesh, 2)[1] == pytest.approx(end.volume, rel=0.03)
+    # Over seven runs: -0.6 to -0.4 %, the worst quality 0.10 to 0.48.
+    assert volumes(mesh, 2)[1] == pytest.approx(end.volume, rel=0.015)
     assert mesh.quality.min() > 0.05
 
 
 def test_a_thin_plate_and_a_small_ball() -> None:
     plate, ball = box((8.0, 8.0, 0.8)), sphere(1.0, center=(0.0, 0.0, 7.0), subdivisions=2)
     mesh = tetrahedralize(OUTER, [plate, ball])
-    # Over ten runs: SPREAD_SMALL
-    assert volumes(mesh, 3)[1] == pytest.approx(plate.volume, rel=0.05)
-    assert volumes(mesh, 3)[2] == pytest.approx(ball.volume, rel=0.1)
+    # Over seven runs: -0.2 to 0 % and -1.3 to -0.7 %.
+    assert volumes(mesh, 3)[1] == pytest.approx(plate.volume, rel=0.01)
+    assert volumes(mesh, 3)[2] == pytest.approx(ball.volume, rel=0.03)
 
 
 def test_refinement_keeps_regions_and_converges_at_second_order(concentric: TetMesh) -> None:
@@ -185,12 +206,12 @@ def test_refinement_keeps_regions_and_converges_at_second_order(concentric: TetM
         sizes.append(float(np.sqrt(((corners - corners[:, [1, 2, 0]]) ** 2).sum(axis=2).mean())))
         errors.append(1.0 - float(volumes(mesh, 2)[1]) / (500.0 * np.pi / 3.0))
     rates = np.diff(np.log(errors)) / np.diff(np.log(sizes))
-    # Over ten runs: SPREAD_RATES
-    assert (np.abs(rates - 2.0) < 0.4).all()
-    assert errors[-1] < 0.005
+    # Over seven runs: 1.86 to 1.88 and 1.99 to 2.02, and 0.0040 to 0.0042 at last.
+    assert (np.abs(rates - 2.0) < 0.3).all()
+    assert errors[-1] < 0.006
     away = np.linalg.norm(middles(mesh), axis=1)
     assert away[mesh.regions == 1].max() < 5.0
-    assert away[mesh.regions == 0].min() > 4.7
+    assert away[mesh.regions == 0].min() > 4.95
 
 
 def test_parts_of_a_tetrahedron_are_in_its_region() -> None:
@@ -205,7 +226,8 @@ def test_parts_of_a_tetrahedron_are_in_its_region() -> None:
 def test_the_middle_of_an_edge_through_a_region_stays_where_it_is() -> None:
     """Both ends of such an edge are on the inner surface, and the edge is not."""
     mesh = block((3, 3, 3), (3.0, 3.0, 3.0))
-    mesh = replace(mesh, regions=(np.abs(middles(mesh) - [0.0, 0.0, -1.5]) < 0.5).all(axis=1).astype(np.int64))
+    inner = np.asarray((np.abs(middles(mesh) - [0.0, 0.0, -1.5]) < 0.5).all(axis=1))
+    mesh = replace(mesh, regions=inner.astype(np.int64))
     body, around = slab(3.0, 3.0), sphere(0.8, center=(0.0, 0.0, -1.5))
     seen = 0
     # Longest edges first: the diagonal through the inner cube, then those of its sides.
@@ -229,13 +251,15 @@ def test_a_mesh_with_more_regions_than_surfaces_is_refused() -> None:
 
 @pytest.mark.parametrize("walls", ["all", "some", "none"])
 def test_tags_follow_the_walls_and_do_without_them(walls: str) -> None:
-    """Walls around the inner cube; the surface is off by so much that middles of tetrahedra lie on the wrong side."""
-    mesh = cubes()
+    """Walls around the inner cube; the surface is so far off that middles of tetrahedra lie on its wrong side."""
+    mesh = block((8, 8, 8), (4.0, 4.0, 4.0))
+    inside = np.asarray((np.abs(middles(mesh) + np.array([0.0, 0.0, 2.0])) < 1.0).all(axis=1))
+    mesh = replace(mesh, regions=inside.astype(np.int64))
     faces = mesh.points[mesh.interfaces[0]].reshape(-1, 3)
     body = box((9.0, 9.0, 9.0), center=(0.0, 0.0, -2.0))
     given = {"all": faces, "some": faces[3:], "none": faces[:0]}[walls]
-    width = 2.2 if walls == "all" else 2.0
-    inner = box((width, width, width), center=(0.04, 0.0, -2.0))
+    inner = box((2.0, 2.0, 2.0), center=(0.13 if walls == "all" else 0.03, 0.0, -2.0))
+    assert inner.contains(middles(mesh)[inside]).all() == (walls != "all")
     assert (tagged(mesh.points, mesh.tetrahedra, given, body, [inner]) == mesh.regions).all()
     gone = tagged(mesh.points, mesh.tetrahedra, given, inner, [])
     assert (gone == mesh.regions - 1).all()
