@@ -37,19 +37,9 @@ def main() -> None:
             stop_energy=float(job["stop_energy"]),
             vtk_ordering=True,
             quiet=True,
-            # It forgets which way triangles face where two surfaces touch, and then what is inside.
-            disable_filtering=bool(job["walls"]),
+            disable_filtering=not bool(job["filtered"]),
         )
-        # Where fTetWild leaves the triangles of its mesh that stand for those that it was given, as text.
-        left = Path("__tracked_surface.stl")
-        lines = left.read_text().splitlines() if job["walls"] and left.exists() else []
-    walls = [line.split()[1:] for line in lines if line.startswith("vertex")]
-    np.savez(
-        Path("output.npz"),
-        points=points,
-        tetrahedra=tetrahedra,
-        walls=np.array(walls, dtype=np.float64).reshape(-1, 3),
-    )
+    np.savez(Path("output.npz"), points=points, tetrahedra=tetrahedra)
 
 
 def _die_with(parent: int) -> None:

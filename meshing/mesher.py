@@ -207,6 +207,8 @@ def _made(
     end = time.monotonic() + time_limit
     shells = _shells(surface, regions, deviation)
     envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells[1:]), math.inf)
+    # Where two surfaces touch fTetWild forgets which way their triangles face, and then what is inside.
+    filtered = not any(shell.touching for shell in shells)
 
     def attempt(share: float) -> TetMesh:
         coarse = [
@@ -214,7 +216,9 @@ def _made(
             for shell in shells
         ]
         seconds = end - time.monotonic()
-        mesh = _filled(surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit)
+        mesh = _filled(
+            surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit, filtered
+        )
         for shell in shells:
             _check_against(_part(mesh, shell), shell.surface, share * shell.deviation)
         return mesh
@@ -255,12 +259,13 @@ def _filled(
     stop_energy: float,
     seconds: float,
     time_limit: float,
+    filtered: bool,
 ) -> TetMesh:
     """Tetrahedra in proxies of the surfaces, their nodes there on the surfaces themselves."""
     # Unit size, about the origin: fTetWild's tolerances are absolute in places.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     first = np.cumsum([0, *(len(each.points) for each in coarse)])
-    points, tetrahedra, walls = _run_pytetwild(
+    points, tetrahedra = _run_pytetwild(
         (np.concatenate([each.points for each in coarse]) - origin) / size,
         np.concatenate([each.faces + start for each, start in zip(coarse, first, strict=False)]),
         edge_length=edge_length / size,
@@ -270,10 +275,10 @@ def _filled(
         seconds=seconds,
         time_limit=time_limit,
         name=surface.name,
-        walls=len(regions) > 0,
+        filtered=filtered,
     )
-    points, walls = points * size + origin, walls * size + origin
-    tags = tagged(points, tetrahedra, walls, coarse[0], coarse[1:]) if len(regions) > 0 else None
+    points = points * size + origin
+    tags = tagged(points, tetrahedra, coarse[0], coarse[1:], envelope) if len(regions) > 0 else None
     mesh = _cleaned(points, tetrahedra, surface, tags)
     return moved_to_surface(mesh, surface, regions)
 
@@ -288,9 +293,9 @@ def _run_pytetwild(
     seconds: float,
     time_limit: float,
     name: str,
-    walls: bool = False,
-) -> tuple[FloatArray, IntArray, FloatArray]:
-    """Points, tetrahedra, and if asked for the corners of the triangles (3 w, 3) that stand for the given ones."""
+    filtered: bool = True,
+) -> tuple[FloatArray, IntArray]:
+    """Points and tetrahedra; if not filtered, also those round the body."""
     with tempfile.TemporaryDirectory(prefix="tetlux-mesher-", ignore_cleanup_errors=True) as folder:
         job = Path(folder) / "input.npz"
         np.savez(
@@ -300,7 +305,7 @@ def _run_pytetwild(
             edge_length=edge_length,
             epsilon=epsilon,
             stop_energy=stop_energy,
-            walls=walls,
+            filtered=filtered,
         )
         try:
             done = subprocess.run(
@@ -328,7 +333,7 @@ def _run_pytetwild(
                 f"{name}: the mesher failed ({cause}); repair or simplify the surface in a mesh editor and try again."
             )
         with np.load(result) as data:
-            return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64), data["walls"]
+            return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
 
 
 def _whereabouts() -> str:

@@ -11,7 +11,6 @@ from functools import lru_cache
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.blocks import grouped
@@ -24,12 +23,12 @@ from tetlux.meshing.tetmesh import FACES, TetMesh, tetrahedron_volumes
 TOUCH = 1e-6
 # Places of a surface that are asked on which side of another they lie; without a crossing one would do.
 LOOKS = 64
-# Tetrahedra of a compartment that are asked whether they lie in a region; and the share of a volume that may answer
-# otherwise than the rest, because their middles lie between the surface and what the mesher made of it.
+# Tetrahedra of a compartment that are asked whether they lie in a region; and the share of its volume, or of the
+# region's, that may answer otherwise than the rest.
 ASKED = 500
 DISSENT = 0.1
-# The mesher writes its walls with seven digits, for a body of unit size.
-SAME_NODE = 1e-6
+# How far beyond the envelope a node on a surface may be.
+ROUNDING = 1.01
 
 
 @dataclass(frozen=True)
@@ -245,75 +244,74 @@ def by_volume(regions: Sequence[Surface]) -> list[int]:
 
 
 def tagged(
-    points: FloatArray, tetrahedra: IntArray, walls: FloatArray, surface: Surface, regions: Sequence[Surface]
+    points: FloatArray, tetrahedra: IntArray, surface: Surface, regions: Sequence[Surface], envelope: float
 ) -> IntArray:
     """The region of each tetrahedron, (m,), -1 for those outside the body.
 
-    The mesher says which triangles of its mesh stand for those that it was given. They part the mesh into
-    compartments, whose tetrahedra are in one region together: near a surface the middle of a single one may lie on
-    the wrong side, within what the mesher may stray.
+    Triangles whose corners are all in the envelope of a surface part the mesh into compartments, which are in one
+    region as a whole: few tetrahedra need to be asked, and not those whose middle is in the envelope, but on the
+    wrong side. Where all corners are in it a tetrahedron is a compartment of its own.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     tetrahedra : (m, 4) ndarray
-        Inside and outside of the body.
-    walls : (3 w, 3) ndarray
-        Corners of these triangles, one after the other.
     surface : Surface
     regions : sequence of Surface
         These as the mesher got them.
+    envelope : float
+        How far from them its nodes on them may be, unit.
     """
-    compartment = _compartments(points, tetrahedra, walls, SAME_NODE * surface.diagonal)
+    neighbours = _neighbours(tetrahedra, len(points))
     middles, volumes = points[tetrahedra].mean(axis=1), tetrahedron_volumes(points, tetrahedra)
-    inside = _held(middles, volumes, compartment, surface)
+
+    def held(by: Surface) -> BoolArray:
+        return _held(points, tetrahedra, middles, volumes, neighbours, by, ROUNDING * envelope)
+
+    inside = held(surface)
     result = np.where(inside, 0, -1)
     for i in by_volume(regions):
-        result[inside & _held(middles, volumes, compartment, regions[i - 1])] = i
+        result[inside & held(regions[i - 1])] = i
     return result
 
 
-def _held(middles: FloatArray, volumes: FloatArray, compartment: IntArray, surface: Surface) -> BoolArray:
-    """Whether each tetrahedron, of that middle (m, 3), volume (m,) and compartment (m,), lies inside a surface."""
-    low, high = _box(surface)
-    near = np.flatnonzero(((middles >= low) & (middles <= high)).all(axis=1))
-    near = near[np.argsort(compartment[near], kind="stable")]
-    starts = np.flatnonzero(np.diff(compartment[near], prepend=-1))
-    sizes = np.bincount(compartment, volumes)
-    result = np.zeros(len(middles), dtype=bool)
-    for those in np.split(near, starts[1:]):
-        if len(those) == 0:
-            continue
-        own = compartment[those[0]]
-        share = surface.contains(middles[those[_evenly(len(those), ASKED)]]).mean()
-        held = float(share * volumes[those].sum())
-        if held >= (1.0 - DISSENT) * sizes[own]:
-            result[compartment == own] = True
-        elif held > DISSENT * surface.volume:
-            # A gap in the walls has made one compartment of two.
-            result[those] = surface.contains(middles[those])
-    return result
-
-
-def _compartments(points: FloatArray, tetrahedra: IntArray, walls: FloatArray, near: float) -> IntArray:
-    """The number of the compartment of each tetrahedron, (m,); without walls each is one of its own."""
-    count, nodes = len(tetrahedra), np.uint64(len(points))
-    if len(walls) == 0:
-        return np.arange(count)
-    distance, node = cKDTree(points).query(walls)
-    found = np.asarray(distance).reshape(-1, 3) < near
-    corners = np.asarray(node).reshape(-1, 3)[found.all(axis=1)]
-    faces = np.concatenate([corners, tetrahedra[:, FACES].reshape(-1, 3)])
+def _neighbours(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
+    """Triangles between two tetrahedra: those (p, 2), and the corners (p, 3)."""
+    faces = tetrahedra[:, FACES].reshape(-1, 3)
     a, b, c = np.sort(faces, axis=1).astype(np.uint64).T
-    _, face = grouped((a * nodes + b) * nodes + c)
-    wall = np.zeros(int(face.max()) + 1, dtype=bool)
-    wall[face[: len(corners)]] = True
-    of_cells = face[len(corners) :]
-    order = np.argsort(of_cells, kind="stable")
-    pair = np.flatnonzero((np.diff(of_cells[order]) == 0) & ~wall[of_cells[order[1:]]])
-    ends = order[pair] // 4, order[pair + 1] // 4
-    joined = coo_array((np.ones(len(pair), dtype=bool), ends), shape=(count, count))
-    return np.asarray(connected_components(joined, directed=False)[1], dtype=np.int64)
+    _, face = grouped((a * np.uint64(nodes) + b) * np.uint64(nodes) + c)
+    order = np.argsort(face, kind="stable")
+    pair = np.flatnonzero(np.diff(face[order]) == 0)
+    return np.column_stack([order[pair], order[pair + 1]]) // 4, faces[order[pair]]
+
+
+def _held(
+    points: FloatArray,
+    tetrahedra: IntArray,
+    middles: FloatArray,
+    volumes: FloatArray,
+    neighbours: tuple[IntArray, IntArray],
+    surface: Surface,
+    near: float,
+) -> BoolArray:
+    """Whether each tetrahedron lies inside a surface, (m,)."""
+    cells, corners = neighbours
+    cells = cells[~_on(points, surface, near)[corners].all(axis=1)]
+    count = len(tetrahedra)
+    joined = coo_array((np.ones(len(cells), dtype=bool), cells.T), shape=(count, count))
+    compartment = connected_components(joined, directed=False)[1]
+    order = np.argsort(compartment, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(compartment[order])) + 1)
+    asked = np.concatenate([part[_evenly(len(part), ASKED)] for part in parts])
+    answers, of_answers = surface.contains(middles[asked]), compartment[asked]
+    share = np.bincount(of_answers, answers) / np.bincount(of_answers)
+    result = np.asarray((share > 0.5)[compartment])
+    # Where the surface was not kept, two compartments are one: its tetrahedra have to answer for themselves.
+    size = np.bincount(compartment, volumes)
+    torn = np.minimum(share, 1.0 - share) * size > DISSENT * np.minimum(size, surface.volume)
+    each = np.flatnonzero(torn[compartment])
+    result[each] = surface.contains(middles[each])
+    return result
 
 
 def nodes_of(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> list[tuple[Surface, BoolArray]]:

@@ -26,7 +26,7 @@ from tetlux.meshing import (
     tetrahedralize,
 )
 from tetlux.meshing import regions as regions_module
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.cache import mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.files import read_mesh, write_mesh
 from tetlux.meshing.refine import moved_to_surface
@@ -172,7 +172,25 @@ def test_layers_may_fill_the_body() -> None:
     assert volumes(mesh, 3)[1:] == pytest.approx([7200.0, 10800.0], rel=0.003)
 
 
-def test_finely_divided_surfaces_that_touch_are_not_decimated_apart() -> None:
+def test_what_the_mesher_may_stray_follows_from_thickness_unless_nothing_is_left() -> None:
+    for upper in np.random.default_rng(0).uniform(1.0, 4.0, 20):
+        layers = [
+            box((60.0, 60.0, upper), center=(0.0, 0.0, -0.5 * upper)),
+            box((60.0, 60.0, 5.0 - upper), center=(0.0, 0.0, -0.5 * (upper + 5.0))),
+        ]
+        body, *_ = mesher._shells(slab(60.0, 5.0), layers, 1.0)
+        assert body.deviation == 1.0
+    body, inner = mesher._shells(OUTER, [sphere(9.9, subdivisions=3)], 2.0)
+    # The gap is 0.1 wide; the mean thickness of a ball, 2 V/A, is two thirds of its radius.
+    assert body.deviation == pytest.approx(0.25 * 0.1, rel=0.02)
+    assert inner.deviation == pytest.approx(mesher.INNER_DEVIATION * 19.8 * np.sqrt(3), rel=0.01)
+
+
+def test_finely_divided_surfaces_that_touch_are_not_decimated_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    def decimate(*_: object) -> Surface:
+        raise AssertionError
+
+    monkeypatch.setattr(mesher, "proxy", decimate)
     rod = cylinder(4.0, 8.0, segments=48)
     end = cylinder(4.0, 2.0, center=(0.0, 0.0, 3.0), segments=48)
     assert nesting(rod, [end]).touching == (True, True)
@@ -249,20 +267,21 @@ def test_a_mesh_with_more_regions_than_surfaces_is_refused() -> None:
         refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), OUTER, [INNER])
 
 
-@pytest.mark.parametrize("walls", ["all", "some", "none"])
-def test_tags_follow_the_walls_and_do_without_them(walls: str) -> None:
-    """Walls around the inner cube; the surface is so far off that middles of tetrahedra lie on its wrong side."""
+@pytest.mark.parametrize("kept", [True, False])
+def test_tetrahedra_in_the_envelope_follow_their_neighbours(kept: bool) -> None:
+    """Without nodes on the surface, or where it is far off, each answers for itself."""
     mesh = block((8, 8, 8), (4.0, 4.0, 4.0))
     inside = np.asarray((np.abs(middles(mesh) + np.array([0.0, 0.0, 2.0])) < 1.0).all(axis=1))
-    mesh = replace(mesh, regions=inside.astype(np.int64))
-    faces = mesh.points[mesh.interfaces[0]].reshape(-1, 3)
-    body = box((9.0, 9.0, 9.0), center=(0.0, 0.0, -2.0))
-    given = {"all": faces, "some": faces[3:], "none": faces[:0]}[walls]
-    inner = box((2.0, 2.0, 2.0), center=(0.13 if walls == "all" else 0.03, 0.0, -2.0))
-    assert inner.contains(middles(mesh)[inside]).all() == (walls != "all")
-    assert (tagged(mesh.points, mesh.tetrahedra, given, body, [inner]) == mesh.regions).all()
-    gone = tagged(mesh.points, mesh.tetrahedra, given, inner, [])
-    assert (gone == mesh.regions - 1).all()
+    body = box((4.0, 4.0, 4.0), center=(0.0, 0.0, -2.0))
+    inner = box((2.0, 2.0, 2.0), center=(0.13, 0.0, -2.0))
+    alone = inner.contains(middles(mesh))
+    on = np.isclose(np.abs(mesh.points + np.array([0.0, 0.0, 2.0])).max(axis=1), 1.0)
+    # Those along the cube's edges, all of whose corners are on it, answer for themselves in any case.
+    some = ~on[mesh.tetrahedra].all(axis=1)
+    assert (alone != inside)[some].sum() > 100
+    tags = tagged(mesh.points, mesh.tetrahedra, body, [inner], 0.2 if kept else 0.01)
+    assert (tags == (inside if kept else alone))[some].all()
+    assert ((tagged(mesh.points, mesh.tetrahedra, inner, [], 0.2) == 0) == inside)[some].all()
 
 
 def test_the_cache_tells_regions_and_remembers_them(tmp_path: Path) -> None:
@@ -383,14 +402,14 @@ def test_the_same_at_every_scale() -> None:
 
 
 def test_a_region_that_the_mesher_lost_is_missed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A mesh without walls inside and without nodes where the region is."""
+    """A mesh without nodes where the region is."""
     whole = block((3, 3, 3), (10.0, 10.0, 10.0))
     points = (whole.points + np.array([0.0, 0.0, 5.0])) / BODY.diagonal
     epsilons: list[float] = []
 
-    def run(*_: object, epsilon: float, **__: object) -> tuple[FloatArray, object, FloatArray]:
+    def run(*_: object, epsilon: float, **__: object) -> tuple[FloatArray, IntArray]:
         epsilons.append(epsilon)
-        return points, whole.tetrahedra, np.zeros((0, 3))
+        return points, whole.tetrahedra
 
     monkeypatch.setattr(mesher, "_run_pytetwild", run)
     with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh lost it, .* give a smaller deviation, or leave"):

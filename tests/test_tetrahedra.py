@@ -27,9 +27,6 @@ from tetlux.meshing.files import read_mesh, write_mesh
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.repair import bodies
 
-# What the mesher says of a body without regions.
-NO_WALLS = np.zeros((0, 3))
-
 
 def test_the_mesher_fills_the_body(ball: Surface, ball_mesh: TetMesh) -> None:
     assert (ball_mesh.volumes > 0).all()
@@ -155,7 +152,7 @@ def test_the_mesher_leaves_nothing_in_the_working_directory(tmp_path: Path, monk
 
 def test_a_mesh_that_is_not_the_body_is_refused(monkeypatch: pytest.MonkeyPatch, ball: Surface) -> None:
     cube = block((2, 2, 2), (1.0, 1.0, 1.0))
-    monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (cube.points, cube.tetrahedra, NO_WALLS))
+    monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (cube.points, cube.tetrahedra))
     with pytest.raises(RunError, match=r"volume is .* off the surface's.* give a smaller deviation"):
         tetrahedralize(ball, cache=False)
 
@@ -205,10 +202,10 @@ def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPat
     cube, other = block((4, 4, 4), (1.0, 1.0, 1.0)), block((1, 1, 1), (0.1, 0.1, 0.1))
     given: list[float] = []
 
-    def run(*_: object, epsilon: float, **__: object) -> tuple[FloatArray, IntArray, FloatArray]:
+    def run(*_: object, epsilon: float, **__: object) -> tuple[FloatArray, IntArray]:
         given.append(epsilon)
         mesh = other if len(given) == 1 else cube
-        return (mesh.points + np.array([0.0, 0.0, 0.5])) / np.sqrt(3), mesh.tetrahedra, NO_WALLS
+        return (mesh.points + np.array([0.0, 0.0, 0.5])) / np.sqrt(3), mesh.tetrahedra
 
     monkeypatch.setattr(mesher, "_run_pytetwild", run)
     assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
@@ -228,9 +225,9 @@ def test_a_mesh_that_lost_a_part_is_made_again(monkeypatch: pytest.MonkeyPatch) 
 
         def run(
             *_: object, epsilon: float, points: FloatArray = points, given: list[float] = given, **__: object
-        ) -> tuple[FloatArray, IntArray, FloatArray]:
+        ) -> tuple[FloatArray, IntArray]:
             given.append(epsilon)
-            return points, mesh.tetrahedra, NO_WALLS
+            return points, mesh.tetrahedra
 
         monkeypatch.setattr(mesher, "_run_pytetwild", run)
         tetrahedralize(surface, cache=False)
@@ -308,7 +305,7 @@ def test_crumbs_of_the_envelope_are_swept(monkeypatch: pytest.MonkeyPatch) -> No
     crumb = np.array([[5.0, 0, 0], [5.01, 0, 0], [5, 0.01, 0], [5, 0, 0.01]])
     points = np.vstack([(cube.points + np.array([0.0, 0.0, 0.5])) / np.sqrt(3), crumb])
     cells = np.vstack([cube.tetrahedra, len(cube.points) + np.arange(4)])
-    monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (points, cells, NO_WALLS))
+    monkeypatch.setattr(mesher, "_run_pytetwild", lambda *_, **__: (points, cells))
     assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
 
 
