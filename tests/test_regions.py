@@ -278,7 +278,7 @@ def test_tetrahedra_in_the_envelope_follow_their_neighbours(kept: bool) -> None:
     on = np.isclose(np.abs(mesh.points + np.array([0.0, 0.0, 2.0])).max(axis=1), 1.0)
     # Those along the cube's edges, all of whose corners are on it, answer for themselves in any case.
     some = ~on[mesh.tetrahedra].all(axis=1)
-    assert (alone != inside)[some].sum() > 100
+    assert (alone != inside)[some].sum() > 40
     tags = tagged(mesh.points, mesh.tetrahedra, body, [inner], 0.2 if kept else 0.01)
     assert (tags == (inside if kept else alone))[some].all()
     assert ((tagged(mesh.points, mesh.tetrahedra, inner, [], 0.2) == 0) == inside)[some].all()
