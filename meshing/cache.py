@@ -42,7 +42,7 @@ def cache_directory() -> Path:
 def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: float | str) -> str:
     """A name for the mesh that these settings make of a surface and those in it: a hash of all that."""
     surfaces = [surface, *regions]
-    shapes = [[s.points.shape, s.faces.shape, s.crease_angle, s.overlaps] for s in surfaces]
+    shapes = [[s.points.shape, s.faces.shape, s.crease_angle, s.overlaps, s.unit == surface.unit] for s in surfaces]
     digest = hashlib.blake2b(json.dumps([FORMAT, shapes, sorted(settings.items())]).encode(), digest_size=20)
     for each in surfaces:
         digest.update(each.points.astype("<f8").tobytes())

@@ -181,16 +181,18 @@ def _shells(surface: Surface, regions: Sequence[Surface], deviation: float) -> l
         return [_Shell(surface, deviation)]
     lie = nesting(surface, regions)
     surfaces = [surface, *(replace(s, name=f"region {i} ({s.name})") for i, s in enumerate(regions, 1))]
-    shells = []
+    by_thickness = []
     for i, each in enumerate(surfaces):
         held = [surfaces[j] for j, parent in enumerate(lie.parents, 1) if parent == i]
         own = each.volume - sum(inner.volume for inner in held)
         thickness = 2.0 * own / (each.area + sum(inner.area for inner in held))
         # Layers may fill it all.
-        by_default = DEVIATION_OF_THICKNESS * thickness if own > LEFT * each.volume else math.inf
-        if i > 0:
-            by_default = min(INNER_DEVIATION * each.diagonal, by_default)
-        shells.append(_Shell(each, min(deviation, by_default), lie.touching[i], tuple(lie.within(i))))
+        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > LEFT * each.volume else math.inf)
+    shells = [_Shell(surface, min(deviation, by_thickness[0]), lie.touching[0], tuple(lie.within(0)))]
+    for i, (each, parent) in enumerate(zip(surfaces[1:], lie.parents, strict=True), 1):
+        # What is on either side of it may be thin.
+        stray = min(deviation, INNER_DEVIATION * each.diagonal, by_thickness[i], by_thickness[parent])
+        shells.append(_Shell(each, stray, lie.touching[i], tuple(lie.within(i))))
     return shells
 
 
@@ -206,7 +208,8 @@ def _made(
     """A mesh that is the body of the surface; if the first one is not, a second one, closer to the surface."""
     end = time.monotonic() + time_limit
     shells = _shells(surface, regions, deviation)
-    envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells[1:]), math.inf)
+    if len(regions) > 0:
+        envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells))
     # Where two surfaces touch fTetWild forgets which way their triangles face, and then what is inside.
     filtered = not any(shell.touching for shell in shells)
 
