@@ -58,10 +58,10 @@ LOOKS = 3_000
 # How much finer the second attempt is, if the first one's mesh is not the body of the surface.
 SECOND = 0.3
 # Default deviation of an inner surface: this share of its own diagonal, or of its region's mean thickness as above.
-# Seconds of the mesher and what a ball's volume lacks, until refinement puts more nodes onto it, at .02, .03 and .05:
-# of a ball a twentieth of a ball's size 6.5, 3.1, 2.1 and 3.8, 5.1, 7.8 %; in the hare, a twelfth of its size, 7.5,
-# 4.0, 2.0 and the same. The proxy of each surface has its own deviation, without which that would be three times as
-# long; the envelope is one for all.
+# Seconds of the mesher and what the inner ball's volume lacks, until refinement puts more nodes onto it, at .02, .03
+# and .05: a twentieth of a ball's size, 3.4, 2.1, 1.5 and 3.9, 5.0, 8.0 %; 5 wide in the hare, which alone takes .9,
+# 2.3, 2.2, 1.7 and 3.8, 4.9, 7.5 %. The proxy of each surface has its own deviation, without which the first would take
+# two to four times as long; the envelope is one for all.
 INNER_DEVIATION = 0.03
 # A region whose inner ones leave it less than this share of its volume is filled by them.
 LEFT = 1e-6
