@@ -12,6 +12,7 @@ from tetlux.cases.compare_picture import draw_comparison
 from tetlux.cases.picture import Ray, Scene, draw
 from tetlux.cases.summary import summarize
 from tetlux.fem.lights import PencilBeam, PointSource
+from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.fem.surface_exitance import surface_exitance
@@ -122,7 +123,7 @@ def _rays(light: object, surface: Surface) -> tuple[Ray, ...]:
     """How a picture draws a light; diffuse light comes from everywhere and is not drawn."""
     if isinstance(light, PencilBeam):
         end = light.entry(surface)
-        start = end - 0.3 * surface.diagonal * light.rays()[1]
+        start = end - 0.3 * surface.diagonal * unit_vector(light.direction, "direction")
         return (Ray(_vector(start), _vector(end)),)
     if isinstance(light, PointSource):
         return (Ray(light.position, light.position),)
