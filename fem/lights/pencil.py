@@ -169,7 +169,11 @@ def _entries(
 
 def _as_points(rays: Rays, surface: Surface, medium: Medium) -> Deposit:
     mean_free_path = medium.mean_free_path
-    distances, _ = surface.rays.first(rays.starts, rays.directions)
+    distances, faces = surface.rays.first(rays.starts, rays.directions)
+    # On a curved surface a beam starts above the triangle that it met, and meets it again.
+    again = np.flatnonzero(np.einsum("ij,ij->i", rays.directions, surface.normals[faces]) < 0)
+    places = rays.starts[again] + distances[again, None] * rays.directions[again]
+    distances[again] += surface.rays.first(places, rays.directions[again])[0]
     paths = np.where(np.isfinite(distances), distances, 0.0)
     if surface.overlaps:
         # A triangle inside the body is no way out.
