@@ -35,6 +35,7 @@ def frame(
     ends: tuple[float, float] | None,
     table: FloatArray,
     below: bool,
+    white: float | None,
     unit: str,
     title: str,
     extent: FloatArray,
@@ -55,6 +56,8 @@ def frame(
         The colour map.
     below : bool
         Whether some of the body is darker than the lower end.
+    white : float or None
+        What white stands for where the body is drawn in colours of its own, which have no bar, W/unit².
     unit, title : str
     extent : (3,) ndarray
         The body's size along x, y and z, unit.
@@ -73,7 +76,10 @@ def frame(
     _size_marks(canvas, camera, unit, extent)
     _axes_cross(canvas, camera)
     _light_marks(canvas, camera, lights)
-    _color_bar(figure, ends, table, below, unit)
+    if white is None or ends is None:
+        _color_bar(figure, ends, table, below, unit)
+    else:
+        _white_note(canvas, white, unit)
     figure.savefig(path, format="png", dpi=DPI, facecolor=BACKGROUND)
 
 
@@ -139,6 +145,15 @@ def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> Non
             markeredgecolor=edge,
             markeredgewidth=width,
         )
+
+
+def _white_note(canvas: "Axes", white: float, unit: str) -> None:
+    """What white stands for in a picture in the body's own colours, under a patch of white."""
+    center, top, size = LEFT + PANEL[0] + 95, 190, 64
+    x, y = [center - size / 2, center + size / 2], [top, top + size]
+    canvas.fill([x[0], x[1], x[1], x[0]], [y[0], y[0], y[1], y[1]], facecolor="white", edgecolor=FAINT, linewidth=1.2)
+    lines = f"white is\nexitance of\n{_label(float(f'{white:.3g}'))} W/{unit}²"
+    canvas.text(center, y[1] + 16, lines, size=14, color=INK, ha="center", va="top", linespacing=1.4)
 
 
 def _color_bar(figure: "Figure", ends: tuple[float, float] | None, table: FloatArray, below: bool, unit: str) -> None:

@@ -30,8 +30,11 @@ def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     weights = _weights(placed[flat, :, :2], pixels % width + 0.5, pixels // width + 0.5)
     colors = np.empty((len(pixels), 3))
     lit = flat >= body
-    shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
-    colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
+    if stage.colours is None:
+        shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
+        colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
+    else:
+        colors[~lit] = np.einsum("ij,ijk->ik", weights[~lit], stage.colours[flat[~lit]])
     colors[lit] = LIGHT
     normals = np.concatenate([stage.normals, stage.arrow_normals])
     lamp, eye = (

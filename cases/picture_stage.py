@@ -99,6 +99,8 @@ class Stage:
         Corners and normals of the lights' arrows.
     table : (256, 3) ndarray
         The colour map, red, green and blue from 0 to 1.
+    colours : (m, 3, 3) ndarray or None
+        Colours of the corners themselves, from 0 to 1, in place of the colour map.
     """
 
     camera: Camera
@@ -108,6 +110,7 @@ class Stage:
     arrows: FloatArray
     arrow_normals: FloatArray
     table: FloatArray
+    colours: FloatArray | None = None
 
 
 def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
@@ -140,7 +143,13 @@ def color_table() -> FloatArray:
     return np.asarray(colormaps[COLOR_MAP](np.linspace(DARKEST, 1.0, 256))[:, :3])
 
 
-def build_stage(points: FloatArray, triangles: IntArray, exitance: FloatArray, lights: tuple[Ray, ...]) -> Stage:
+def build_stage(
+    points: FloatArray,
+    triangles: IntArray,
+    exitance: FloatArray,
+    lights: tuple[Ray, ...],
+    colours: FloatArray | None = None,
+) -> Stage:
     """Choose the camera, and make arrows, normals and colours for it."""
     shares = map_shares(exitance, exitance_range(exitance))
     corners = points[triangles]
@@ -160,6 +169,7 @@ def build_stage(points: FloatArray, triangles: IntArray, exitance: FloatArray, l
         arrows=np.concatenate([np.empty((0, 3, 3)), *(c for c, _ in arrows)]),
         arrow_normals=np.concatenate([np.empty((0, 3, 3)), *(n for _, n in arrows)]),
         table=color_table(),
+        colours=None if colours is None else colours[triangles],
     )
 
 

@@ -14,7 +14,7 @@ from tetlux.cases.case import Case, find_case_file, load_cases
 from tetlux.cases.cli import main
 from tetlux.cases.run import run_case
 from tetlux.fem.exact import slab
-from tetlux.fem.solve import solve
+from tetlux.fem.solve import solve_each
 from tetlux.meshing import RunError
 from tetlux.meshing.files import read_mesh
 
@@ -132,9 +132,9 @@ def test_a_failing_case_does_not_stop_the_others(
     def failing(surface: object, *rest: object, **options: object) -> object:
         if surface.name == "box":  # type: ignore[attr-defined]
             raise RunError("the mesher failed.")
-        return solve(surface, *rest, **options)  # type: ignore[arg-type]
+        return solve_each(surface, *rest, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(run, "solve", failing)
+    monkeypatch.setattr(run, "solve_each", failing)
     (tmp_path / "a.yaml").write_text(QUICK.replace("sphere: {radius: 10}", "box: {size: [9, 9, 9]}"))
     (tmp_path / "b.yaml").write_text(QUICK + "outputs: [surface]\n")
     assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(tmp_path / "out")]) == 1
