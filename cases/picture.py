@@ -12,7 +12,6 @@ import numpy as np
 from tetlux.cases.picture_frame import frame
 from tetlux.cases.picture_plain import draw_plain
 from tetlux.cases.picture_stage import (
-    BACKGROUND,
     FULL,
     LIGHT,
     OVERSAMPLING,
@@ -124,7 +123,7 @@ def _drawn_with_pyvista(stage: Stage) -> Image | None:
         np.savez(
             job,
             size=OVERSAMPLING * np.array(PANEL),
-            background=BACKGROUND,
+            background=stage.background,
             light=LIGHT,
             shading=(SHADED, FULL),
             lamp=camera.lamp,

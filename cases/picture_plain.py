@@ -3,7 +3,6 @@
 import numpy as np
 
 from tetlux.cases.picture_stage import (
-    BACKGROUND,
     FULL,
     LIGHT,
     OVERSAMPLING,
@@ -43,7 +42,7 @@ def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     # As VTK does, a normal that points away from the eye is turned round.
     cosine = np.clip(np.where(eye < 0, -lamp, lamp), 0.0, 1.0)
     colors *= (SHADED + (FULL - SHADED) * cosine)[:, None]
-    image = np.tile(np.round(255 * np.asarray(BACKGROUND)).astype(np.uint8), (owner.size, 1))
+    image = np.tile(np.round(255 * np.asarray(stage.background)).astype(np.uint8), (owner.size, 1))
     image[pixels] = np.round(255 * colors).astype(np.uint8)
     return image.reshape(*owner.shape, 3)
 

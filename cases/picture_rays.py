@@ -9,6 +9,8 @@ from tetlux.meshing.surface import Surface
 
 # Light on the whole body is drawn as so many arrows.
 ARROWS = 3
+# So far from the middle of what is lit they stand at most, as a share of its extent: not at its rim.
+SPREAD = 0.6
 
 
 def rays(light: Light, surface: Surface) -> tuple[Ray, ...]:
@@ -29,7 +31,10 @@ def rays(light: Light, surface: Surface) -> tuple[Ray, ...]:
 def _spread(places: FloatArray, along: FloatArray, count: int) -> FloatArray:
     """The place nearest to the middle of all, and others far from it and from each other, seen along the light."""
     flat = places - np.outer(places @ along, along)
-    chosen = [int(np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1)))]
+    away = np.linalg.norm(flat - flat.mean(axis=0), axis=1)
+    near = away <= SPREAD * away.max()
+    places, flat = places[near], flat[near]
+    chosen = [int(np.argmin(away[near]))]
     while len(chosen) < min(count, len(places)):
         apart = np.linalg.norm(flat[:, None] - flat[chosen], axis=2).min(axis=1)
         chosen.append(int(np.argmax(apart)))

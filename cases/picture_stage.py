@@ -19,6 +19,8 @@ NARROWEST = 2.0
 # The darkest colours of the map are left out: on black no shape can be seen.
 COLOR_MAP, DARKEST = "inferno", 0.2
 BACKGROUND: Vector = (0.953, 0.957, 0.965)
+# Behind a body in colours of its own, most of which are darker than white.
+DARK: Vector = (0.11, 0.12, 0.14)
 LIGHT: Vector = (0.0, 0.62, 0.72)
 # Brightness of a face turned away from the lamp and of one that faces it; between them it follows the
 # cosine. Near enough to 1 that colours can be read off the bar.
@@ -111,6 +113,11 @@ class Stage:
     arrow_normals: FloatArray
     table: FloatArray
     colours: FloatArray | None = None
+
+    @property
+    def background(self) -> Vector:
+        """Red, green and blue behind the body."""
+        return BACKGROUND if self.colours is None else DARK
 
 
 def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
