@@ -10,16 +10,16 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tetlux import meshing
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.lighting import BODY, light_names, light_of
-from tetlux.cases.media import AnyMedium, base_of, media_of
+from tetlux.cases.media import media_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.schema_parts import TAG
 from tetlux.cases.sensors import Sensor, sensor_of
+from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
@@ -27,6 +27,7 @@ from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.read import SUFFIXES
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 
 
@@ -295,11 +296,9 @@ def _regions(
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
                 check_media(surface, [base_of(outside), base_of(inside)])
-        regions.append(Region(inner, own))  # type: ignore[arg-type]  # until Region takes media that vary
-    # TODO: import it as the others are, when tetlux.meshing has it.
-    check: Any = getattr(meshing, "check_regions", lambda *_: None)
+        regions.append(Region(inner, own))
     with document.at(("regions",)):
-        check(surface, [region.surface for region in regions])
+        check_regions(surface, [region.surface for region in regions])
     return names, tuple(regions)
 
 

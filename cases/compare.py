@@ -90,7 +90,7 @@ class Compared:
 
 def are_points(deposits: list[Deposit]) -> bool:
     """Whether all light is deposited in points."""
-    return not any(len(d.starts) or np.any(d.irradiance) or np.any(d.emission) or d.on_mesh for d in deposits)
+    return not any(len(d.points) == 0 or len(d.starts) or d.on_mesh is not None for d in deposits)
 
 
 def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], names: list[ClosedForm]) -> Comparison:

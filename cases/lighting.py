@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any
 
-from tetlux import fem
 from tetlux.cases.channels import of_channel
 from tetlux.cases.images import of_channel as colour_of_channel
 from tetlux.cases.reading import Reader
@@ -14,6 +13,7 @@ from tetlux.fem.lights import (
     DiffuseLight,
     Disc,
     Emission,
+    EnvironmentLight,
     Gaussian,
     Image,
     Light,
@@ -111,16 +111,11 @@ def _spot(spec: SpotSpec, channel: int, count: int, reader: Reader) -> AnySpot |
 
 
 def _environment(spec: EnvironmentSpec, brightest: float, channel: int, count: int, reader: Reader) -> Light | None:
-    # TODO: import it as the others are, when tetlux.fem has it.
-    environment: Any = getattr(fem, "EnvironmentLight", None)
-    if environment is None:
-        raise InputError("light by an image of the surroundings is not in this version.")
     colours = reader.pixels(spec.file, spec.encoding)
     pixels = colour_of_channel(colours, channel, count)
     if not pixels.any() and colours.any():
         return None
-    light: Light = environment(brightest * pixels, up=spec.up, front=spec.front)
-    return light
+    return EnvironmentLight(brightest * pixels, up=spec.up, front=spec.front)
 
 
 def _region(spec: EmissionSpec, regions: tuple[str, ...]) -> int | None:

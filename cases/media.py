@@ -4,19 +4,13 @@ from tetlux.cases.channels import of_channel
 from tetlux.cases.document import Document, Key
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema_media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.materials import material
 from tetlux.fem.medium import Medium
 from tetlux.fem.phase import PhaseFunction, henyey_greenstein, table, two_term
 from tetlux.fem.validity import check_scattering
 from tetlux.fem.varying import Field, VaryingMedium
 from tetlux.meshing.surface import Surface
-
-AnyMedium = Medium | VaryingMedium
-
-
-def base_of(medium: AnyMedium) -> Medium:
-    """A medium, or what stands for one that varies where one number has to do."""
-    return medium.base if isinstance(medium, VaryingMedium) else medium
 
 
 def media_of(

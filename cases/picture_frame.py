@@ -154,15 +154,13 @@ def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> Non
 def _white_note(canvas: "Axes", white: float, unit: str) -> None:
     """What white stands for in a picture in the body's own colours, under a patch of white."""
     center, top, size = LEFT + PANEL[0] + 95, 190, 64
-    x, y = [center - size / 2, center + size / 2], [top, top + size]
-    canvas.fill(
-        [x[0], x[1], x[1], x[0]], [y[0], y[0], y[1], y[1]], facecolor="white", edgecolor=PALE_FAINT, linewidth=1.2
-    )
+    left, right, low = center - size / 2, center + size / 2, top + size
+    canvas.fill([left, right, right, left], [top, top, low, low], facecolor="white")
     if not white > 0:
         lines = "no light leaves\nthe body"
     else:
         lines = f"white is\nexitance of\n{_label(float(f'{white:.3g}'))} W/{unit}²"
-    canvas.text(center, y[1] + 16, lines, size=14, color=PALE, ha="center", va="top", linespacing=1.4)
+    canvas.text(center, low + 16, lines, size=14, color=PALE, ha="center", va="top", linespacing=1.4)
 
 
 def _color_bar(figure: "Figure", ends: tuple[float, float] | None, table: FloatArray, below: bool, unit: str) -> None:

@@ -5,7 +5,6 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import cast
 
 from tetlux.cases.case import Case
 from tetlux.cases.compare import as_json, compare
@@ -16,7 +15,6 @@ from tetlux.cases.ply import write_ply
 from tetlux.cases.results import Results, results_of, surface_values, volume_values
 from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
-from tetlux.fem.medium import Medium
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.files import write_mesh
@@ -57,8 +55,7 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
     started = time.perf_counter()
     solutions = solve_each(
         case.surface,
-        # Until solve_each is declared to take media that vary.
-        cast(list[Medium], [channel.medium for channel in case.channels]),
+        [channel.medium for channel in case.channels],
         [list(channel.lights.values()) for channel in case.channels],
         regions=case.regions,
         tolerance=case.tolerance,

@@ -6,8 +6,8 @@ from importlib.metadata import version
 from typing import Any
 
 from tetlux.cases.case import Channel
-from tetlux.cases.media import base_of
 from tetlux.cases.results import Results, lights_in
+from tetlux.fem.coefficients import base_of
 from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation

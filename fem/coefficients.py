@@ -6,8 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.medium import Medium
+from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tetmesh import TetMesh
+
+AnyMedium = Medium | VaryingMedium
+# Barycentric coordinates of the points of a rule that is exact for quadratics, each of the same weight.
+_WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +68,33 @@ def at_cells(value: float | FloatArray, cells: IntArray) -> FloatArray:
     return np.full(len(cells), value) if np.ndim(value) == 0 else np.asarray(value)[cells]
 
 
-def coefficients_on(mesh: TetMesh, media: Sequence[Medium]) -> Coefficients:
-    """Coefficients of a mesh whose region i is of medium i."""
-    if len(media) == 1:
+def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
+    """Coefficients of a mesh whose region i is of medium i.
+
+    Raises
+    ------
+    InputError
+        If a coefficient that varies is not known, or not sensible, somewhere on the mesh.
+    """
+    outer = base_of(media[0])
+    if len(media) == 1 and isinstance(media[0], Medium):
         return coefficients_of(media[0])
-    each = [coefficients_of(medium) for medium in media]
+    values = np.empty((4, len(mesh.tetrahedra)))
+    for region, medium in enumerate(media):
+        inside = np.flatnonzero(mesh.regions == region)
+        if isinstance(medium, Medium):
+            scattering, cosine = medium.delta_eddington
+            values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, scattering, cosine])[:, None]
+            continue
+        # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
+        points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
+        at = medium.at(points.reshape(-1, 3))
+        sigma_a, sigma_s_prime = (value.reshape(-1, 4).mean(axis=1) for value in at)
+        scattering_of, cosine = medium.delta_eddington(sigma_s_prime)
+        values[:, inside] = sigma_a, sigma_a + sigma_s_prime, scattering_of, np.full(len(inside), cosine)
+    return Coefficients(*values, outer=outer)
 
-    def of(name: str) -> FloatArray:
-        return np.array([getattr(one, name) for one in each])[mesh.regions]
 
-    return Coefficients(of("sigma_a"), of("sigma_t_prime"), of("scattering"), of("cosine"), media[0])
+def base_of(medium: AnyMedium) -> Medium:
+    """The medium itself, or what stands for one that varies."""
+    return medium if isinstance(medium, Medium) else medium.base

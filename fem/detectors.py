@@ -128,8 +128,8 @@ def read(detector: Detector, solution: Solution) -> Reading:
     """Read a detector.
 
     A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
-    the disc's. A fibre collects the radiance ``F_t(eta, theta) M/pi`` up to the angle whose sine is its aperture, see
-    `tetlux.fem.radiance`; it changes nothing of the light that it reads.
+    the disc's. A fibre collects up to the angle whose sine is its aperture, out of radiance that goes with
+    ``F_t(eta, theta)`` and adds up to the exitance; it changes nothing of the light that it reads.
 
     Parameters
     ----------
@@ -163,7 +163,8 @@ def read(detector: Detector, solution: Solution) -> Reading:
     exitance, area = float(weights @ solution.exitance_on(points)), math.pi * detector.radius**2
     share = 1.0
     if isinstance(detector, FibreDetector):
-        share = collected_share(solution.medium.eta, detector.numerical_aperture)
+        eta = solution.medium.eta
+        share = collected_share(eta, detector.numerical_aperture) / collected_share(eta, 1.0)
     return Reading(_vector(place), _vector(normal), exitance, area, share * exitance * area)
 
 

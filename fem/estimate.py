@@ -37,9 +37,9 @@ from tetlux.meshing.tetmesh import TetMesh
 # to 3 times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACETS = 0.5
-# With this the estimate is 0.6 to 2.3 times the true error on spheres of radius 2 to 10 in a beam, at reduced albedos
+# With this the estimate is 0.8 to 2.6 times the true error on spheres of radius 2 to 10 in a beam, at reduced albedos
 # of 0.8 to 0.99, for g from 0 to 0.9; without it it would be 0.25 to 1.1 times.
-RIPPLE = 1.0 / 40.0
+RIPPLE = 1.0 / 30.0
 # Facets whose distance from the surface could add no more than this share of the rest are not measured: a facet's
 # distance is at most this share of its longest edge, where the surface is smooth.
 NOT_MEASURED, FARTHEST = 0.02, 0.2

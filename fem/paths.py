@@ -15,8 +15,8 @@ from tetlux.meshing.cell_tree import Stretches
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
-# A beam is followed until it has faded to this share of the average ray's power; what is left stays where it is.
-FAINTEST = 1e-10
+# What a ray still carries when it has faded to this share of the average ray's power stays where it would on average.
+FAINTEST = 1e-6
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
 
@@ -126,7 +126,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
     faintest = FAINTEST * float(rays.powers.sum()) / max(len(rays.powers), 1)
     # Nothing is left after so long a way.
     longest = -np.log(FAINTEST) / float(np.min(coefficients.extinction))
-    segments, lengths_of, absorbed, ballistic, specular = [], [], 0.0, 0.0, 0.0
+    segments, lengths_of, stopped, absorbed, ballistic, specular = [], [], [], 0.0, 0.0, 0.0
     for _ in range(MOST_MEETINGS):
         if len(rays.powers) == 0:
             break
@@ -140,15 +140,18 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         absorbed += lost
         segments.append(rays)
         lengths_of.append(lengths)
+        arrived = Rays(rays.starts + lengths[:, None] * rays.directions, rays.directions, ends)
         going_on = (ends > faintest) & (lengths == distances)
-        absorbed += float(ends[~going_on].sum())
-        arrived = Rays(rays.starts + lengths[:, None] * rays.directions, rays.directions, ends)[going_on]
-        rays, gone, reflected = beyond(mesh, coefficients, arrived, met[going_on])
+        stopped.append(arrived[~going_on])
+        rays, gone, reflected = beyond(mesh, coefficients, arrived[going_on], met[going_on])
         ballistic += gone
         specular += reflected
-    absorbed += float(rays.powers.sum())
-    every = joined(segments)
+    every, left = joined(segments), joined([*stopped, rays])
+    scattered = _scattered_share(mesh, coefficients, left.starts) * left.powers
+    absorbed += float((left.powers - scattered).sum())
     return Deposit(
+        points=left.starts,
+        powers=scattered,
         specular=specular,
         absorbed=absorbed,
         ballistic=ballistic,
@@ -157,6 +160,17 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         lengths=np.concatenate([np.zeros(0), *lengths_of]),
         fluxes=every.powers,
     )
+
+
+def _scattered_share(mesh: TetMesh, coefficients: Coefficients, points: FloatArray) -> FloatArray | float:
+    """What share of a beam is scattered where it is stopped, (q,)."""
+    share = coefficients.scattering / coefficients.extinction
+    if coefficients.uniform:
+        return share
+    cells, _ = mesh.locate(points)
+    lost = np.flatnonzero(cells < 0)
+    cells[lost] = mesh.boundary_cells[mesh.closest_boundary(points[lost])[1]]
+    return at_cells(share, cells)
 
 
 def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArray) -> tuple[Rays, float, float]:

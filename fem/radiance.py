@@ -3,7 +3,7 @@
 Outside, diffuse light of exitance M has the radiance ``L = F_t(eta, theta) M/pi``, with Fresnel's transmittance on the
 way out (Jensen 2001, eq. 5). Over all directions that adds up to ``collected_share(eta, 1) M``: to the M that leaves
 where indices match, but to 0.934 of it at an index of 1.33 and 0.908 at 1.5, because M has passed the boundary already.
-Divide by that share for a radiance that adds up to M.
+Rendering has it so; divide by that share for a radiance that adds up to M, as fibres do.
 """
 
 import numpy as np

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tetlux.fem.medium import Medium
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.meshing.surface import Surface
 
 
@@ -15,9 +15,9 @@ class Region:
     ----------
     surface : Surface
         Inside the body's.
-    medium : Medium or sequence of Medium
+    medium : Medium, VaryingMedium, or sequence of these
         Of the refractive index of the body's; one for each of the body's where that is a sequence.
     """
 
     surface: Surface
-    medium: Medium | Sequence[Medium]
+    medium: AnyMedium | Sequence[AnyMedium]

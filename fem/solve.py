@@ -7,9 +7,9 @@ from typing import overload
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
+from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
-from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Subtract, sources_of
@@ -40,7 +40,7 @@ MOST_TETRAHEDRA = 1_000_000
 @overload
 def solve(
     body: Surface | TetMesh,
-    medium: Medium,
+    medium: AnyMedium,
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -57,7 +57,7 @@ def solve(
 @overload
 def solve(
     body: Surface | TetMesh,
-    medium: Sequence[Medium],
+    medium: Sequence[AnyMedium],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -73,7 +73,7 @@ def solve(
 
 def solve(
     body: Surface | TetMesh,
-    medium: Medium | Sequence[Medium],
+    medium: AnyMedium | Sequence[AnyMedium],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
@@ -93,7 +93,7 @@ def solve(
     Parameters
     ----------
     body : Surface or TetMesh
-    medium : Medium or sequence of Medium
+    medium : Medium, VaryingMedium, or sequence of these
         Of the body. Several are channels (wavelengths, or red, green and blue): all are solved on one mesh that is
         fine enough for every one of them.
     lights : sequence of Light
@@ -135,7 +135,7 @@ def solve(
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """
-    channels = [medium] if isinstance(medium, Medium) else list(medium)
+    channels = [medium] if isinstance(medium, AnyMedium) else list(medium)
     solutions = solve_each(
         body,
         channels,
@@ -149,12 +149,12 @@ def solve(
         cache=cache,
         report=report,
     )
-    return solutions[0] if isinstance(medium, Medium) else solutions
+    return solutions[0] if isinstance(medium, AnyMedium) else solutions
 
 
 def solve_each(
     body: Surface | TetMesh,
-    medium: Medium | Sequence[Medium],
+    medium: AnyMedium | Sequence[AnyMedium],
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
@@ -172,7 +172,7 @@ def solve_each(
     ----------
     body, regions, tolerance, mesh, mass, subtract, most_tetrahedra, cache, report
         As in `solve`.
-    medium : Medium or sequence of Medium
+    medium : Medium, VaryingMedium, or sequence of these
         That of all scenes, or of each.
     scenes : sequence of sequences of Light
         The lights of one scene add up; each scene has a solution of its own.
@@ -203,10 +203,8 @@ def solve_each(
         media = media_of(medium, regions, len(scenes))
         for each in dict.fromkeys(media):
             check_media(surface, each)
-        uniform = len(regions) == 0
         scene_sources = [
-            sources_of(lights, surface, each[0], subtract, uniform=uniform)
-            for lights, each in zip(scenes, media, strict=True)
+            sources_of(lights, surface, each, subtract) for lights, each in zip(scenes, media, strict=True)
         ]
 
     def steps_on(mesh: TetMesh, before: list[Step] | None) -> list[Step]:
@@ -225,7 +223,7 @@ def solve_each(
         with watch.stage("mesh"):
             mesh = tetrahedralize(surface, cache=cache)
             deposits = [deposit for sources in scene_sources for deposit in sources.deposits]
-            mesh = graded_towards(mesh, surface, *lit_points(deposits, media[0][0]), most_tetrahedra)
+            mesh = graded_towards(mesh, surface, *lit_points(deposits, base_of(media[0][0])), most_tetrahedra)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     steps = best = steps_on(mesh, None)
     least = np.inf
@@ -257,7 +255,9 @@ def solve_each(
     ]
 
 
-def media_of(medium: Medium | Sequence[Medium], regions: Sequence[Region], scenes: int) -> list[tuple[Medium, ...]]:
+def media_of(
+    medium: AnyMedium | Sequence[AnyMedium], regions: Sequence[Region], scenes: int
+) -> list[tuple[AnyMedium, ...]]:
     """The media of the body and its regions in each scene.
 
     Raises
@@ -266,8 +266,8 @@ def media_of(medium: Medium | Sequence[Medium], regions: Sequence[Region], scene
         If there are not as many media as scenes, or their refractive indices differ within a body.
     """
 
-    def of_scenes(given: Medium | Sequence[Medium], whose: str) -> list[Medium]:
-        if isinstance(given, Medium):
+    def of_scenes(given: AnyMedium | Sequence[AnyMedium], whose: str) -> list[AnyMedium]:
+        if isinstance(given, AnyMedium):
             return [given] * scenes
         if len(given) != scenes:
             raise InputError(f"{whose} has {len(given)} media for {scenes} channels; give one, or one for each.")

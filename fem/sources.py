@@ -1,13 +1,17 @@
 """What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
+from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -42,9 +46,23 @@ class Sources:
 
 
 def sources_of(
-    lights: Sequence[Light], surface: Surface, medium: Medium, subtract: Subtract, *, uniform: bool = True
+    lights: Sequence[Light],
+    surface: Surface,
+    media: Sequence[AnyMedium],
+    subtract: Subtract,
+    region_of: Callable[[FloatArray], IntArray] | None = None,
 ) -> Sources:
-    """Let lights fall into a body, which may be of one medium throughout.
+    """Let lights fall into a body.
+
+    Parameters
+    ----------
+    lights : sequence of Light
+    surface : Surface
+    media : sequence of Medium or VaryingMedium
+        Of the body, and of its regions.
+    subtract : {"half-space", "free-space", "nothing"}
+    region_of : callable, optional
+        The regions that points lie in, if there are several.
 
     Raises
     ------
@@ -55,6 +73,7 @@ def sources_of(
         raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
+    uniform = len(media) == 1 and isinstance(media[0], Medium)
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
@@ -62,23 +81,61 @@ def sources_of(
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract == "half-space"
     for number, light in enumerate(lights):
-        deposit = light.deposit_in(surface, medium, uniform=uniform)
-        no_points = replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])
-        # As many as can be afforded: beams too and with images, or points alone, at least without.
-        trials = [(deposit, no_points, images), (deposit, no_points, False)]
-        if len(deposit.starts):
-            trials.insert(0, (*in_points(deposit, medium), images))
-        known, rest = deposit, deposit
-        for bright, faint, with_images in trials:
-            if not 0 < len(bright.points) <= left:
-                continue
-            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=left)
-            if some is not None:
-                left -= len(some.positions)
-                charges.append(some)
-                owners.append(number)
-                known, rest = bright, faint
-                break
+        deposit = light.deposit_in(surface, base_of(media[0]), uniform=uniform)
+        find = _charges_in_one_medium if uniform else _charges_in_several
+        known, rest, found = find(deposit, surface, media, region_of, images=images, most=left)
+        left -= sum(len(some.positions) for some in found)
+        charges += found
+        owners += [number] * len(found)
         deposits.append(known)
         on_mesh.append(rest)
     return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+
+
+_RegionOf = Callable[[FloatArray], IntArray] | None
+
+
+def _charges_in_one_medium(
+    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], _: _RegionOf, *, images: bool, most: int
+) -> tuple[Deposit, Deposit, list[Charges]]:
+    """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
+    medium = base_of(media[0])
+    # Beams too and with images, or points alone, at least without.
+    trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
+    if len(deposit.starts):
+        trials.insert(0, (*in_points(deposit, medium), images))
+    for bright, faint, with_images in trials:
+        if 0 < len(bright.points) <= most:
+            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=most)
+            if some is not None:
+                return bright, faint, [some]
+    return deposit, deposit, []
+
+
+def _charges_in_several(
+    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], region_of: _RegionOf, *, images: bool, most: int
+) -> tuple[Deposit, Deposit, list[Charges]]:
+    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh."""
+    places = np.zeros(len(deposit.points), dtype=np.int64) if region_of is None else region_of(deposit.points)
+    found, rest = [], np.ones(len(places), dtype=bool)
+    for region in np.unique(places).tolist():
+        medium, inside = media[region], places == region
+        if isinstance(medium, Medium) and most > 0:
+            some = charges_of(
+                deposit.points[inside],
+                deposit.powers[inside],
+                surface,
+                medium,
+                images=images and region == 0,
+                most=most,
+                region=region,
+            )
+            if some is not None:
+                most -= len(some.positions)
+                rest &= ~inside
+                found.append(some)
+    return deposit, replace(deposit, points=deposit.points[rest], powers=deposit.powers[rest]), found
+
+
+def _without_points(deposit: Deposit) -> Deposit:
+    return replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])

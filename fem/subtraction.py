@@ -75,6 +75,8 @@ class Charges:
     closest : float
         Distance that no charge is seen from nearer than, unit.
     medium : Medium
+    region : int, optional
+        The region that the sources are in, if the body has several media.
     """
 
     positions: FloatArray
@@ -82,6 +84,7 @@ class Charges:
     sources: int
     closest: float
     medium: Medium
+    region: int | None = None
 
     def fluence(self, points: FloatArray) -> FloatArray:
         """Fluence at points (n, 3), (n,), W/unit²."""
@@ -128,6 +131,7 @@ def charges_of(
     *,
     images: bool,
     most: int = MOST_CHARGES,
+    region: int | None = None,
 ) -> Charges | None:
     """Point sources and their images, each in the plane that touches the surface nearest to it.
 
@@ -143,6 +147,8 @@ def charges_of(
         Without them it is the sources in free space.
     most : int
         How many charges can be afforded.
+    region : int, optional
+        See `Charges`.
 
     Returns
     -------
@@ -168,7 +174,7 @@ def charges_of(
     if count > most:
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
-    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium)
+    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium, region)
 
 
 def _image_line(depth: float, zb: float) -> tuple[FloatArray, FloatArray]:
@@ -243,6 +249,8 @@ def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
 def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
     """The patch of the tetrahedra whose nodes are all good; an empty one if that would not be sound."""
     cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
+    if charges.region is not None:
+        cells &= mesh.regions == charges.region
     patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
     return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
 
@@ -278,12 +286,11 @@ def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
     return np.concatenate([good, good[cKDTree(points).query(added)[1]]])
 
 
-def patch_terms(medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
+def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     """Assemble what a patch adds.
 
     Parameters
     ----------
-    medium : Medium
     patch : Patch
     mass : {"lumped", "consistent"}
         As in the system matrix.
@@ -292,7 +299,7 @@ def patch_terms(medium: Medium, patch: Patch, mass: Mass) -> PatchTerms:
     -------
     PatchTerms
     """
-    mesh, charges = patch.mesh, patch.charges
+    mesh, charges, medium = patch.mesh, patch.charges, patch.charges.medium
     sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
     if not patch.cells.any():
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)

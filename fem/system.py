@@ -7,17 +7,16 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import Coefficients, coefficients_on
+from tetlux.fem.coefficients import AnyMedium, Coefficients, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
-from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -41,7 +40,7 @@ class System:
     Parameters
     ----------
     mesh : TetMesh
-    medium : Medium
+    medium : Medium or VaryingMedium
         Of the body.
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
@@ -49,18 +48,18 @@ class System:
         Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     expected : int
         How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
-    inner : tuple of Medium
+    inner : tuple of Medium or VaryingMedium
         Those of the mesh's regions 1, 2, ....
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     """
 
     mesh: TetMesh
-    medium: Medium
+    medium: AnyMedium
     surface: Surface | None = None
     mass: Mass = "lumped"
     expected: int = 1
-    inner: tuple[Medium, ...] = ()
+    inner: tuple[AnyMedium, ...] = ()
     assembly: Assembly | None = None
 
     @cached_property
@@ -102,7 +101,7 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.medium, subtract, uniform=self.coefficients.uniform)
+            sources = sources_of(lights, self.body, (self.medium, *self.inner), subtract, self._region_of)
         solution, _, _ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=sources.warnings)
 
@@ -117,7 +116,7 @@ class System:
         self, sources: Sources, watch: Stopwatch, before: Step | None
     ) -> tuple[Solution, tuple[BoolArray, ...], FloatArray]:
         """The solution, where its charges are good guesses, and what was put on the nodes."""
-        mesh, medium = self.mesh, self.medium
+        mesh = self.mesh
         with watch.stage("assemble"):
             deposits = [deposit.on(mesh, self.body, self.coefficients) for deposit in sources.on_mesh]
             loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
@@ -132,7 +131,7 @@ class System:
                     patch_of(mesh, charges, inherited(good, coarse, mesh))
                     for charges, good in zip(sources.charges, before.good, strict=True)
                 ]
-            terms = [patch_terms(medium, patch, self.mass) for patch in patches]
+            terms = [patch_terms(patch, self.mass) for patch in patches]
             solver = self.solver
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
@@ -144,7 +143,7 @@ class System:
             with watch.stage("assemble"):
                 for i in worse:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(medium, patches[i], self.mass)
+                    terms[i] = patch_terms(patches[i], self.mass)
             with watch.stage("solve"):
                 parts[:, worse] = solver.solve(np.column_stack([terms[i].load for i in worse]))
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
@@ -171,10 +170,15 @@ class System:
             ballistic=deposit.ballistic,
         )
         solution = Solution(
-            mesh, self.body, self.medium, fluence, ledger, tuple(patches), deposit.transmitted_irradiance
+            mesh, self.body, self.coefficients.outer, fluence, ledger, tuple(patches), deposit.transmitted_irradiance
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
+
+    def _region_of(self, points: FloatArray) -> IntArray:
+        """The regions that points inside lie in, (q,)."""
+        cells, _ = self.mesh.locate(points)
+        return np.asarray(np.where(cells >= 0, self.mesh.regions[cells], 0))
 
     @cached_property
     def _absorbing(self) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
@@ -46,21 +47,22 @@ def check_size(surface: Surface, medium: Medium) -> None:
     )
 
 
-def check_media(surface: Surface, media: Sequence[Medium]) -> None:
+def check_media(surface: Surface, media: Sequence[AnyMedium]) -> None:
     """Refuse media that do not go together, or with the body: the body's own first, then those of its regions.
 
     Raises
     ------
     InputError
     """
-    for medium in media:
+    outer = base_of(media[0])
+    for medium in map(base_of, media):
         check_scattering(medium)
-        if (medium.eta, medium.boundary) != (media[0].eta, media[0].boundary):
+        if (medium.eta, medium.boundary) != (outer.eta, outer.boundary):
             raise InputError(
-                f"a region's refractive index of {medium.eta:g} is not the body's {media[0].eta:g}, or its boundary "
+                f"a region's refractive index of {medium.eta:g} is not the body's {outer.eta:g}, or its boundary "
                 "is another; light that is reflected between regions is not modelled: give both the same."
             )
-    check_size(surface, media[0])
+    check_size(surface, outer)
 
 
 def warnings_for(surface: Surface, medium: Medium) -> list[str]:

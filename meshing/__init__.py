@@ -4,6 +4,7 @@ from tetlux.meshing.errors import InputError, RunError, TetluxError
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.refine import refine
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface import Surface
@@ -16,6 +17,7 @@ __all__ = [
     "TetMesh",
     "TetluxError",
     "box",
+    "check_regions",
     "cylinder",
     "read_surface",
     "refine",

@@ -37,6 +37,7 @@ def main() -> None:
             stop_energy=float(job["stop_energy"]),
             vtk_ordering=True,
             quiet=True,
+            disable_filtering=not bool(job["filtered"]),
         )
     np.savez(Path("output.npz"), points=points, tetrahedra=tetrahedra)
 

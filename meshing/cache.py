@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # To be raised whenever the code makes other meshes of the same settings, or writes them otherwise.
-FORMAT = 1
+FORMAT = 2
 # Bytes; the entries that were used longest ago go first.
 LIMIT = 1_000_000_000
 # Seconds after which a half-written file was left by a process that died.
@@ -38,12 +39,14 @@ def cache_directory() -> Path:
     return base / "tetlux"
 
 
-def mesh_key(surface: Surface, **settings: float | str) -> str:
-    """A name for the mesh that these settings make of a surface: a hash of its content and of them."""
-    shape = [surface.points.shape, surface.faces.shape, surface.crease_angle, surface.overlaps]
-    digest = hashlib.blake2b(json.dumps([FORMAT, shape, sorted(settings.items())]).encode(), digest_size=20)
-    digest.update(surface.points.astype("<f8").tobytes())
-    digest.update(surface.faces.astype("<i8").tobytes())
+def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: float | str) -> str:
+    """A name for the mesh that these settings make of a surface and those in it: a hash of all that."""
+    surfaces = [surface, *regions]
+    shapes = [[s.points.shape, s.faces.shape, s.crease_angle, s.overlaps, s.unit == surface.unit] for s in surfaces]
+    digest = hashlib.blake2b(json.dumps([FORMAT, shapes, sorted(settings.items())]).encode(), digest_size=20)
+    for each in surfaces:
+        digest.update(each.points.astype("<f8").tobytes())
+        digest.update(each.faces.astype("<i8").tobytes())
     return digest.hexdigest()
 
 
@@ -53,10 +56,11 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     try:
         # Opened here: np.load leaves a file that is cut off open.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            points, tetrahedra = data["points"], data["tetrahedra"]
-            if str(data["key"]) != key or (points.dtype, tetrahedra.dtype) != (np.float64, np.int64):
+            points, tetrahedra, regions = data["points"], data["tetrahedra"], data["regions"]
+            types = points.dtype, tetrahedra.dtype, regions.dtype
+            if str(data["key"]) != key or types != (np.float64, np.int64, np.int64):
                 return None
-        mesh = TetMesh(points, tetrahedra, unit)
+        mesh = TetMesh(points, tetrahedra, unit, regions)
     except Exception:  # whatever a foreign, cut or damaged file can make its reader raise: it is a miss
         return None
     with contextlib.suppress(OSError):
@@ -71,7 +75,13 @@ def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
         with tempfile.NamedTemporaryFile(dir=directory, suffix=".part", delete=False) as file:
             part = Path(file.name)
             try:
-                np.savez(file, points=mesh.points, tetrahedra=mesh.tetrahedra, key=np.array(key))
+                np.savez(
+                    file,
+                    points=mesh.points,
+                    tetrahedra=mesh.tetrahedra,
+                    regions=mesh.regions,
+                    key=np.array(key),
+                )
             except BaseException:
                 part.unlink()
                 raise

@@ -1,9 +1,11 @@
 """Volume meshes on disk, and surfaces with values on them, through meshio."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
@@ -11,10 +13,12 @@ from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 SUFFIXES = (".vtu", ".msh")
+# What the regions of tetrahedra are called in files.
+REGION = "region"
 
 
 def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
-    """Read a tetrahedral mesh.
+    """Read a tetrahedral mesh, and its regions if it has them.
 
     Parameters
     ----------
@@ -40,7 +44,9 @@ def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
     _check_suffix(path)
     try:
         data = meshio.read(path)
-        cells = [block.data for block in data.cells if block.type == "tetra"]
+        chosen = [i for i, block in enumerate(data.cells) if block.type == "tetra"]
+        cells = [data.cells[i].data for i in chosen]
+        tags = [data.cell_data[REGION][i] for i in chosen] if REGION in data.cell_data else []
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
         raise InputError(f"{path} is not a readable {path.suffix} mesh; export it again.") from error
     if not cells:
@@ -50,11 +56,12 @@ def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
     negative = tetrahedron_volumes(points, tetrahedra) < 0
     tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
     used, compact = np.unique(tetrahedra, return_inverse=True)
-    return TetMesh(points[used], compact.reshape(tetrahedra.shape), unit)
+    mesh = TetMesh(points[used], compact.reshape(tetrahedra.shape), unit)
+    return replace(mesh, regions=np.concatenate(tags).reshape(-1).astype(np.int64)) if tags else mesh
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:
-    """Write a tetrahedral mesh, with named values at its nodes.
+    """Write a tetrahedral mesh, with named values at its nodes, and with the `region` of its tetrahedra if several.
 
     Parameters
     ----------
@@ -70,7 +77,11 @@ def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray]
     """
     path = Path(path)
     _check_suffix(path)
-    _write(path, mesh.points, "tetra", mesh.tetrahedra, values, "vtu" if path.suffix == ".vtu" else "gmsh")
+    file_format = "vtu" if path.suffix == ".vtu" else "gmsh"
+    # gmsh's values are floating-point numbers.
+    tags = mesh.regions.astype(np.int32 if file_format == "vtu" else np.float64)
+    cell_values = {REGION: tags} if tags.any() else {}
+    _write(path, mesh.points, "tetra", mesh.tetrahedra, values, file_format, cell_values)
 
 
 def write_surface(surface: Surface, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:
@@ -90,8 +101,14 @@ def _write(
     cells: IntArray | np.ndarray[tuple[int, int], np.dtype[np.int32]],
     values: Mapping[str, FloatArray] | None,
     file_format: str,
+    cell_values: Mapping[str, npt.NDArray[np.generic]] | None = None,
 ) -> None:
     import meshio  # noqa: PLC0415
 
-    mesh = meshio.Mesh(points, [(kind, cells)], point_data=dict(values or {}))
+    mesh = meshio.Mesh(
+        points,
+        [(kind, cells)],
+        point_data=dict(values or {}),
+        cell_data={name: [array] for name, array in (cell_values or {}).items()},
+    )
     mesh.write(path, file_format=file_format)

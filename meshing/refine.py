@@ -1,10 +1,13 @@
 """Refinement of marked tetrahedra, with new boundary nodes on the true surface."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import count
 
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
+from tetlux.meshing.regions import nodes_of
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_volumes
 
@@ -12,6 +15,8 @@ from tetlux.meshing.tetmesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_v
 # below this quality, no tetrahedron may get worse. Otherwise the move is shortened.
 SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
+# A node on two surfaces goes to one and the other in turn so often, which ends where they meet.
+ROUNDS = 10
 # The edges of a tetrahedron, and of each of its faces.
 _GROUPS = [list(range(6)), *EDGES_OF_FACES.tolist()]
 # Even permutations of the corners that put each edge first, and where they put the edges.
@@ -21,7 +26,9 @@ _ITS_EDGES = np.array(
 )
 
 
-def refine(mesh: TetMesh, marked: BoolArray, surface: Surface | None = None) -> TetMesh:
+def refine(
+    mesh: TetMesh, marked: BoolArray, surface: Surface | None = None, regions: Sequence[Surface] = ()
+) -> TetMesh:
     """Split marked tetrahedra (and as many neighbours as keeps the mesh conforming) by longest edges.
 
     Parameters
@@ -30,21 +37,32 @@ def refine(mesh: TetMesh, marked: BoolArray, surface: Surface | None = None) -> 
     marked : (m,) ndarray of bool
     surface : Surface, optional
         Where new boundary nodes are moved to; without it they stay in the middle of their edges.
+    regions : sequence of Surface
+        Where new nodes between regions are moved to: the inner surfaces that the mesh was made of, in their order.
 
     Returns
     -------
     TetMesh
-        Its first ``len(mesh.points)`` nodes are those of `mesh`.
+        Its first ``len(mesh.points)`` nodes are those of `mesh`; parts of a tetrahedron are in its region.
+
+    Raises
+    ------
+    InputError
+        If `mesh` has more regions than there are inner surfaces, unless there are none.
     """
-    points, tetrahedra = _bisected(mesh, marked)
+    points, tetrahedra, parents = _bisected(mesh, marked)
     fine = TetMesh(points, tetrahedra, mesh.unit)
+    if mesh.regions.any():
+        fine = replace(fine, regions=mesh.regions[parents])
     if surface is None:
         return fine
-    return moved_to_surface(fine, surface, first=len(mesh.points))
+    return moved_to_surface(fine, surface, regions, first=len(mesh.points))
 
 
-def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray]:
-    """Bisection by longest edges (Plaza & Carey 2000, refinement based on the skeleton).
+def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """New points and tetrahedra, and the old tetrahedron that each is part of.
+
+    Bisection by longest edges (Plaza & Carey 2000, refinement based on the skeleton).
 
     All edges have one order, by length. A tetrahedron or a face any of whose edges is split has its longest one
     split too, and the split edges of a tetrahedron are halved from the longest to the shortest: both sides of a face
@@ -59,13 +77,16 @@ def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray]:
     middle_of_edge = np.full(len(ends), -1)
     middle_of_edge[split] = len(mesh.points) + np.arange(len(split))
 
-    corners, middles, done = mesh.tetrahedra, middle_of_edge[edges], []
+    corners, middles, parents = mesh.tetrahedra, middle_of_edge[edges], np.arange(len(edges))
+    done, parents_of_done = [], []
     while True:
         ready = (middles < 0).all(axis=1)
         done.append(corners[ready])
-        corners, middles, priority = corners[~ready], middles[~ready], priority[~ready]
+        parents_of_done.append(parents[ready])
+        corners, middles = corners[~ready], middles[~ready]
+        priority, parents = priority[~ready], parents[~ready]
         if len(corners) == 0:
-            return points, np.concatenate(done)
+            return points, np.concatenate(done), np.concatenate(parents_of_done)
         longest = np.where(middles >= 0, priority, -1).argmax(axis=1)
         corners = np.take_along_axis(corners, _EDGE_FIRST[longest], axis=1)
         middles = np.take_along_axis(middles, _ITS_EDGES[longest], axis=1)
@@ -76,7 +97,7 @@ def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray]:
         middles_of_halves[0][:, [0, 3, 4]] = -1
         middles_of_halves[1][:, [0, 1, 2]] = -1
         corners, middles = halves.reshape(-1, 4), middles_of_halves.reshape(-1, 6)
-        priority = np.concatenate([priority, priority])
+        priority, parents = np.concatenate([priority, priority]), np.concatenate([parents, parents])
 
 
 def _closed(edges: IndexArray, priority: IndexArray, marked: BoolArray, count: int) -> BoolArray:
@@ -93,20 +114,25 @@ def _closed(edges: IndexArray, priority: IndexArray, marked: BoolArray, count: i
     return split
 
 
-def moved_to_surface(mesh: TetMesh, surface: Surface, *, first: int = 0) -> TetMesh:
+def moved_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] = (), *, first: int = 0) -> TetMesh:
     """Move boundary nodes (those numbered `first` and up) to the nearest point of a surface.
+
+    Nodes between regions are moved to the inner surfaces, and those where surfaces touch onto both.
 
     A node whose move would invert or squash a tetrahedron goes only part of the way, or stays. On fTetWild's
     meshes 0 to 5 % of the nodes do, and the worst quality stays above 0.1 where it was.
     """
-    nodes = mesh.boundary_nodes[mesh.boundary_nodes >= first]
-    if len(nodes) == 0:
+    targets = [(target, np.flatnonzero(nodes[first:]) + first) for target, nodes in nodes_of(mesh, surface, regions)]
+    surfaces_at = np.bincount(np.concatenate([nodes for _, nodes in targets]), minlength=len(mesh.points))
+    if not surfaces_at.any():
         return mesh
-    target, _ = surface.project(mesh.points[nodes])
-    step = np.zeros_like(mesh.points)
-    step[nodes] = target - mesh.points[nodes]
-    share = np.zeros(len(mesh.points))
-    share[nodes] = 1.0
+    aim = mesh.points.copy()
+    for again in range(ROUNDS if surfaces_at.max() > 1 else 1):
+        for target, nodes in targets:
+            some = nodes[surfaces_at[nodes] > 1] if again else nodes
+            aim[some], _ = target.project(aim[some])
+    step = aim - mesh.points
+    share = (surfaces_at > 0).astype(np.float64)
     touched = mesh.tetrahedra[(share[mesh.tetrahedra] > 0).any(axis=1)]
     least = SMALLEST_SHARE * tetrahedron_volumes(mesh.points, touched)
     before = TetMesh(mesh.points, touched).quality
@@ -121,4 +147,4 @@ def moved_to_surface(mesh: TetMesh, surface: Surface, *, first: int = 0) -> TetM
         if not squashed.any():
             break
         share[np.unique(touched[squashed])] *= 0.5 if attempt < 6 else 0.0
-    return TetMesh(moved, mesh.tetrahedra, mesh.unit)
+    return replace(mesh, points=moved)

@@ -1,6 +1,6 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -15,11 +15,13 @@ from tetlux.meshing.rays import RayCaster
 from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
-_FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 # The edges of the face opposite each corner.
 EDGES_OF_FACES = np.array([[3, 4, 5], [1, 2, 5], [0, 2, 4], [0, 1, 3]])
 # Corners of a tetrahedron's edges, in the order of `TetMesh.tetrahedron_edges`.
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+
+_NO_REGIONS = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +35,8 @@ class TetMesh:
     tetrahedra : (m, 4) ndarray
         Corners; the first three are anticlockwise seen from the fourth's far side, so volumes are positive.
     unit : str
+    regions : (m,) ndarray of int, optional
+        The region of each tetrahedron: 0 is the body itself, and the others are numbered from 1; all 0 if not given.
 
     Raises
     ------
@@ -43,6 +47,7 @@ class TetMesh:
     points: FloatArray
     tetrahedra: IntArray
     unit: str = "mm"
+    regions: IntArray = field(default_factory=lambda: _NO_REGIONS)
 
     def __post_init__(self) -> None:
         p, t = self.points, self.tetrahedra
@@ -52,6 +57,11 @@ class TetMesh:
             raise InputError("a tetrahedron names a node that does not exist.")
         if not np.isfinite(p).all():
             raise InputError("a node's coordinate is not finite.")
+        if self.regions is _NO_REGIONS:
+            # Zeros that take no memory.
+            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(t)))
+        elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu" or self.regions.min() < 0:
+            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, integers from 0 up.")
         bad = int((self.volumes <= 0).sum())
         if bad:
             raise InputError(f"{bad} of {len(t)} tetrahedra are inverted or flat; orient and clean the mesh.")
@@ -106,7 +116,7 @@ class TetMesh:
 
         def fill(block: slice) -> None:
             corners = np.ascontiguousarray(self.tetrahedra[block].T)
-            for face, (i, j, k) in enumerate(_FACES):
+            for face, (i, j, k) in enumerate(FACES):
                 a, b, c = corners[i], corners[j], corners[k]
                 low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
                 pair = low * nodes + (a + b + c - low - high)
@@ -119,7 +129,7 @@ class TetMesh:
         if not small:
             keys += (grouped(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
         places = once(keys.reshape(-1))
-        return places, self.tetrahedra[places[:, None] // 4, _FACES[places % 4]]
+        return places, self.tetrahedra[places[:, None] // 4, FACES[places % 4]]
 
     @property
     def boundary_faces(self) -> IntArray:
@@ -135,6 +145,35 @@ class TetMesh:
     def boundary_edges(self) -> IndexArray:
         """The three edges of each boundary triangle, (f, 3)."""
         return np.asarray(self.tetrahedron_edges[self.boundary_cells[:, None], EDGES_OF_FACES[self._boundary[0] % 4]])
+
+    @cached_property
+    def interfaces(self) -> tuple[IntArray, IntArray]:
+        """Triangles between tetrahedra of different regions.
+
+        Returns
+        -------
+        faces : (f, 3) ndarray
+            Node numbers, anticlockwise seen from the second region.
+        regions : (f, 2) ndarray
+            The regions on either side, the smaller number first.
+        """
+        kinds_at = np.zeros(len(self.points), dtype=np.int64)
+        for kind in np.unique(self.regions):
+            touched = np.zeros(len(kinds_at), dtype=bool)
+            touched[self.tetrahedra[self.regions == kind]] = True
+            kinds_at += touched
+        # Both sides of every such triangle are among those whose corners are all of several regions.
+        between = kinds_at > 1
+        cells = np.flatnonzero(between[self.tetrahedra].sum(axis=1) > 2)
+        faces = self.tetrahedra[cells][:, FACES].reshape(-1, 3)
+        chosen = between[faces].all(axis=1)
+        faces, region = faces[chosen], self.regions[np.repeat(cells, 4)[chosen]]
+        key = np.sort(faces, axis=1)
+        order = np.lexsort((region, key[:, 2], key[:, 1], key[:, 0]))
+        first, second = order[:-1], order[1:]
+        pair = (key[first] == key[second]).all(axis=1) & (region[first] != region[second])
+        first, second = first[pair], second[pair]
+        return faces[first], np.column_stack([region[first], region[second]])
 
     @cached_property
     def boundary_nodes(self) -> IntArray:

@@ -11,6 +11,7 @@ from skfem.helpers import dot, grad
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium
 from tetlux.fem.assembly import Assembly, Mass, system_matrix
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.forms import weak_form_matrix
 from tetlux.meshing import TetMesh
 from tetlux.meshing.tetmesh import tetrahedron_volumes
@@ -109,9 +110,9 @@ def test_linear_functions_are_exact() -> None:
 
 def test_matrices_of_one_assembly_share_their_pattern_and_nothing_else() -> None:
     assembly = Assembly(block((4, 4, 4), (1.0, 1.0, 1.0)))
-    first = assembly.of(TISSUE)
+    first = assembly.of(coefficients_of(TISSUE))
     before = first.toarray()
-    second = assembly.of(Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.2))
+    second = assembly.of(coefficients_of(Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.2)))
     assert np.shares_memory(first.indices, second.indices)
     assert not np.shares_memory(first.data, second.data)
     assert (first.toarray() == before).all()

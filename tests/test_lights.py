@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, solve
+from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, paths, solve
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.fresnel import reflectance
-from tetlux.fem.lights import pencil
 from tetlux.fem.loads import load_vector
 from tetlux.meshing import InputError, Surface, TetMesh, box, slab, sphere, surface_from_arrays
 
@@ -54,7 +53,8 @@ def test_a_slanting_beam_refracts() -> None:
 def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -> None:
     thin = slab(20.0, 0.5)
     beam = PencilBeam((0.1, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
-    deposit = beam.deposit_in(thin, FORWARD)
+    mesh = block((8, 8, 2), (20.0, 20.0, 0.5))
+    deposit = beam.deposit_in(thin, FORWARD).on(mesh, thin, coefficients_of(FORWARD))
     extinction = 0.05 + 10 * (1 - 0.81)
     lost = (0.4 / 2.4) ** 2
     through = (1 - lost) * math.exp(-extinction * 0.5)
@@ -66,9 +66,7 @@ def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -
     scattered = (1 - lost - deposit.ballistic) * 1.9 / 1.95
     assert deposit.absorbed == pytest.approx((1 - lost - deposit.ballistic) * 0.05 / 1.95, rel=1e-9)
     assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-12)
-    assert load_vector(block((8, 8, 2), (20.0, 20.0, 0.5)), coefficients_of(FORWARD), deposit).sum() == pytest.approx(
-        scattered
-    )
+    assert load_vector(mesh, coefficients_of(FORWARD), deposit).sum() == pytest.approx(scattered)
 
 
 @pytest.mark.parametrize("counts", [(1, 1, 1), (2, 2, 3), (3, 5, 7)])
@@ -187,7 +185,8 @@ def test_a_slanting_line_beam_meets_the_far_face_at_its_angle() -> None:
     direction = (math.sin(angle), 0.0, -math.cos(angle))
     clear = Medium(sigma_a=0.0, sigma_s=0.1, g=0.0, eta=1.4)
     beam = PencilBeam((-3 * direction[0], 0.1, 3 * math.cos(angle)), direction, deposit="line")
-    deposit = beam.deposit_in(slab(400.0, 4.0), clear)
+    plate, mesh = slab(400.0, 4.0), block((4, 4, 2), (400.0, 400.0, 4.0))
+    deposit = beam.deposit_in(plate, clear).on(mesh, plate, coefficients_of(clear))
     inside = math.asin(math.sin(angle) / 1.4)
     assert deposit.lengths[:3] == pytest.approx(4 / math.cos(inside))
     # Stokes: the same share is reflected from inside at the refracted angle as from outside at the first.
@@ -199,13 +198,14 @@ def test_a_slanting_line_beam_meets_the_far_face_at_its_angle() -> None:
 
 
 def test_what_is_still_caught_after_many_reflections_is_booked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pencil, "REFLECTIONS", 3)
+    monkeypatch.setattr(paths, "MOST_MEETINGS", 2)
     clear = Medium(sigma_a=0.001, sigma_s=0.1, g=0.5, eta=4.0)
     beam = PencilBeam((0.2, 0.1, 2.0), (0.3, 0.2, -1.0), deposit="line")
-    deposit = beam.deposit_in(box((2.0, 2.0, 2.0)), clear)
-    mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
+    cube, mesh = box((2.0, 2.0, 2.0)), block((2, 2, 2), (2.0, 2.0, 2.0))
     mesh = TetMesh(mesh.points + np.array([0.0, 0.0, 1.0]), mesh.tetrahedra)
+    deposit = beam.deposit_in(cube, clear).on(mesh, cube, coefficients_of(clear))
     scattered = load_vector(mesh, coefficients_of(clear), deposit).sum()
+    # The first way, and of each of the others what is reflected.
     assert len(deposit.lengths) == 3
     assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-10)
 

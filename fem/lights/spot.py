@@ -139,6 +139,16 @@ class Gaussian:
         return np.where(across <= self.reach**2, share, 0.0)
 
 
+def check_pixels(pixels: FloatArray) -> None:
+    """Refuse what is no image of brightness, or one that is black all over."""
+    if pixels.ndim != 2 or min(pixels.shape) < 1:
+        raise InputError(f"the image has the shape {pixels.shape}; give rows and columns of brightness.")
+    if not np.isfinite(pixels).all() or (pixels < 0).any():
+        raise InputError("the image holds a brightness that is not a number or negative.")
+    if not (pixels > 0).any():
+        raise InputError("the image is black all over; no light would fall on the body.")
+
+
 def _axes(direction: FloatArray, up: Vector) -> tuple[FloatArray, FloatArray]:
     """Unit vectors to the right and up on the plane across a beam, as one sees it who looks along the beam."""
     raised = as_vector(up, "up")
@@ -229,12 +239,7 @@ class Image:
     def __post_init__(self) -> None:
         as_vector(self.center, "center")
         _check_length(self.width, "width")
-        if self.pixels.ndim != 2 or min(self.pixels.shape) < 1:
-            raise InputError(f"the image has the shape {self.pixels.shape}; give rows and columns of brightness.")
-        if not np.isfinite(self.pixels).all() or (self.pixels < 0).any():
-            raise InputError("the image holds a brightness that is not a number or negative.")
-        if not (self.pixels > 0).any():
-            raise InputError("the image is black all over; no light would fall on the body.")
+        check_pixels(self.pixels)
 
     @cached_property
     def _coarse(self) -> FloatArray:
