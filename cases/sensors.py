@@ -83,9 +83,10 @@ def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> Non
     """Write readings as a table, units in its head."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        places = [f"{axis} [{unit}]" for axis in "xyz"]
-        writer.writerow(["name", "kind", "channel", "light", *places, f"exitance [W/{unit}²]", "power [W]"])
+        axes = [f"{axis} [{unit}]" for axis in "xyz"]
+        writer.writerow(["name", "kind", "channel", "light", *axes, f"exitance [W/{unit}²]", "power [W]"])
         for row in rows:
             power = "" if row["power"] is None else repr(row["power"])
             names = [row[key] for key in ("name", "kind", "channel", "light")]
-            writer.writerow([*names, *row["position"], row["exitance"], power])
+            places = [f"{value:.9g}" for value in row["position"]]
+            writer.writerow([*names, *places, row["exitance"], power])
