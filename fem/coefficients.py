@@ -83,16 +83,16 @@ def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
     for region, medium in enumerate(media):
         inside = np.flatnonzero(mesh.regions == region)
         if isinstance(medium, Medium):
-            scattering, cosine = medium.delta_eddington
-            values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, scattering, cosine])[:, None]
+            values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington])[:, None]
             continue
         # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
         points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
         at = medium.at(points.reshape(-1, 3))
-        sigma_a, sigma_s_prime = (value.reshape(-1, 4).mean(axis=1) for value in at)
-        scattering_of, cosine = medium.delta_eddington(sigma_s_prime)
-        values[:, inside] = sigma_a, sigma_a + sigma_s_prime, scattering_of, np.full(len(inside), cosine)
-    return Coefficients(*values, outer=outer)
+        absorption, reduced = (value.reshape(-1, 4).mean(axis=1) for value in at)
+        peaked, forward = medium.delta_eddington(reduced)
+        values[:, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
+    each: list[FloatArray] = list(values)
+    return Coefficients(each[0], each[1], each[2], each[3], outer)
 
 
 def base_of(medium: AnyMedium) -> Medium:

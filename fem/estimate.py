@@ -13,7 +13,12 @@ Flat facets instead of a curved boundary, a distance delta away, add the shape d
 
     ∮ |delta| [ D |grad_t phi . grad_t z| + sigma_a phi z + |kappa - 1/zb| J z ]
 
-with J the net flux that leaves and kappa twice the mean curvature. Sums of moduli, so errors that cancel are counted.
+with J the net flux that leaves and kappa twice the mean curvature; at interfaces between regions, with jumps [.] across
+them, it is::
+
+    ∮ |delta| [ |[D]| |grad_t phi . grad_t z| + |[1/D]| |D dphi/dn D dz/dn| + |[sigma_a]| phi z + |[Q0]| z ]
+
+Sums of moduli, so errors that cancel are counted.
 
 Where light is deposited all along the boundary, as that of a beam is, the exitance ripples from node to node as the
 tetrahedra do. To what leaves in sum that adds nothing, and no dual shows it; it goes with the density q of what is
@@ -22,6 +27,7 @@ deposited, and its square is integrated over the boundary::
     ripple² = RIPPLE² ∮ (h² q / (2A D))²
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +35,9 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
-from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface import Surface, longest_sides
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.regions import owners
+from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
 # Facets of a round body err to one side, and partly against the gradients: with half of their sum the estimate is 0.6
@@ -68,7 +75,14 @@ class Estimate:
         return float(self.shares.sum())
 
 
-def estimated(solution: Solution, coefficients: Coefficients, load: FloatArray, solver: Solver) -> Estimate:
+def estimated(
+    solution: Solution,
+    coefficients: Coefficients,
+    solver: Solver,
+    load: FloatArray,
+    emission: float | FloatArray = 0.0,
+    inner: Sequence[Surface] = (),
+) -> Estimate:
     """Estimate the error of a solution.
 
     Parameters
@@ -76,10 +90,14 @@ def estimated(solution: Solution, coefficients: Coefficients, load: FloatArray, 
     solution : Solution
     coefficients : Coefficients
         Of its mesh.
-    load : (n,) ndarray
-        What the lights put on the nodes, W.
     solver : Solver
         Of its system matrix.
+    load : (n,) ndarray
+        What the lights put on the nodes, W.
+    emission : float or (m,) ndarray
+        Of the volume, W/unit³.
+    inner : sequence of Surface
+        Of the mesh's regions, if there are any.
 
     Returns
     -------
@@ -98,11 +116,12 @@ def estimated(solution: Solution, coefficients: Coefficients, load: FloatArray, 
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     duals = solver.solve(loads)
 
-    rough = _roughness(mesh, fluence)
+    groups = _groups(mesh)
+    rough = _roughness(mesh, groups, fluence)
     smooth = fluence[mesh.tetrahedra]
     for patch in patches:
         inside = patch.cells[:, None]
-        rough -= inside[..., None] * _roughness(mesh, patch.at_nodes)
+        rough -= inside[..., None] * _roughness(mesh, groups, patch.at_nodes)
         smooth = smooth - inside * patch.at_nodes[mesh.tetrahedra]
     slope_gap = _size(rough)
     corners = (mesh.tetrahedra[mesh.boundary_cells][:, None, :] == mesh.boundary_faces[:, :, None]).argmax(axis=2)
@@ -110,11 +129,12 @@ def estimated(solution: Solution, coefficients: Coefficients, load: FloatArray, 
     leaving[mesh.boundary_nodes] = exitance - solution.transmitted_irradiance
 
     def shares_by(dual: FloatArray) -> FloatArray:
-        shares = coefficients.diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, dual))
+        shares = coefficients.diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, groups, dual))
         shares += coefficients.sigma_a * mesh.volumes * _lumping(smooth, dual[mesh.tetrahedra])
         of_faces = _lumping(np.take_along_axis(smooth[mesh.boundary_cells], corners, axis=1), dual[mesh.boundary_faces])
         shares += np.bincount(mesh.boundary_cells, robin * mesh.boundary_areas * of_faces, minlength=len(shares))
-        return shares + FACETS * _of_facets(mesh, coefficients, surface, (fluence, leaving, dual), float(shares.sum()))
+        shares += FACETS * _of_facets(mesh, coefficients, surface, (fluence, leaving, dual), float(shares.sum()))
+        return shares + FACETS * _of_interfaces(mesh, coefficients, inner, emission, (fluence, dual))
 
     shares, power_shares = (shares_by(dual) for dual in duals.T)
     return Estimate(shares + _ripple(mesh, coefficients, load, size), power_shares)
@@ -130,7 +150,7 @@ def _ripple(mesh: TetMesh, coefficients: Coefficients, load: FloatArray, size: f
     height = RIPPLE * square * density * coefficients.escape / at_cells(coefficients.diffusion, cells)
     shares = np.bincount(cells, mesh.boundary_areas * height**2, minlength=len(mesh.tetrahedra))
     total = float(np.sqrt(shares.sum()))
-    return np.asarray(shares / (total * size)) if total > 0 else shares
+    return np.asarray(shares / (total * size if total > 0 else 1.0), dtype=np.float64)
 
 
 def _size(rough: FloatArray) -> FloatArray:
@@ -138,11 +158,30 @@ def _size(rough: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("mij,mij->m", rough, rough) / 4.0))
 
 
-def _roughness(mesh: TetMesh, values: FloatArray) -> FloatArray:
-    """What averaging over the nodes takes off a gradient, at the corners of each tetrahedron, (m, 4, 3)."""
+def _groups(mesh: TetMesh) -> IntArray:
+    """Numbers of the corners of each tetrahedron, (m, 4): at a node between regions, another one for each of these."""
+    if not mesh.regions.any():
+        return mesh.tetrahedra
+    keys = mesh.tetrahedra * (int(mesh.regions.max()) + 1) + mesh.regions[:, None]
+    return np.asarray(np.unique(keys, return_inverse=True)[1].reshape(keys.shape), dtype=np.int64)
+
+
+def _roughness(mesh: TetMesh, groups: IntArray, values: FloatArray) -> FloatArray:
+    """What averaging over the nodes takes off a gradient, at the corners of each tetrahedron, (m, 4, 3).
+
+    Across an interface, where the gradient jumps, it is not averaged.
+    """
     slope = np.einsum("mij,mi->mj", mesh.hat_gradients, values[mesh.tetrahedra])
-    mean = np.column_stack([mesh.to_nodes(mesh.volumes * part) for part in slope.T]) / mesh.node_volumes[:, None]
-    return np.asarray(mean[mesh.tetrahedra] - slope[:, None])
+
+    def at_corners(shares: FloatArray) -> FloatArray:
+        sums = np.zeros(int(groups.max()) + 1)
+        for corner in groups.T:
+            sums += np.bincount(corner, shares, minlength=len(sums))
+        return sums
+
+    volumes = at_corners(mesh.volumes)
+    mean = np.column_stack([at_corners(mesh.volumes * part) / volumes for part in slope.T])
+    return np.asarray(mean[groups] - slope[:, None])
 
 
 def _lumping(first: FloatArray, second: FloatArray) -> FloatArray:
@@ -185,3 +224,42 @@ def _of_facets(
     bent = np.abs(curvature - 1.0 / extrapolation[measured]) * outflow[measured]
     added = MEAN_OVER_MIDDLE * distance * areas[measured] * (along[measured] + bent)
     return np.asarray(np.bincount(cells[measured], added, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+
+
+def _of_interfaces(
+    mesh: TetMesh,
+    coefficients: Coefficients,
+    inner: Sequence[Surface],
+    emission: float | FloatArray,
+    values: tuple[FloatArray, FloatArray],
+) -> FloatArray:
+    """What flat facets between regions add, (m,), by the fluence and the dual at the nodes."""
+    added = np.zeros(len(mesh.tetrahedra))
+    if len(inner) == 0:
+        return added
+    faces, pairs, cells = mesh.interfaces
+    corners = mesh.points[faces]
+    middles, owner = corners.mean(axis=1), owners(pairs, inner)
+    distance = np.zeros(len(faces))
+    for region in np.unique(owner):
+        mine = owner == region
+        distance[mine] = np.linalg.norm(inner[region - 1].project(middles[mine])[0] - middles[mine], axis=1)
+    normals, areas = triangle_areas(mesh.points, faces)
+    diffusion, sigma_a, density = (
+        np.column_stack([at_cells(value, side) for side in cells.T])
+        for value in (coefficients.diffusion, coefficients.sigma_a, emission)
+    )
+    means, flows, tangents = [], [], []
+    for at_nodes in values:
+        slopes = np.einsum("fsij,fsi->fsj", mesh.hat_gradients[cells], at_nodes[mesh.tetrahedra[cells]])
+        across = np.einsum("fsj,fj->fs", slopes, normals)
+        means.append(at_nodes[faces].mean(axis=1))
+        flows.append((diffusion * across).mean(axis=1))
+        tangents.append((slopes - across[..., None] * normals[:, None]).mean(axis=1))
+    jumps = [np.abs(np.diff(each, axis=1)[:, 0]) for each in (diffusion, 1.0 / diffusion, sigma_a, density)]
+    bent = jumps[0] * np.abs(np.einsum("fj,fj->f", *tangents)) + jumps[1] * np.abs(flows[0] * flows[1])
+    bent += jumps[2] * np.abs(means[0] * means[1]) + jumps[3] * np.abs(means[1])
+    shares = 0.5 * MEAN_OVER_MIDDLE * distance * areas * bent
+    for side in cells.T:
+        added += np.bincount(side, shares, minlength=len(added))
+    return added

@@ -1,5 +1,7 @@
 """The first mesh: fine enough, where light is deposited, for its error to be estimated at all."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -34,7 +36,14 @@ def lit_points(deposits: list[Deposit], medium: Medium) -> tuple[FloatArray, Flo
 
 
 def graded_towards(
-    mesh: TetMesh, surface: Surface, points: FloatArray, resolutions: FloatArray, most: int, longest: float = LONGEST
+    mesh: TetMesh,
+    surface: Surface,
+    points: FloatArray,
+    resolutions: FloatArray,
+    most: int,
+    *,
+    longest: float = LONGEST,
+    inner: Sequence[Surface] = (),
 ) -> TetMesh:
     """Split tetrahedra until none is longer than `longest` times its distance from the light.
 
@@ -48,6 +57,8 @@ def graded_towards(
     most : int
         Tetrahedra at which it stops.
     longest : float
+    inner : sequence of Surface
+        Those of the mesh's regions; new nodes on them are moved onto them.
 
     Returns
     -------
@@ -61,7 +72,7 @@ def graded_towards(
         marked = mesh.longest_edges > longest * np.maximum(distance, resolutions[nearest])
         if not marked.any():
             return mesh
-        finer = refine(mesh, marked, surface)
+        finer = refine(mesh, marked, surface, inner)
         if len(finer.tetrahedra) > most:
             return mesh
         mesh = finer

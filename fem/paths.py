@@ -10,13 +10,13 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import Stretches
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
 # What a ray still carries when it has faded to this share of the average ray's power stays where it would on average.
-FAINTEST = 1e-6
+FAINTEST = 1e-10
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
 
@@ -37,8 +37,8 @@ class Rays:
     directions: FloatArray
     powers: FloatArray
 
-    def __getitem__(self, some: object) -> "Rays":
-        return Rays(self.starts[some], self.directions[some], self.powers[some])  # type: ignore[index]
+    def __getitem__(self, some: BoolArray) -> "Rays":
+        return Rays(self.starts[some], self.directions[some], self.powers[some])
 
 
 def joined(parts: list[Rays]) -> Rays:

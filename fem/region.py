@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tetlux.fem.coefficients import AnyMedium
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
 
@@ -21,3 +22,10 @@ class Region:
 
     surface: Surface
     medium: AnyMedium | Sequence[AnyMedium]
+
+
+def only_medium(region: Region) -> AnyMedium:
+    """The one medium of a region."""
+    if isinstance(region.medium, AnyMedium):
+        return region.medium
+    raise InputError(f"a region has {len(region.medium)} media where one is wanted; give the one of this channel.")

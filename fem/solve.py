@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import overload
 
 import numpy as np
@@ -20,6 +21,7 @@ from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.refine import refine
+from tetlux.meshing.regions import check_regions, region_at
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -201,16 +203,19 @@ def solve_each(
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
         media = media_of(medium, regions, len(scenes))
+        inner = tuple(region.surface for region in regions)
+        check_regions(surface, inner)
         for each in dict.fromkeys(media):
             check_media(surface, each)
         scene_sources = [
-            sources_of(lights, surface, each, subtract) for lights, each in zip(scenes, media, strict=True)
+            sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
+            for lights, each in zip(scenes, media, strict=True)
         ]
 
     def steps_on(mesh: TetMesh, before: list[Step] | None) -> list[Step]:
         assembly = Assembly(mesh)
         systems = {
-            each: System(mesh, each[0], surface, mass, media.count(each), each[1:], assembly)
+            each: System(mesh, each[0], surface, mass, media.count(each), _regions_of(inner, each), assembly)
             for each in dict.fromkeys(media)
         }
         return [
@@ -221,9 +226,10 @@ def solve_each(
     given = mesh is not None
     if mesh is None:
         with watch.stage("mesh"):
-            mesh = tetrahedralize(surface, cache=cache)
+            mesh = tetrahedralize(surface, inner, cache=cache)
             deposits = [deposit for sources in scene_sources for deposit in sources.deposits]
-            mesh = graded_towards(mesh, surface, *lit_points(deposits, base_of(media[0][0])), most_tetrahedra)
+            lit = lit_points(deposits, base_of(media[0][0]))
+            mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     steps = best = steps_on(mesh, None)
     least = np.inf
@@ -236,7 +242,7 @@ def solve_each(
         if given or not marked.any():
             break
         with watch.stage("mesh"):
-            finer = refine(mesh, marked, surface)
+            finer = refine(mesh, marked, surface, inner)
         if len(finer.tetrahedra) > most_tetrahedra:
             # Where refinement does not help any more, an earlier mesh may have been the better one.
             steps = best
@@ -276,6 +282,11 @@ def media_of(
     columns = [of_scenes(medium, "the body")]
     columns += [of_scenes(region.medium, f"region {number}") for number, region in enumerate(regions, 1)]
     return list(zip(*columns, strict=True))
+
+
+def _regions_of(inner: Sequence[Surface], media: Sequence[AnyMedium]) -> tuple[Region, ...]:
+    """The regions with the media that they have in one scene."""
+    return tuple(Region(surface, medium) for surface, medium in zip(inner, media[1:], strict=True))
 
 
 def _to_split(steps: list[Step], tolerance: float) -> BoolArray:

@@ -12,6 +12,7 @@ from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
+from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
@@ -48,8 +49,8 @@ class System:
         Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     expected : int
         How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
-    inner : tuple of Medium or VaryingMedium
-        Those of the mesh's regions 1, 2, ....
+    regions : tuple of Region
+        The mesh's regions 1, 2, ..., each with one medium.
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     """
@@ -59,13 +60,18 @@ class System:
     surface: Surface | None = None
     mass: Mass = "lumped"
     expected: int = 1
-    inner: tuple[AnyMedium, ...] = ()
+    regions: tuple[Region, ...] = ()
     assembly: Assembly | None = None
+
+    @property
+    def media(self) -> tuple[AnyMedium, ...]:
+        """Those of the body and of its regions."""
+        return (self.medium, *(only_medium(region) for region in self.regions))
 
     @cached_property
     def coefficients(self) -> Coefficients:
         """Those of its tetrahedra."""
-        return coefficients_on(self.mesh, (self.medium, *self.inner))
+        return coefficients_on(self.mesh, self.media)
 
     @cached_property
     def solver(self) -> Solver:
@@ -101,21 +107,22 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, (self.medium, *self.inner), subtract, self._region_of)
-        solution, _, _ = self._solved(sources, watch, None)
+            sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
+        solution, *_ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=sources.warnings)
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
-        solution, good, load = self._solved(sources, watch, before)
+        solution, good, load, emission = self._solved(sources, watch, before)
         with watch.stage("solve"):
-            estimate = estimated(solution, self.coefficients, load, self.solver)
+            inner = tuple(region.surface for region in self.regions)
+            estimate = estimated(solution, self.coefficients, self.solver, load, emission, inner)
         return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
-    ) -> tuple[Solution, tuple[BoolArray, ...], FloatArray]:
-        """The solution, where its charges are good guesses, and what was put on the nodes."""
+    ) -> tuple[Solution, tuple[BoolArray, ...], FloatArray, float | FloatArray]:
+        """The solution, where its charges are good guesses, what was put on the nodes, and the emission."""
         mesh = self.mesh
         with watch.stage("assemble"):
             deposits = [deposit.on(mesh, self.body, self.coefficients) for deposit in sources.on_mesh]
@@ -152,7 +159,8 @@ class System:
             fluence = parts[:, : len(owners)][:, owners == light].sum(axis=1)
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
             of_lights.append(self._solution(deposit, fluence, [patches[i] for i in own], [terms[i] for i in own]))
-        return added(of_lights), tuple(good), np.sum(loads, axis=0)
+        emission = sum((deposit.emission for deposit in deposits), 0.0)
+        return added(of_lights), tuple(good), np.sum(loads, axis=0), emission
 
     def _solution(
         self, deposit: Deposit, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]

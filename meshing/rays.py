@@ -36,7 +36,7 @@ class RayCaster:
 
     def _single(self, points: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
         """Places about the origin, in units of the extent, which single precision can hold."""
-        return ((points - self._origin) / self._size).astype(np.float32)
+        return np.asarray((points - self._origin) / self._size, dtype=np.float32)
 
     def first(self, origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first triangle that each ray meets.

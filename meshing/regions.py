@@ -243,6 +243,20 @@ def by_volume(regions: Sequence[Surface]) -> list[int]:
     return sorted(range(1, len(regions) + 1), key=lambda i: -regions[i - 1].volume)
 
 
+def owners(pairs: IntArray, regions: Sequence[Surface]) -> IntArray:
+    """The inner surface, by its number, that triangles between pairs of regions (f, 2) belong to: the smaller one's."""
+    rank = np.argsort([0, *by_volume(regions)])
+    return np.asarray(np.where(rank[pairs[:, 0]] > rank[pairs[:, 1]], pairs[:, 0], pairs[:, 1]))
+
+
+def region_at(points: FloatArray, regions: Sequence[Surface]) -> IntArray:
+    """The region that each of the points (q, 3) of a body lies in, (q,)."""
+    found = np.zeros(len(points), dtype=np.int64)
+    for region in by_volume(regions):
+        found[regions[region - 1].contains(points)] = region
+    return found
+
+
 def tagged(
     points: FloatArray, tetrahedra: IntArray, surface: Surface, regions: Sequence[Surface], envelope: float
 ) -> IntArray:
@@ -328,15 +342,14 @@ def nodes_of(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> lis
     boundary[mesh.boundary_nodes] = True
     if len(regions) == 0 or len(mesh.interfaces[0]) == 0:
         return [(surface, boundary)]
-    faces, pairs = mesh.interfaces
+    faces, pairs, _ = mesh.interfaces
     if int(pairs.max()) > len(regions):
         raise InputError(
             f"the mesh has a region {int(pairs.max())}, and {len(regions)} inner surfaces are given; "
             "give those that it was made of."
         )
     order = [0, *by_volume(regions)]
-    rank = np.argsort(order)
-    owner = np.where(rank[pairs[:, 0]] > rank[pairs[:, 1]], pairs[:, 0], pairs[:, 1])
+    owner = owners(pairs, regions)
     found = []
     for i in order[:0:-1]:
         mask = np.zeros(len(mesh.points), dtype=bool)

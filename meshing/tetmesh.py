@@ -147,7 +147,7 @@ class TetMesh:
         return np.asarray(self.tetrahedron_edges[self.boundary_cells[:, None], EDGES_OF_FACES[self._boundary[0] % 4]])
 
     @cached_property
-    def interfaces(self) -> tuple[IntArray, IntArray]:
+    def interfaces(self) -> tuple[IntArray, IntArray, IntArray]:
         """Triangles between tetrahedra of different regions.
 
         Returns
@@ -156,6 +156,8 @@ class TetMesh:
             Node numbers, anticlockwise seen from the second region.
         regions : (f, 2) ndarray
             The regions on either side, the smaller number first.
+        cells : (f, 2) ndarray
+            The tetrahedra there.
         """
         kinds_at = np.zeros(len(self.points), dtype=np.int64)
         for kind in np.unique(self.regions):
@@ -167,13 +169,18 @@ class TetMesh:
         cells = np.flatnonzero(between[self.tetrahedra].sum(axis=1) > 2)
         faces = self.tetrahedra[cells][:, FACES].reshape(-1, 3)
         chosen = between[faces].all(axis=1)
-        faces, region = faces[chosen], self.regions[np.repeat(cells, 4)[chosen]]
+        faces, cells = faces[chosen], np.repeat(cells, 4)[chosen]
+        region = self.regions[cells]
         key = np.sort(faces, axis=1)
         order = np.lexsort((region, key[:, 2], key[:, 1], key[:, 0]))
         first, second = order[:-1], order[1:]
         pair = (key[first] == key[second]).all(axis=1) & (region[first] != region[second])
         first, second = first[pair], second[pair]
-        return faces[first], np.column_stack([region[first], region[second]])
+        return (
+            faces[first],
+            np.column_stack([region[first], region[second]]),
+            np.column_stack([cells[first], cells[second]]),
+        )
 
     @cached_property
     def boundary_nodes(self) -> IntArray:

@@ -73,7 +73,7 @@ def test_a_mesh_has_one_region_unless_told() -> None:
 
 def test_interfaces_are_the_triangles_between_regions() -> None:
     mesh = cubes()
-    faces, pairs = mesh.interfaces
+    faces, pairs, _ = mesh.interfaces
     assert len(faces) == 6 * 4 * 2
     assert (pairs == [0, 1]).all()
     # They face from the body to the region: towards its middle.
@@ -143,7 +143,7 @@ def test_layers_that_share_sides_with_the_body_and_each_other(layered: TetMesh) 
     # Over seven runs: 0.1 % off at most, the worst quality 0.09 to 0.21, and all nodes in their planes.
     assert volumes(layered, 3) == pytest.approx([18000.0, 7200.0, 10800.0], rel=0.003)
     assert layered.quality.min() > 0.05
-    faces, pairs = layered.interfaces
+    faces, pairs, _ = layered.interfaces
     for pair, height in (([1, 2], -2.0), ([0, 2], -5.0)):
         z = layered.points[faces[(pairs == pair).all(axis=1)]][:, :, 2]
         # Those at the rim, which belong to the body's surface too, included.

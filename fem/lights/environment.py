@@ -12,7 +12,7 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.lights.spot import check_pixels
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, Vector, summed
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -76,9 +76,9 @@ class EnvironmentLight:
         height, turn = 1.0 - (2.0 * index + 1.0) / DIRECTIONS, index * np.pi * (3.0 - np.sqrt(5.0))
         level = np.column_stack([np.cos(turn), np.sin(turn)])
         even = np.column_stack([np.sqrt(1.0 - height**2)[:, None] * level, height])
-        home = cKDTree(even).query(towards)[1]
-        total = np.bincount(home, power, DIRECTIONS)
-        mean = np.column_stack([np.bincount(home, power * axis, DIRECTIONS) for axis in towards.T])
+        home = np.asarray(cKDTree(even).query(towards)[1])
+        total = summed(home, power, DIRECTIONS)
+        mean = np.column_stack([summed(home, power * axis, DIRECTIONS) for axis in towards.T])
         found = total > 0
         return mean[found] / np.linalg.norm(mean[found], axis=1, keepdims=True), total[found]
 

@@ -20,7 +20,10 @@ FINEST = 1.0 / 128.0
 class Spot(Protocol):
     """A pattern on the plane across a beam."""
 
-    center: Vector
+    @property
+    def center(self) -> Vector:
+        """A point on the beam's axis, unit."""
+        ...
 
     @property
     def reach(self) -> float:
@@ -256,7 +259,7 @@ class Image:
     @property
     def height(self) -> float:
         """Unit."""
-        return self.width * self.pixels.shape[0] / self.pixels.shape[1]
+        return float(self.width * self.pixels.shape[0] / self.pixels.shape[1])
 
     @property
     def reach(self) -> float:
@@ -267,7 +270,7 @@ class Image:
     def detail(self) -> float:
         """See `Spot`."""
         rows, columns = self._coarse.shape
-        return max(self.height / rows, self.width / columns)
+        return float(max(self.height / rows, self.width / columns))
 
     has_edge = False
 
