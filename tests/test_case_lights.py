@@ -27,6 +27,8 @@ lights:
 ONE = "{sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}"
 THREE = "{sigma_a: [0.01, 0.02, 0.03], sigma_s_prime: 1.0, eta: 1.4}"
 POINT = "point: {position: [0, 0, 0]}"
+SPOT = "spot: {image: {file: FILE, center: [0, 0, 4], width: 4}}"
+SLIDE = SPOT.replace("FILE", "slide.png")
 
 Load = Callable[..., Case]
 
@@ -84,7 +86,7 @@ def test_light_on_the_whole_body_is_drawn_as_parallel_arrows(load: Load) -> None
 
 @pytest.mark.usefixtures("slide")
 def test_each_of_three_channels_takes_its_colour_of_an_image(load: Load) -> None:
-    light = "collimated: {direction: [0, 0, -1], irradiance: 2, spot: {image: {file: slide.png, center: [0, 0, 4], width: 4}}}"
+    light = f"collimated: {{direction: [0, 0, -1], irradiance: 2, {SLIDE}}}"
     case = load(f"{light}\n  - {POINT}", medium=THREE)
     # Nothing of it is blue.
     assert [list(channel.lights) for channel in case.channels] == [["collimated_1", "point_1"]] * 2 + [["point_1"]]
@@ -145,24 +147,34 @@ def test_detectors_and_camera(load: Load) -> None:
     assert case.camera == (0.0, 0.0, 50.0)
 
 
-SPOT = "spot: {image: {file: FILE, center: [0, 0, 4], width: 4}}"
-SLIDE = SPOT.replace("FILE", "slide.png")
+def beam(spot: str) -> str:
+    return f"collimated: {{direction: [0, 0, -1], irradiance: 1, {spot}}}"
+
+
 WRONG = [
     ("collimated: {direction: [0, 0, -1]}", "", r"lights\[0\]\.collimated: give irradiance or power, not neither"),
     ("collimated: {direction: [0, 0, -1], irradiance: 1, power: 1}", "", "give irradiance or power, not both"),
     ("collimated: {direction: [0, 0, -1], power: 1}", "", "power belongs to a spot"),
     ("collimated: {direction: [0, 0, 0], irradiance: 1}", "", r"line 4: lights\[0\]: .*direction"),
     ("collimated: {direction: [0, 0, -1], irradiance: -1}", "", r"lights\[0\]: irradiance is -1"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, spot: {disc: {center: [9, 0, 0], radius: 1}}}", "", r"lights\[0\]: the collimated light .* misses"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, spot: {disc: {center: [0, 0, 0], radius: 0}}}", "", r"spot\.disc\.radius: expected a number greater than 0"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, spot: {}}", "", r"lights\[0\]\.collimated\.spot: give exactly one of disc, gaussian, rectangle, image"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, " + SPOT.replace("FILE", "none.png") + "}", "", r"lights\[0\]: .*none\.png does not exist"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, " + SPOT.replace("FILE", "cube.yaml") + "}", "", r"lights\[0\]: .*cube\.yaml is not a readable image"),
-    ("collimated: {direction: [0, 0, -1], irradiance: 1, " + SPOT.replace("FILE", "black.png") + "}", "", r"lights\[0\]: the image is black"),
-    ("collimated: {direction: [0, 0, -1], power: [1, 1, 1], " + SLIDE + "}", "", "the image is black in a channel that has power"),
+    (beam("spot: {disc: {center: [9, 0, 0], radius: 1}}"), "", r"lights\[0\]: the collimated light .* misses"),
+    (beam("spot: {disc: {center: [0, 0, 0], radius: 0}}"), "", r"spot\.disc\.radius: expected a number greater than 0"),
+    (beam("spot: {}"), "", r"lights\[0\]\.collimated\.spot: give exactly one of disc, gaussian, rectangle, image"),
+    (beam(SPOT.replace("FILE", "none.png")), "", r"lights\[0\]: .*none\.png does not exist"),
+    (beam(SPOT.replace("FILE", "cube.yaml")), "", r"lights\[0\]: .*cube\.yaml is not a readable image"),
+    (beam(SPOT.replace("FILE", "black.png")), "", r"lights\[0\]: the image is black"),
+    (
+        "collimated: {direction: [0, 0, -1], power: [1, 1, 1], " + SLIDE + "}",
+        "",
+        "the image is black in a channel that has power",
+    ),
     ("environment: {file: cube.yaml, brightest: 1}", "", r"lights\[0\]: .*cube\.yaml is not a readable image"),
     ("environment: {file: slide.png, brightest: 1, up: [0, 1, 0]}", "", r"lights\[0\]: up and front"),
-    ("emission: {density: 1, region: sgone}", REGION, r'line 5: lights\[0\]: there is no region "sgone"; the regions here are body, core'),
+    (
+        "emission: {density: 1, region: sgone}",
+        REGION,
+        r'line 5: lights\[0\]: there is no region "sgone"; the regions here are body, core',
+    ),
     ("emission: {density: -1}", "", r"lights\[0\]: density is -1"),
     ("point: {position: [0, 0, 0], power: [0, 0]}", "", "lights: all lights are dark in one channel"),
     ("{name: all, " + POINT + "}", "", r'lights\[0\]: "all" is the sum'),
@@ -170,14 +182,30 @@ WRONG = [
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),
     ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: a name is"),
     ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, collimated, environment, emission"),
-    (POINT, "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n", r'detectors\[1\]: the name "a" stands here twice'),
+    (
+        POINT,
+        "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n",
+        r'detectors\[1\]: the name "a" stands here twice',
+    ),
     (POINT, "detectors: [{point: [0, 0, 4]}]\n", r"detectors\[0\]\.name: this key is missing"),
     (POINT, "detectors: [{name: a}]\n", r"detectors\[0\]: give exactly one of point, disc, fibre"),
-    (POINT, "detectors: [{name: a, point: [0, 0, 9]}]\n", r"line 3: detectors\[0\]: the detector's position .* from the surface"),
-    (POINT, "detectors: [{name: a, disc: {center: [0, 0, 4], radius: 30}}]\n", r"detectors\[0\]: the disc of radius 30"),
-    (POINT, "detectors: [{name: a, fibre: {center: [0, 0, 4], radius: 1, numerical_aperture: 2}}]\n", r"detectors\[0\]: numerical_aperture is 2"),
+    (
+        POINT,
+        "detectors: [{name: a, point: [0, 0, 9]}]\n",
+        r"line 3: detectors\[0\]: the detector's position .* from the surface",
+    ),
+    (
+        POINT,
+        "detectors: [{name: a, disc: {center: [0, 0, 4], radius: 30}}]\n",
+        r"detectors\[0\]: the disc of radius 30",
+    ),
+    (
+        POINT,
+        "detectors: [{name: a, fibre: {center: [0, 0, 4], radius: 1, numerical_aperture: 2}}]\n",
+        r"detectors\[0\]: numerical_aperture is 2",
+    ),
     (POINT, "camera: {position: [0, 0]}\n", r"camera\.position\[2\]: expected a list of three numbers"),
-]  # fmt: skip
+]
 
 
 @pytest.mark.usefixtures("slide")

@@ -117,7 +117,7 @@ def test_a_field_from_images(load: Load, tmp_path: Path) -> None:
 
 def test_a_field_from_a_volume_and_channels_beside_it(load: Load, tmp_path: Path) -> None:
     mesh = block((2, 2, 2), (10.0, 10.0, 10.0))
-    moved = type(mesh)(mesh.points + [0.0, 0.0, 5.0], mesh.tetrahedra)
+    moved = type(mesh)(mesh.points + np.array([0.0, 0.0, 5.0]), mesh.tetrahedra)
     write_mesh(moved, tmp_path / "body.vtu", {"absorption": 0.02 + 0.001 * moved.points[:, 2]})
     field = "{volume: {file: body.vtu, name: absorption}}"
     first, second = media(load(f"{{sigma_a: {field}, sigma_s_prime: [1, 2], eta: 1.4}}"))
@@ -150,36 +150,88 @@ def test_regions_have_media_for_every_channel(load: Load) -> None:
     assert not case.is_simple
 
 
+def absorbing(field: str) -> str:
+    return f"{{sigma_a: {{{field}}}, sigma_s_prime: 1, eta: 1.4}}"
+
+
+def ball(medium: str = TISSUE, *, radius: float = 1, name: str = "ball") -> str:
+    return f"regions: [{{name: {name}, surface: {{sphere: {{radius: {radius}}}}}, medium: {medium}}}]\n"
+
+
 WRONG = [
-    ("{sigma_a: [0.1, 0.2], sigma_s_prime: [1, 2, 3], eta: 1.4}", "", r"line 2: medium\.sigma_s_prime: .*3 channels, and"),
-    ("{sigma_a: [0.1, 0.2], sigma_s_prime: 1, eta: 1.4}", "channels: [a, b, c]\n", r"medium\.sigma_a: .*2 channels, and channels makes 3"),
-    ("{material: marble}", "channels: [a]\n", r"medium\.material: this makes 3 channels, and channels makes 1 channel;"),
+    (
+        "{sigma_a: [0.1, 0.2], sigma_s_prime: [1, 2, 3], eta: 1.4}",
+        "",
+        r"line 2: medium\.sigma_s_prime: .*3 channels, and",
+    ),
+    (
+        "{sigma_a: [0.1, 0.2], sigma_s_prime: 1, eta: 1.4}",
+        "channels: [a, b, c]\n",
+        r"medium\.sigma_a: .*2 channels, and channels makes 3",
+    ),
+    (
+        "{material: marble}",
+        "channels: [a]\n",
+        r"medium\.material: this makes 3 channels, and channels makes 1 channel;",
+    ),
     ("{material: marbel}", "", r'medium\.material: material "marbel" is not known; did you mean "marble"'),
     ("{material: marble, eta: 1.3}", "", r"medium\.eta: unknown key; the keys here are material"),
     (TISSUE, "channels: [a, a]\n", r'line 5: channels\[1\]: the name "a" stands here twice'),
     (TISSUE, "channels: [blue, green, red]\n", "channels: red, green and blue stand in this order"),
     (TISSUE, "channels: ['a b']\n", r"channels\[0\]: a name is"),
     ("{sigma_a: [], sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: give at least one"),
-    ("{sigma_a: [0.1, many], sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a\[1\]: expected a number, but found 'many'"),
+    (
+        "{sigma_a: [0.1, many], sigma_s_prime: 1, eta: 1.4}",
+        "",
+        r"medium\.sigma_a\[1\]: expected a number, but found 'many'",
+    ),
     ("{sigma_a: [0.1, -2], sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: sigma_a is -2"),
     ("[{sigma_a: 0.1, sigma_s_prime: 1}]", "", r"medium\[0\]\.eta: this key is missing"),
     ("[{sigma_a: 0.1, sigma_s_prime: 1, eta: 99}]", "", r"medium\[0\]\.eta: eta is 99"),
     ("{sigma_a: 0.1, sigma_s: 1, phase: {henyey_greenstein: 2}, eta: 1.4}", "", r"medium\.phase: g is 2"),
     ("{sigma_a: 0.1, sigma_s: 1, phase: {}, eta: 1.4}", "", r"medium\.phase: give exactly one of henyey_greenstein"),
-    ("{sigma_a: 0.1, sigma_s: 1, g: 0, phase: {henyey_greenstein: 0}, eta: 1.4}", "", r"medium\.g: g is given together"),
-    ("{sigma_a: {array: {file: no.npy, origin: [0, 0, 0], spacing: 1}}, sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: .*no\.npy does not exist"),
-    ("{sigma_a: {array: {file: one.npy, origin: [0, 0, 0], spacing: 1}}, sigma_s_prime: 1, eta: 1.4}", "", r"line 2: medium\.sigma_a: the grid from .* does not cover the body"),
-    ("{sigma_a: {array: {file: below.npy, origin: [-4, -4, -4], spacing: 8}}, sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: sigma_a is -1 at"),
-    ("{sigma_a: {images: {files: a, origin: [0, 0, 0], spacing: 1, values: [1]}}, sigma_s_prime: 1, eta: 1.4}", "", r"sigma_a\.images\.values\[1\]: expected a list of two numbers"),
-    ("{sigma_a: {array: {file: one.npy, origin: [0, 0, 0], spacing: [1, 1]}}, sigma_s_prime: 1, eta: 1.4}", "", r"sigma_a\.array\.spacing\[2\]: expected a list of three numbers"),
-    (TISSUE, "regions: [{surface: {sphere: {radius: 9}}, medium: " + TISSUE + "}]\n", r"line 5: regions: .*region 1 \(sphere\)"),
-    (TISSUE, "regions: [{surface: {sphere: {radius: 1}}, medium: {sigma_a: 1, sigma_s_prime: 1, eta: 1.2}}]\n", r"regions\[0\]\.medium: a region's refractive index of 1\.2"),
-    (TISSUE, "regions: [{surface: {sphere: {radius: -1}}, medium: " + TISSUE + "}]\n", r"regions\[0\]\.surface\.sphere\.radius: expected a number greater than 0"),
-    (TISSUE, "regions: [{surface: {sphere: {radius: 1}}, medium: {sigma_a: [1, 2], sigma_s_prime: [1, 2, 3], eta: 1.4}}]\n", r"regions\[0\]\.medium\.sigma_s_prime: .*3 channels"),
-    (TISSUE, "regions: [{name: body, surface: {sphere: {radius: 1}}, medium: " + TISSUE + "}]\n", r'regions\[0\]: "body" is'),
+    (
+        "{sigma_a: 0.1, sigma_s: 1, g: 0, phase: {henyey_greenstein: 0}, eta: 1.4}",
+        "",
+        r"medium\.g: g is given together",
+    ),
+    (
+        absorbing("array: {file: no.npy, origin: [0, 0, 0], spacing: 1}"),
+        "",
+        r"medium\.sigma_a: .*no\.npy does not exist",
+    ),
+    (
+        absorbing("array: {file: one.npy, origin: [0, 0, 0], spacing: 1}"),
+        "",
+        r"line 2: medium\.sigma_a: the grid from .* does not cover the body",
+    ),
+    (absorbing("array: {file: below.npy, origin: [-4, -4, -4], spacing: 8}"), "", r"medium\.sigma_a: sigma_a is -1 at"),
+    (
+        absorbing("images: {files: a, origin: [0, 0, 0], spacing: 1, values: [1]}"),
+        "",
+        r"sigma_a\.images\.values\[1\]: expected a list of two numbers",
+    ),
+    (
+        absorbing("array: {file: one.npy, origin: [0, 0, 0], spacing: [1, 1]}"),
+        "",
+        r"sigma_a\.array\.spacing\[2\]: expected a list of three numbers",
+    ),
+    (TISSUE, ball(radius=9), r"line 5: regions: .*region 1 \(sphere\)"),
+    (
+        TISSUE,
+        ball("{sigma_a: 1, sigma_s_prime: 1, eta: 1.2}"),
+        r"regions\[0\]\.medium: a region's refractive index of 1\.2",
+    ),
+    (TISSUE, ball(radius=-1), r"regions\[0\]\.surface\.sphere\.radius: expected a number greater than 0"),
+    (
+        TISSUE,
+        ball("{sigma_a: [1, 2], sigma_s_prime: [1, 2, 3], eta: 1.4}"),
+        r"regions\[0\]\.medium\.sigma_s_prime: .*3 channels",
+    ),
+    (TISSUE, ball(name="body"), r'regions\[0\]: "body" is'),
     (TISSUE, "channels: [a, b]\ncompare: [series]\n", "compare: closed forms are those of one channel"),
-    (TISSUE, "regions: [{surface: {sphere: {radius: 1}}, medium: " + TISSUE + "}]\ncompare: [robin]\n", "compare: closed forms are those of one channel"),
-]  # fmt: skip
+    (TISSUE, ball() + "compare: [robin]\n", "compare: closed forms are those of one channel"),
+]
 
 
 @pytest.mark.parametrize(("medium", "more", "message"), WRONG)
