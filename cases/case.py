@@ -4,7 +4,7 @@ import copy
 import itertools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,7 @@ class Case:
     light_names : tuple of str
         Of all lights, in their order.
     regions : tuple of Region
-        Each with one medium for each channel.
+        Each with one medium for each channel; its surface bears its name.
     tolerance : float
     outputs : tuple of str
     sensors : tuple of Sensor
@@ -94,6 +94,20 @@ class Case:
     def channel_names(self) -> tuple[str, ...]:
         """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What was mended when its surfaces were read."""
+        return self._of_surfaces("repairs")
+
+    @property
+    def region_warnings(self) -> tuple[str, ...]:
+        """What a user should know of the surfaces of regions; that of the body is among a solution's warnings."""
+        return self._of_surfaces("warnings")[len(self.surface.warnings) :]
+
+    def _of_surfaces(self, name: str) -> tuple[str, ...]:
+        inner = [f"{region.surface.name}: {note}" for region in self.regions for note in getattr(region.surface, name)]
+        return (*getattr(self.surface, name), *inner)
 
     @property
     def is_simple(self) -> bool:
@@ -291,7 +305,7 @@ def _regions(
     for i, region in enumerate(spec.regions):
         key: Key = ("regions", i)
         with document.at((*key, "surface")):
-            inner = reader.surface(region.surface, spec.unit)
+            inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
         own = media_of(document, (*key, "medium"), region.medium, inner, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):

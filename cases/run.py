@@ -130,8 +130,11 @@ def _warnings(results: Results) -> list[str]:
         for warning in solution.warnings:
             told.setdefault(warning, []).append(name)
     return [
-        warning if len(whose) == len(names) else f"in {' and '.join(whose)}: {warning}"
-        for warning, whose in told.items()
+        *results.case.region_warnings,
+        *(
+            warning if len(whose) == len(names) else f"in {' and '.join(whose)}: {warning}"
+            for warning, whose in told.items()
+        ),
     ]
 
 

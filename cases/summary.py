@@ -42,7 +42,7 @@ def summarize(
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
-        "repairs": list(case.surface.repairs),
+        "repairs": list(case.repairs),
         "warnings": warnings,
         "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
     }

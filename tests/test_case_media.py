@@ -7,16 +7,18 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from tests.conftest import block
 from tetlux.cases.case import Case, load_cases
+from tetlux.cases.chart_scene import scene_of
 from tetlux.cases.cli import main
 from tetlux.fem import Medium, PencilBeam, PointSource
 from tetlux.fem.materials import material
 from tetlux.fem.phase import henyey_greenstein, table, two_term
 from tetlux.fem.varying import VaryingMedium
-from tetlux.meshing import InputError
+from tetlux.meshing import InputError, RunError, box
 from tetlux.meshing.files import write_mesh
 
 CUBE = """\
@@ -25,6 +27,7 @@ medium: MEDIUM
 lights:
   - point: {position: [0, 0, 0]}
 """
+MARBLE = "{material: marble}"
 TISSUE = "{sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}"
 
 Load = Callable[..., Case]
@@ -100,7 +103,8 @@ def test_a_field_from_an_array(load: Load, tmp_path: Path) -> None:
     (medium,) = media(load(f"{{sigma_a: {field}, sigma_s_prime: 1, eta: 1.4}}"))
     assert isinstance(medium, VaryingMedium)
     # The corners of the cube lie at x = -4 and 4, as many here as there.
-    assert (medium.base.sigma_a, medium.base.sigma_s_prime) == (pytest.approx(0.05), 1.0)
+    assert medium.base.sigma_a == pytest.approx(0.05)
+    assert medium.base.sigma_s_prime == 1.0
     sigma_a, sigma_s_prime = medium.at(np.array([[2.5, 0.0, 0.0]]))
     assert (sigma_a[0], sigma_s_prime[0]) == (pytest.approx(0.075), 1.0)
 
@@ -216,7 +220,7 @@ WRONG = [
         "",
         r"sigma_a\.array\.spacing\[2\]: expected a list of three numbers",
     ),
-    (TISSUE, ball(radius=9), r"line 5: regions: .*region 1 \(sphere\)"),
+    (TISSUE, ball(radius=9), r"line 5: regions: .*region 1 \(ball\)"),
     (
         TISSUE,
         ball("{sigma_a: 1, sigma_s_prime: 1, eta: 1.2}"),
@@ -246,6 +250,27 @@ def test_a_wrong_medium_gets_one_sentence(
     assert re.search(message, printed.err), printed.err
     assert printed.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_chart_is_of_simple_cases_only(load: Load) -> None:
+    for case in (load("{material: marble}"), load(more=ball())):
+        with pytest.raises(RunError, match="a chart is of one channel and one even medium"):
+            scene_of(case, quick=True)
+
+
+def test_repairs_of_a_region_bear_its_name(load: Load, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    inner = box((2.0, 2.0, 2.0))
+    soup = trimesh.Trimesh(inner.points[inner.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False)
+    soup.faces[0] = soup.faces[0][::-1]
+    soup.export(tmp_path / "inner.ply")
+    case = load("{material: marble}", f"regions: [{{name: stone, surface: {{file: inner.ply}}, medium: {MARBLE}}}]\n")
+    assert case.surface.repairs == ()
+    assert len(case.repairs) > 0
+    assert all(note.startswith("stone: ") for note in case.repairs)
+    assert main(["check", str(tmp_path / "cube.yaml")]) == 0
+    printed = capsys.readouterr().out
+    assert "right; channels red, green, blue; 12 triangles, 8 x 8 x 8 mm" in printed
+    assert f"  {case.repairs[0]}" in printed
 
 
 def test_a_list_is_swept_by_the_number_of_its_item(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def test_the_surface_has_colours_that_programs_read(finished: Finished) -> None:
     np.testing.assert_array_equal(given, expected)
     # Some of it is burnt out and most is not: 99 % of the area is darker than white.
     assert 0 < (linear @ LUMINANCE > 1).mean() < 0.6
-    loaded = trimesh.load(finished.folder / "surface.ply", process=False)
+    loaded: Any = trimesh.load(finished.folder / "surface.ply", process=False)
     np.testing.assert_array_equal(loaded.visual.vertex_colors[:, :3], given)
     assert loaded.is_watertight
 
