@@ -1,14 +1,8 @@
 """`Case`: one run, ready to be solved; and how a case file becomes a list of them."""
 
-import copy
-import itertools
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-from pydantic import ValidationError
 
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
@@ -17,8 +11,9 @@ from tetlux.cases.lighting import BODY, light_names, light_of
 from tetlux.cases.media import media_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
-from tetlux.cases.schema_parts import TAG
 from tetlux.cases.sensors import Sensor, sensor_of
+from tetlux.cases.sweep import swept
+from tetlux.cases.validation import validated
 from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.medium import Medium
@@ -156,100 +151,15 @@ def load_cases(path: Path) -> list[Case]:
         With the file, the line and the key.
     """
     document = read_document(path)
-    spec = _validated(document, document.data)
+    spec = validated(document, document.data)
     reader = Reader(path.parent)
     cases = []
-    for label, data, keys in _swept(document, spec):
+    for label, data, keys in swept(document, spec):
         single = document if label is None else Document(path, data, {**document.lines, **keys})
-        one = spec if label is None else _validated(single, data)
+        one = spec if label is None else validated(single, data)
         name = one.name or path.stem
         cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
     return cases
-
-
-# What pydantic says in words of Python's, by the beginning of its error's kind; of lists, how long they are.
-PLAIN = {
-    "model_": "expected keys and values",
-    "dict_": "expected keys and values",
-    "list_": "expected a list",
-    "tuple_": "",
-    "string_pattern": "a name is of letters, digits, spaces and any of . + = , - _ and begins with a letter or digit",
-    "string_type": "expected text",
-    "too_short": "give at least one",
-    "too_long": "",
-    "float_type": "expected a number",
-}
-# Lists of numbers that are not of three.
-COUNTS: dict[str | int, str] = {"values": "two"}
-MOST_RUNS = 20_000
-
-
-def _validated(document: Document, data: dict[str, Any]) -> CaseSpec:
-    try:
-        return CaseSpec.model_validate(data)
-    except ValidationError as failure:
-        first = failure.errors()[0]
-        key: Key = tuple(part for part in first["loc"] if not str(part).startswith(TAG))
-        context = first.get("ctx", {})
-        if first["type"] == "unknown_key":
-            key = (*key, context["key"])
-        raise document.error(key, _sentence(first["type"], first["msg"], first.get("input"), key)) from failure
-
-
-def _sentence(kind: str, message: str, given: object, key: Key) -> str:
-    several = f"expected a list of {COUNTS.get(key[-2] if len(key) > 1 else '', 'three')} numbers"
-    if kind == "missing":
-        return f"{several}." if isinstance(key[-1], int) else "this key is missing; the case needs it."
-    text = message[0].lower() + message[1:]
-    text = text.replace("input should be greater", "expected a number greater").replace(
-        "input should be less", "expected a number less"
-    )
-    text = text.replace("input should be", "expected").replace("a valid number", "a number")
-    for start, plain in PLAIN.items():
-        if kind.startswith(start):
-            text = plain or several
-    if kind in ("unknown_key", "one_of", "scale"):
-        return f"{text}."
-    shown = repr(given)
-    return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}."
-
-
-def _swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str, Any], dict[Key, int]]]:
-    """The case's data once for each point of its sweep's grid, with the label of that point."""
-    if not spec.sweep:
-        return [(None, document.data, {})]
-    runs: list[tuple[str | None, dict[str, Any], dict[Key, int]]] = []
-    for key, listed in spec.sweep.items():
-        if len(set(map(repr, listed))) < len(listed):
-            raise document.error(("sweep", key), "a value stands here twice; give each once.")
-    count = math.prod(len(listed) for listed in spec.sweep.values())
-    if count > MOST_RUNS:
-        raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
-    for values in itertools.product(*spec.sweep.values()):
-        data = copy.deepcopy(document.data)
-        del data["sweep"]
-        keys: dict[Key, int] = {}
-        for key, value in zip(spec.sweep, values, strict=True):
-            keys[_assign(document, data, key, value)] = document.lines["sweep", key]
-        label = ",".join(f"{k}={v}" for k, v in zip(spec.sweep, values, strict=True))
-        runs.append((label.replace("/", "_"), data, keys))
-    return runs
-
-
-def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
-    """Set a dotted key (list items by their number); it may be new, what holds it may not."""
-    parts: Key = tuple(int(p) if p.isdigit() else p for p in key.split("."))
-    holder: Any = data
-    try:
-        for part in parts[:-1]:
-            holder = holder[part]
-        holder[parts[-1]] = value
-    except (KeyError, IndexError, TypeError) as error:
-        raise document.error(
-            ("sweep", key),
-            f'"{key}" is no key of this case; write it as in medium.sigma_a or lights.0.pencil.power.',
-        ) from error
-    return parts
 
 
 def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:

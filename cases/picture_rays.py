@@ -4,9 +4,12 @@ import numpy as np
 
 from tetlux.cases.picture_stage import Ray
 from tetlux.fem.lights import CollimatedBeam, Light, PencilBeam, PointSource
+from tetlux.fem.lights.point import unit_vector
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.surface import Surface
 
+# Of an arrow, as a share of the body's diagonal.
+LENGTH = 0.3
 # Light on the whole body is drawn as so many arrows.
 ARROWS = 3
 # So far from the middle of what is lit they stand at most, as a share of its extent: not at its rim.
@@ -17,14 +20,14 @@ def rays(light: Light, surface: Surface) -> tuple[Ray, ...]:
     """Arrows or points of a light; light from everywhere and light of the volume have none."""
     if isinstance(light, PencilBeam):
         end = light.entry(surface)
-        start = end - 0.3 * surface.diagonal * light.rays()[1]
+        start = end - LENGTH * surface.diagonal * unit_vector(light.direction, "direction")
         return (Ray(_vector(start), _vector(end)),)
     if isinstance(light, PointSource):
         return (Ray(light.position, light.position),)
     if isinstance(light, CollimatedBeam):
-        along = np.asarray(light.direction) / np.linalg.norm(light.direction)
+        along = unit_vector(light.direction, "direction")
         ends = _spread(light.entries(surface), along, ARROWS if light.spot is None else 1)
-        return tuple(Ray(_vector(end - 0.3 * surface.diagonal * along), _vector(end)) for end in ends)
+        return tuple(Ray(_vector(end - LENGTH * surface.diagonal * along), _vector(end)) for end in ends)
     return ()
 
 

@@ -13,7 +13,7 @@ from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
-from tetlux.fem.sources import Subtract, sources_of
+from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for
@@ -255,7 +255,7 @@ def solve_each(
         replace(
             step.solution,
             seconds=seconds,
-            warnings=_warnings(step.solution, sources.warnings, tolerance, limit),
+            warnings=_warnings(step.solution, sources, tolerance, limit),
         )
         for step, sources in zip(steps, scene_sources, strict=True)
     ]
@@ -305,9 +305,9 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     return marked
 
 
-def _warnings(solution: Solution, of_lights: list[str], tolerance: float, most_tetrahedra: int | None) -> list[str]:
+def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetrahedra: int | None) -> list[str]:
     """What a user should know of a solution; the limit is None for a mesh that was given."""
-    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *of_lights]
+    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *sources.warnings]
     if solution.error_estimate > tolerance:
         where = "on the mesh given" if most_tetrahedra is None else f"at the limit of {most_tetrahedra:,} tetrahedra"
         warnings.append(
@@ -332,8 +332,11 @@ def _warnings(solution: Solution, of_lights: list[str], tolerance: float, most_t
         )
     lowest = float(solution.fluence.min())
     if lowest < -NEGLIGIBLE_DIP * float(solution.fluence.max()):
-        warnings.append(
-            f"the fluence dips below zero, to {lowest / float(solution.fluence.max()):.1e} of its largest value, where "
-            "tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
+        cause = (
+            "beside where a thin beam enters, as the diffusion equation itself has it; read it a mean free path away."
+            if sources.dips
+            else "where tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
         )
+        share = lowest / float(solution.fluence.max())
+        warnings.append(f"the fluence dips below zero, to {share:.1e} of its largest value, {cause}")
     return list(dict.fromkeys(warnings))

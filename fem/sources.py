@@ -44,6 +44,11 @@ class Sources:
         """What a user should know of the lights."""
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
+    @property
+    def dips(self) -> bool:
+        """Whether the equation itself may have a fluence below zero: that of a source of a first moment may."""
+        return any((charges.strengths[: charges.sources] < 0).any() for charges in self.charges)
+
 
 def sources_of(
     lights: Sequence[Light],

@@ -55,6 +55,9 @@ class RayCaster:
         """
         if len(origins) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64)
+        # Single precision holds no places far from the triangles: rays start from near them.
+        gone = np.maximum(np.einsum("ij,ij->i", self._origin - origins, directions) - self._size, 0.0)
+        origins = origins + gone[:, None] * directions
         offset = OFFSET * self._size
         starts = self._single(origins + offset * directions)
         met = self._scene.run(starts, np.ascontiguousarray(directions, dtype=np.float32), output=True)
@@ -67,4 +70,4 @@ class RayCaster:
             exact /= np.einsum("ij,ij->i", directions, normals)
         rough = np.asarray(met["tfar"], dtype=np.float64) * self._size + offset
         distances = np.where(np.abs(exact - rough) < 10.0 * offset, exact, rough)
-        return np.where(faces >= 0, distances, np.inf), faces
+        return np.where(faces >= 0, gone + distances, np.inf), faces

@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
+from tetlux.meshing.rays import RayCaster
 
 # Triangles beyond which a surface is taken to be fine enough.
 MOST_BULGING = 20_000
@@ -168,6 +169,11 @@ class Surface:
         faces = np.flatnonzero(distances > 1e-9 * self.diagonal)
         order = np.argsort(distances[faces], kind="stable")
         return distances[faces[order]], faces[order]
+
+    @cached_property
+    def rays(self) -> RayCaster:
+        """The triangles, ready to be met by many rays."""
+        return RayCaster(self.points, self.faces)
 
     def exit(self, origin: FloatArray, direction: FloatArray) -> tuple[float, int] | None:
         """Where a ray from inside leaves the body.

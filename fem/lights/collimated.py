@@ -7,12 +7,11 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive, unit_vector
-from tetlux.fem.lights.spot import Spot
+from tetlux.fem.lights.spot import Spot, sunflower
 from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, entered, follow
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.rays import RayCaster
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -82,14 +81,7 @@ class CollimatedBeam:
         center = middle
         if self.spot is not None:
             reach, center = self.spot.reach, np.asarray(self.spot.center, dtype=float)
-        # Vogel's sunflower pattern: equal areas, no two on one radius.
-        index = np.arange(LOOKS)
-        distance, angle = reach * np.sqrt((index + 0.5) / LOOKS), index * np.pi * (3.0 - np.sqrt(5.0))
-        across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-        across /= np.linalg.norm(across)
-        offsets = np.outer(distance * np.cos(angle), across)
-        offsets += np.outer(distance * np.sin(angle), np.cross(direction, across))
-        offsets = np.vstack([np.zeros((1, 3)), offsets])
+        offsets = np.vstack([np.zeros((1, 3)), sunflower(LOOKS, reach, direction)])
         if self.spot is not None:
             offsets = offsets[self.spot.brightness(offsets, direction) > 0]
         starts = center + offsets
@@ -97,7 +89,7 @@ class CollimatedBeam:
             # From before the body, wherever the spot's center is along the beam.
             starts += np.outer((middle - starts) @ direction - surface.diagonal, direction)
         directions = np.broadcast_to(direction, starts.shape)
-        distances, met = RayCaster(surface.points, surface.faces).first(starts, directions)
+        distances, met = surface.rays.first(starts, directions)
         return np.asarray(starts + np.where(met >= 0, distances, 0.0)[:, None] * direction)[met >= 0]
 
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:

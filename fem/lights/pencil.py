@@ -7,14 +7,13 @@ from typing import Literal
 import numpy as np
 
 from tetlux.fem.coefficients import Coefficients
-from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
 from tetlux.fem.lights.deposit import Deposit, together
 from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
-from tetlux.fem.lights.spot import Disc
+from tetlux.fem.lights.spot import Disc, sunflower
 from tetlux.fem.medium import Medium
-from tetlux.fem.paths import Rays, beyond, follow
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.fem.paths import Rays, beyond, entered, follow
+from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -72,35 +71,6 @@ class PencilBeam:
         if self.deposit not in ("point", "line"):
             raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".')
 
-    def rays(self, spacing: float = math.inf) -> tuple[FloatArray, FloatArray]:
-        """Thin beams that make this one up.
-
-        Parameters
-        ----------
-        spacing : float
-            Wanted distance between them, unit.
-
-        Returns
-        -------
-        origins : (r, 3) ndarray
-        direction : (3,) ndarray
-            Their common unit direction.
-        """
-        origin = as_vector(self.origin, "origin")
-        direction = unit_vector(self.direction, "direction")
-        if self.radius == 0:
-            return origin[None], direction
-        # Vogel's sunflower pattern: equal areas, no two rays on one radius.
-        count = int(np.clip(np.pi * (self.radius / spacing) ** 2, *RAYS))
-        index = np.arange(count)
-        distance = self.radius * np.sqrt((index + 0.5) / count)
-        angle = index * np.pi * (3.0 - np.sqrt(5.0))
-        across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-        across /= np.linalg.norm(across)
-        up = np.cross(direction, across)
-        spread = np.outer(distance * np.cos(angle), across) + np.outer(distance * np.sin(angle), up)
-        return origin + spread, direction
-
     def entry(self, surface: Surface) -> FloatArray:
         """Where the middle of the beam meets the surface, (3,).
 
@@ -109,41 +79,42 @@ class PencilBeam:
         InputError
             If the beam misses the body or starts inside it.
         """
-        origin, direction = as_vector(self.origin, "origin"), self.rays()[1]
+        origin = as_vector(self.origin, "origin")
         self._check_outside(surface, origin)
-        distances, _ = _entering(surface, origin, direction)
-        if len(distances) == 0:
+        points, _ = _entries(surface, origin[None], unit_vector(self.direction, "direction"), curved=False)
+        if len(points) == 0:
             raise self._missed(surface)
-        return np.asarray(origin + distances[0] * direction)
+        return np.asarray(points[0])
 
     def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
-        self._check_outside(surface, as_vector(self.origin, "origin"))
+        origin, direction = as_vector(self.origin, "origin"), unit_vector(self.direction, "direction")
+        self._check_outside(surface, origin)
         if self.deposit == "line" and self.radius > 0:
             return self._as_spot(surface, medium)
-        origins, direction = self.rays(spacing=0.5 * medium.mean_free_path)
-        share = self.power / len(origins)
-        parts = []
-        for origin in origins:
-            distances, faces = _entering(surface, origin, direction)
-            if len(faces):
-                entry, normal = _on_curve(surface, origin + distances[0] * direction, faces[0], direction)
-                enter = _Entry.through(entry, direction, normal, medium.eta, share)
-                parts.append(
-                    _as_point(enter, surface, medium)
-                    if self.deposit == "point"
-                    else _as_line(enter, surface, medium, uniform=uniform)
-                )
-        if not parts:
+        # Thin beams that make this one up.
+        spacing = 0.5 * medium.mean_free_path
+        count = 1 if self.radius == 0 else int(np.clip(np.pi * (self.radius / spacing) ** 2, *RAYS))
+        origins = origin + (sunflower(count, self.radius, direction) if count > 1 else np.zeros((1, 3)))
+        points, normals = _entries(surface, origins, direction)
+        if len(points) == 0:
             raise self._missed(surface)
-        deposit = together(parts)
+        met = Rays(points, np.broadcast_to(direction, points.shape), np.full(len(points), self.power / count))
+        inside, specular = entered(met, normals, medium.eta)
+        deposit = replace(
+            _as_points(inside, surface, medium)
+            if self.deposit == "point"
+            else _as_line(inside, surface, medium, uniform=uniform),
+            incident=float(met.powers.sum()),
+            specular=specular,
+        )
         warnings = list(deposit.warnings)
-        if len(parts) < len(origins):
-            warnings.append(_partly_missed(1 - len(parts) / len(origins)))
-        apart = self.radius * math.sqrt(math.pi / len(origins)) / medium.mean_free_path
+        if len(points) < count:
+            warnings.append(_partly_missed(1 - len(points) / count))
+        apart = self.radius * math.sqrt(math.pi / count) / medium.mean_free_path
         if apart > 1.0:
             warnings.append(
-                f"the beam is so wide that the {len(origins)} thin ones it is made of lie {apart:.2g} mean free paths "
+                f"the beam is so wide that the {count} thin ones it is made of lie {apart:.2g} mean free paths "
                 "apart: its exitance is spotted close to where it enters."
             )
         if self.deposit == "line":
@@ -151,7 +122,7 @@ class PencilBeam:
                 "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
                 "or read its exitance a mean free path away."
             )
-        return replace(deposit, warnings=tuple(dict.fromkeys(warnings)))
+        return replace(deposit, warnings=tuple(warnings))
 
     def _as_spot(self, surface: Surface, medium: Medium) -> Deposit:
         spot = Disc(self.origin, self.radius)
@@ -176,99 +147,89 @@ class PencilBeam:
         )
 
 
-def _entering(surface: Surface, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
-    """The crossings (distances, faces) at which a ray goes in."""
-    distances, faces = surface.crossings(origin, direction)
-    inward = surface.normals[faces] @ direction < 0
-    return distances[inward], faces[inward]
-
-
-def _on_curve(surface: Surface, point: FloatArray, face: int, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Where a ray that meets a triangle meets the smooth surface that this stands for, and the normal there."""
-    (curved,), (normal,) = surface.on_curve(np.array([face]), point[None])
-    flat = surface.normals[face]
+def _entries(
+    surface: Surface, origins: FloatArray, direction: FloatArray, *, curved: bool = True
+) -> tuple[FloatArray, FloatArray]:
+    """Where parallel rays from outside first meet a surface, and its normals there, (e, 3) each."""
+    directions = np.broadcast_to(direction, origins.shape)
+    distances, faces = surface.rays.first(origins, directions)
+    # From outside a surface is met from its front, but for rays through an edge.
+    met = (faces >= 0) & (surface.normals[faces] @ direction < 0)
+    points, faces = origins[met] + distances[met, None] * direction, faces[met]
+    flat = surface.normals[faces]
+    if not curved or len(points) == 0:
+        return points, flat
     # Along the ray, to the height of the smooth surface; where they run side by side the triangle has to do.
-    slope = float(direction @ flat)
-    if abs(slope) < GRAZING or direction @ normal > -GRAZING:
-        return point, flat
-    return point + float((curved - point) @ flat) / slope * direction, normal
+    above, normals = surface.on_curve(faces, points)
+    slope = flat @ direction
+    grazing = (slope > -GRAZING) | (normals @ direction > -GRAZING)
+    way = np.where(grazing, 0.0, np.einsum("ij,ij->i", above - points, flat) / np.where(grazing, 1.0, slope))
+    return points + way[:, None] * direction, np.where(grazing[:, None], flat, normals)
 
 
-@dataclass(frozen=True, eq=False)
-class _Entry:
-    """A thin beam just inside the surface."""
-
-    point: FloatArray
-    direction: FloatArray
-    incident: float
-    specular: float
-
-    @property
-    def transmitted(self) -> float:
-        return self.incident - self.specular
-
-    @staticmethod
-    def through(point: FloatArray, direction: FloatArray, normal: FloatArray, eta: float, power: float) -> "_Entry":
-        """Snell's law and Fresnel's, from outside (index 1) into the medium (index eta)."""
-        cosine = max(-float(direction @ normal), 0.0)
-        lost = float(reflectance(cosine, 1.0 / eta))
-        inside = max(1.0 - (1.0 - cosine**2) / eta**2, 0.0)
-        refracted = direction / eta + (cosine / eta - math.sqrt(inside)) * normal
-        return _Entry(point, refracted / np.linalg.norm(refracted), power, power * lost)
-
-
-def _as_point(entry: _Entry, surface: Surface, medium: Medium) -> Deposit:
+def _as_points(rays: Rays, surface: Surface, medium: Medium) -> Deposit:
     mean_free_path = medium.mean_free_path
-    way_out = surface.exit(entry.point, entry.direction)
-    path = way_out[0] if way_out else 0.0
-    depth = mean_free_path
+    distances, faces = surface.rays.first(rays.starts, rays.directions)
+    # On a curved surface a beam starts above the triangle that it met, and meets it again.
+    again = np.flatnonzero(np.einsum("ij,ij->i", rays.directions, surface.normals[faces]) < 0)
+    places = rays.starts[again] + distances[again, None] * rays.directions[again]
+    distances[again] += surface.rays.first(places, rays.directions[again])[0]
+    paths = np.where(np.isfinite(distances), distances, 0.0)
+    if surface.overlaps:
+        # A triangle inside the body is no way out.
+        for ray in np.flatnonzero(paths < 2.0 * mean_free_path).tolist():
+            way_out = surface.exit(rays.starts[ray], rays.directions[ray])
+            paths[ray] = way_out[0] if way_out else 0.0
+    depths = np.minimum(mean_free_path, 0.5 * paths)
     warnings: tuple[str, ...] = ()
-    if path < 2.0 * mean_free_path:
-        depth = min(depth, 0.5 * path)
+    if (depths < mean_free_path).any():
         warnings = (
             "the beam crosses less than two mean free paths of the body, too little for one point of deposit; "
             'use deposit: "line".',
         )
     return Deposit(
-        incident=entry.incident,
-        specular=entry.specular,
-        absorbed=(1.0 - medium.albedo) * entry.transmitted,
-        points=(entry.point + depth * entry.direction)[None],
-        powers=np.array([medium.albedo * entry.transmitted]),
-        resolution=depth,
+        absorbed=(1.0 - medium.albedo) * float(rays.powers.sum()),
+        points=rays.starts + depths[:, None] * rays.directions,
+        powers=medium.albedo * rays.powers,
+        resolution=float(depths.min(initial=mean_free_path)),
         warnings=warnings,
     )
 
 
-def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) -> Deposit:
-    """Through one medium to the far side at once; the rest, and several media, on the mesh."""
+def _as_line(rays: Rays, surface: Surface, medium: Medium, *, uniform: bool) -> Deposit:
+    """A beam without width: through one medium to the far side at once; the rest, and several media, on the mesh."""
+    if len(rays.powers) == 0:
+        return Deposit()
     scattering, _ = medium.delta_eddington
     extinction = medium.sigma_a + scattering
-    start, direction, power = entry.point, entry.direction, entry.transmitted
-    known = Deposit(incident=entry.incident, specular=entry.specular, resolution=0.5 / extinction)
+    start, direction, power = rays.starts[0], rays.directions[0], float(rays.powers[0])
+    resolution = 0.5 / extinction
 
     def ray_on(mesh: TetMesh) -> Rays:
         """The beam from where it meets a facet of the mesh."""
         back = (start - ASTRAY * surface.diagonal * direction)[None]
-        distance, face = mesh.rays.first(back, direction[None])
+        distance, face = mesh.rays.first(back, rays.directions)
         met = face[0] >= 0 and distance[0] < 2.0 * ASTRAY * surface.diagonal
         place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
-        return Rays(place, direction[None], np.array([power]))
+        return replace(rays, starts=place)
 
     if not uniform:
         on_the_way = start + np.linspace(0.0, 4.0 / extinction, 9)[:, None] * direction
-        lit = on_the_way[surface.contains(on_the_way)]
-        return replace(known, lit=lit, on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)))
+        return Deposit(
+            lit=on_the_way[surface.contains(on_the_way)],
+            resolution=resolution,
+            on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)),
+        )
     way_out = surface.exit(start, direction)
     length = way_out[0] if way_out else 0.0
     end = power * math.exp(-extinction * length)
-    segment = replace(
-        known,
+    segment = Deposit(
         absorbed=(power - end) * medium.sigma_a / extinction,
-        starts=start[None],
-        directions=direction[None],
+        starts=rays.starts,
+        directions=rays.directions,
         lengths=np.array([length]),
-        fluxes=np.array([power]),
+        fluxes=rays.powers,
+        resolution=resolution,
     )
     if end <= NEGLIGIBLE * power:
         return replace(segment, absorbed=segment.absorbed + end)
@@ -279,8 +240,8 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) 
         if face[0] < 0:
             return Deposit(ballistic=end)
         arrived = Rays(ray.starts + distance[:, None] * direction, ray.directions, np.array([end]))
-        rays, ballistic, specular = beyond(mesh, coefficients, arrived, face)
-        return together([Deposit(ballistic=ballistic, specular=specular), follow(mesh, coefficients, rays)])
+        on, ballistic, specular = beyond(mesh, coefficients, arrived, face)
+        return together([Deposit(ballistic=ballistic, specular=specular), follow(mesh, coefficients, on)])
 
     return replace(segment, on_mesh=rest_on)
 

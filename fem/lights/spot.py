@@ -50,6 +50,16 @@ class Spot(Protocol):
         ...
 
 
+def sunflower(count: int, radius: float, direction: FloatArray) -> FloatArray:
+    """Places (count, 3) that cover a disc across a direction evenly, no two on one radius (Vogel 1979)."""
+    index = np.arange(count)
+    distance, angle = radius * np.sqrt((index + 0.5) / count), index * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    across /= np.linalg.norm(across)
+    spread = np.outer(distance * np.cos(angle), across)
+    return np.asarray(spread + np.outer(distance * np.sin(angle), np.cross(direction, across)))
+
+
 def _check_length(value: float, name: str) -> None:
     if not 0 < value < math.inf:
         raise InputError(f"{name} of the spot is {value:g}; give a length greater than 0.")
