@@ -21,6 +21,7 @@ from tetlux.fem.lights import (
     PointSource,
     Rectangle,
 )
+from tetlux.fem.lights.point import check_positive
 from tetlux.meshing.errors import InputError
 
 AnySpot = Disc | Gaussian | Rectangle | Image
@@ -111,6 +112,7 @@ def _spot(spec: SpotSpec, channel: int, count: int, reader: Reader) -> AnySpot |
 
 
 def _environment(spec: EnvironmentSpec, brightest: float, channel: int, count: int, reader: Reader) -> Light | None:
+    check_positive(brightest, "brightest", "W/(unit² sr)")
     colours = reader.pixels(spec.file, spec.encoding)
     pixels = colour_of_channel(colours, channel, count)
     if not pixels.any() and colours.any():

@@ -92,13 +92,15 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     if "volume" in case.outputs:
         write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
     if "picture" in case.outputs:
+        # One that is dark in the first channel may be bright in another.
+        lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
         scene = Scene(
             points=results.surface.points,
             triangles=results.surface.faces,
             exitance=results.exitance(),
             unit=unit,
             title=case.name,
-            lights=tuple(ray for light in case.lights for ray in rays(light, case.surface)),
+            lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
             colours=results.preview if results.has_colours else None,
         )
         warnings += draw(scene, folder / FILES["picture"])

@@ -10,7 +10,8 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Vector3 = tuple[Number, Number, Number]
 Numbers = Annotated[list[Number], Field(min_length=1)]
-Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][\w.+-]*$", max_length=60)]
+# Of channels, lights, regions and detectors: it becomes part of the names of values in files.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=60)]
 Encoding = Literal["srgb", "linear"]
 
 # Tags of alternatives begin with this, so that they can be left out of the keys that errors name.

@@ -55,6 +55,8 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
     for start, plain in PLAIN.items():
         if kind.startswith(start):
             text = plain or several
+    if kind.startswith("string_pattern") and key != ("name",):
+        text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
     if kind in ("unknown_key", "one_of", "scale"):
         return f"{text}."
     shown = repr(given)

@@ -182,7 +182,7 @@ WRONG = [
     ("{material: marble, eta: 1.3}", "", r"medium\.eta: unknown key; the keys here are material"),
     (TISSUE, "channels: [a, a]\n", r'line 5: channels\[1\]: the name "a" stands here twice'),
     (TISSUE, "channels: [blue, green, red]\n", "channels: red, green and blue stand in this order"),
-    (TISSUE, "channels: ['a b']\n", r"channels\[0\]: a name is"),
+    (TISSUE, "channels: ['a b']\n", r"channels\[0\]: a name here is of letters"),
     ("{sigma_a: [], sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: give at least one"),
     (
         "{sigma_a: [0.1, many], sigma_s_prime: 1, eta: 1.4}",
