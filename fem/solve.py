@@ -1,7 +1,7 @@
 """From a body, a medium and lights to a `Solution`: mesh, solve, estimate, refine."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import overload
 
@@ -16,7 +16,7 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
-from tetlux.fem.validity import check_media, warnings_for
+from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import tetrahedralize
@@ -197,68 +197,103 @@ def solve_each(
         if mesh is not None:
             raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
         mesh = body
-    if mesh is not None and mesh.unit != body.unit:
-        raise InputError(f"the mesh is in {mesh.unit} and the surface in {body.unit}; give both in one unit.")
     watch = Stopwatch()
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
-        media = media_of(medium, regions, len(scenes))
         inner = tuple(region.surface for region in regions)
-        check_regions(surface, inner)
+        if mesh is None:
+            check_regions(surface, inner)
+        else:
+            _check_mesh(mesh, surface, len(inner))
+        media = media_of(medium, regions, len(scenes))
         for each in dict.fromkeys(media):
             check_media(surface, each)
-        scene_sources = [
+        sources = [
             sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
             for lights, each in zip(scenes, media, strict=True)
         ]
-
-    def steps_on(mesh: TetMesh, before: list[Step] | None) -> list[Step]:
-        assembly = Assembly(mesh)
-        systems = {
-            each: System(mesh, each[0], surface, mass, media.count(each), _regions_of(inner, each), assembly)
-            for each in dict.fromkeys(media)
-        }
-        return [
-            systems[each].step(sources, watch, before[i] if before else None)
-            for i, (each, sources) in enumerate(zip(media, scene_sources, strict=True))
-        ]
-
+    work = _Work(surface, inner, media, sources, mass, watch)
     given = mesh is not None
     if mesh is None:
         with watch.stage("mesh"):
             mesh = tetrahedralize(surface, inner, cache=cache)
-            deposits = [deposit for sources in scene_sources for deposit in sources.deposits]
-            lit = lit_points(deposits, base_of(media[0][0]))
+            lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
-    steps = best = steps_on(mesh, None)
-    least = np.inf
-    while True:
-        worst = max(step.estimate.error for step in steps)
-        if worst < least:
-            best, least = steps, worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
-        marked = _to_split(steps, tolerance)
-        if given or not marked.any():
-            break
-        with watch.stage("mesh"):
-            finer = refine(mesh, marked, surface, inner)
-        if len(finer.tetrahedra) > most_tetrahedra:
-            # Where refinement does not help any more, an earlier mesh may have been the better one.
-            steps = best
-            break
-        mesh = finer
-        steps = steps_on(mesh, steps)
+    steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
     limit = None if given else most_tetrahedra
     seconds = watch.read()
     return [
         replace(
             step.solution,
             seconds=seconds,
-            warnings=_warnings(step.solution, sources, tolerance, limit),
+            warnings=_warnings(step.solution, sources[scene], tolerance, limit)
+            + warnings_for_regions(media[scene][1:]),
         )
-        for step, sources in zip(steps, scene_sources, strict=True)
+        for scene, step in sorted(steps.items())
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What is solved for: a body, and the media and lights of each scene."""
+
+    surface: Surface
+    inner: tuple[Surface, ...]
+    media: list[tuple[AnyMedium, ...]]
+    sources: list[Sources]
+    mass: Mass
+    watch: Stopwatch
+
+    def solver_on(self, mesh: TetMesh) -> Callable[[int, Step | None], Step]:
+        """What solves for one scene on a mesh, given its solution on the mesh before; scenes share what they can."""
+        assembly = Assembly(mesh)
+        systems = {}
+        for media in dict.fromkeys(self.media):
+            regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
+            expected = self.media.count(media)
+            systems[media] = System(mesh, media[0], self.surface, self.mass, expected, regions, assembly)
+        return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
+
+
+def _refined(
+    mesh: TetMesh, work: _Work, tolerance: float, most_tetrahedra: int, report: Callable[[str], None]
+) -> dict[int, Step]:
+    """Solutions of all scenes on one mesh, refined until it is fine enough or has as many tetrahedra as it may."""
+    # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
+    order = sorted(range(len(work.media)), key=lambda scene: base_of(work.media[scene][0]).mean_free_path)
+    first, *pending = order
+    solve_on = work.solver_on(mesh)
+    steps = best = {first: solve_on(first, None)}
+    least = np.inf
+    while True:
+        worst = max(step.estimate.error for step in steps.values())
+        if worst < least:
+            best, least = steps, worst
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
+        marked = _to_split(list(steps.values()), tolerance)
+        fine_enough = not marked.any()
+        if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
+            with work.watch.stage("mesh"):
+                finer = refine(mesh, marked, work.surface, work.inner)
+            if len(finer.tetrahedra) <= most_tetrahedra:
+                mesh, solve_on = finer, work.solver_on(finer)
+                steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
+                continue
+        if not pending:
+            # Where refinement does not help any more, an earlier mesh may have been the better one.
+            return steps if fine_enough else best
+        steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
+        pending, least = [], np.inf
+
+
+def _check_mesh(mesh: TetMesh, surface: Surface, regions: int) -> None:
+    """Refuse a mesh that is not of this body."""
+    if mesh.unit != surface.unit:
+        raise InputError(f"the mesh is in {mesh.unit} and the surface in {surface.unit}; give both in one unit.")
+    have = int(mesh.regions.max(initial=0))
+    if have != regions:
+        raise InputError(f"the mesh has {have} regions and {regions} are given; give those that it was made of.")
 
 
 def media_of(
@@ -282,11 +317,6 @@ def media_of(
     columns = [of_scenes(medium, "the body")]
     columns += [of_scenes(region.medium, f"region {number}") for number, region in enumerate(regions, 1)]
     return list(zip(*columns, strict=True))
-
-
-def _regions_of(inner: Sequence[Surface], media: Sequence[AnyMedium]) -> tuple[Region, ...]:
-    """The regions with the media that they have in one scene."""
-    return tuple(Region(surface, medium) for surface, medium in zip(inner, media[1:], strict=True))
 
 
 def _to_split(steps: list[Step], tolerance: float) -> BoolArray:

@@ -86,3 +86,13 @@ def warnings_for(surface: Surface, medium: Medium) -> list[str]:
             "transmitted light in particular will be off by tens of per cent."
         )
     return found
+
+
+def warnings_for_regions(media: Sequence[AnyMedium]) -> list[str]:
+    """The same of the media of regions, in short."""
+    return [
+        f"region {number}: the reduced albedo is {base_of(medium).albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
+        "is good for; light that is absorbed there is only roughly right."
+        for number, medium in enumerate(media, 1)
+        if base_of(medium).albedo < LOW_ALBEDO
+    ]
