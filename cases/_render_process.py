@@ -26,10 +26,14 @@ def main(job_path: str, image_path: str) -> None:
     shaded, full = job["shading"].tolist()
     look = {"smooth_shading": True, "ambient": shaded, "diffuse": full - shaded, "specular": 0.0}
     body = _soup(job["corners"], job["normals"])
-    body.point_data["share"] = job["shares"].ravel()
-    table = pyvista.LookupTable(values=np.round(255 * np.column_stack([job["table"], np.ones(256)])))
-    table.scalar_range = (0.0, 1.0)
-    plotter.add_mesh(body, scalars="share", cmap=table, interpolate_before_map=True, show_scalar_bar=False, **look)
+    if len(job["colours"]):
+        body.point_data["colour"] = np.round(255 * job["colours"].reshape(-1, 3)).astype(np.uint8)
+        plotter.add_mesh(body, scalars="colour", rgb=True, show_scalar_bar=False, **look)
+    else:
+        body.point_data["share"] = job["shares"].ravel()
+        table = pyvista.LookupTable(values=np.round(255 * np.column_stack([job["table"], np.ones(256)])))
+        table.scalar_range = (0.0, 1.0)
+        plotter.add_mesh(body, scalars="share", cmap=table, interpolate_before_map=True, show_scalar_bar=False, **look)
     if len(job["arrows"]):
         arrows = _soup(job["arrows"], job["arrow_normals"])
         plotter.add_mesh(arrows, color=job["light"].tolist(), **look)

@@ -44,11 +44,13 @@ def check_all(requests: Sequence[str]) -> int:
             print(f"tetlux: {error}", file=sys.stderr)
             wrong += 1
             continue
-        surface = cases[0].surface
+        first, surface = cases[0], cases[0].surface
         runs = "" if len(cases) == 1 else f"{len(cases)} runs, "
+        if len(first.channels) > 1:
+            runs += f"channels {', '.join(first.channel_names)}; "
         size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
         print(f"{request}: right; {runs}{len(surface.faces):,} triangles, {size} {surface.unit}")
-        for note in (*surface.repairs, *surface.warnings):
+        for note in (*first.repairs, *surface.warnings, *first.region_warnings):
             print(f"  {note}")
     return 2 if wrong else 0
 
@@ -72,7 +74,7 @@ def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:
     for number, case in enumerate(cases, 1):
         print(f"[{number}/{len(cases)}] {case.name}", flush=True)
         started = time.perf_counter()
-        for note in case.surface.repairs:
+        for note in case.repairs:
             print(f"  repaired: {note}")
 
         def report(line: str, started: float = started) -> None:

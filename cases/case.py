@@ -1,25 +1,47 @@
 """`Case`: one run, ready to be solved; and how a case file becomes a list of them."""
 
-import copy
-import itertools
-import math
-import time
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
-from pydantic import ValidationError
-
+from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
-from tetlux.cases.schema import CaseSpec, LightSpec, SurfaceSpec
-from tetlux.fem.lights import DiffuseLight, Light, PencilBeam, PointSource
+from tetlux.cases.lighting import BODY, light_names, light_of
+from tetlux.cases.media import media_of
+from tetlux.cases.reading import Reader
+from tetlux.cases.schema import CaseSpec
+from tetlux.cases.sensors import Sensor, sensor_of
+from tetlux.cases.sweep import swept
+from tetlux.cases.validation import validated
+from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.medium import Medium
-from tetlux.fem.validity import check_scattering, check_size
-from tetlux.meshing import shapes
+from tetlux.fem.region import Region
+from tetlux.fem.validity import check_media, check_size
+from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.read import SUFFIXES, read_surface
+from tetlux.meshing.read import SUFFIXES
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One wavelength or colour of a case.
+
+    Attributes
+    ----------
+    name : str
+    medium : Medium or VaryingMedium
+        Of the body.
+    lights : mapping of str to Light
+        Those that are not dark in it, by name.
+    """
+
+    name: str
+    medium: AnyMedium
+    lights: Mapping[str, Light]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +55,17 @@ class Case:
         within the case's.
     source : Path
     surface : Surface
-    medium : Medium
-    lights : tuple of Light
+    channels : tuple of Channel
+    light_names : tuple of str
+        Of all lights, in their order.
+    regions : tuple of Region
+        Each with one medium for each channel; its surface bears its name.
     tolerance : float
     outputs : tuple of str
+    sensors : tuple of Sensor
+        The detectors, by name.
+    camera : (3,) floats, optional
+        From where the surface is seen, unit.
     reading_seconds : float
         Spent on reading and checking the surface.
     comparison : Comparison, optional
@@ -46,12 +75,49 @@ class Case:
     name: str
     source: Path
     surface: Surface
-    medium: Medium
-    lights: tuple[Light, ...]
+    channels: tuple[Channel, ...]
+    light_names: tuple[str, ...]
+    regions: tuple[Region, ...]
     tolerance: float
     outputs: tuple[str, ...]
+    sensors: tuple[Sensor, ...] = ()
+    camera: Vector | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
+
+    @property
+    def channel_names(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(channel.name for channel in self.channels)
+
+    @property
+    def repairs(self) -> tuple[str, ...]:
+        """What was mended when its surfaces were read."""
+        return self._of_surfaces("repairs")
+
+    @property
+    def region_warnings(self) -> tuple[str, ...]:
+        """What a user should know of the surfaces of regions; that of the body is among a solution's warnings."""
+        return self._of_surfaces("warnings")[len(self.surface.warnings) :]
+
+    def _of_surfaces(self, name: str) -> tuple[str, ...]:
+        inner = [f"{region.surface.name}: {note}" for region in self.regions for note in getattr(region.surface, name)]
+        return (*getattr(self.surface, name), *inner)
+
+    @property
+    def is_simple(self) -> bool:
+        """Whether it is of one channel and one medium, the same everywhere."""
+        return len(self.channels) == 1 and not self.regions and isinstance(self.channels[0].medium, Medium)
+
+    @property
+    def medium(self) -> Medium:
+        """The medium of a simple case; else what stands for the body's in the first channel."""
+        return base_of(self.channels[0].medium)
+
+    @property
+    def lights(self) -> tuple[Light, ...]:
+        """The lights of the first channel."""
+        return tuple(self.channels[0].lights.values())
 
 
 def library_folder() -> Path:
@@ -85,174 +151,121 @@ def load_cases(path: Path) -> list[Case]:
         With the file, the line and the key.
     """
     document = read_document(path)
-    spec = _validated(document, document.data)
-    surfaces: dict[str, Surface] = {}
+    spec = validated(document, document.data)
+    reader = Reader(path.parent)
     cases = []
-    for label, data, keys in _swept(document, spec):
+    for label, data, keys in swept(document, spec):
         single = document if label is None else Document(path, data, {**document.lines, **keys})
-        one = spec if label is None else _validated(single, data)
+        one = spec if label is None else validated(single, data)
         name = one.name or path.stem
-        cases.append(_case(single, one, name if label is None else f"{name}/{label}", surfaces))
+        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
     return cases
 
 
-# What pydantic says in words of Python's, by the beginning of its error's kind.
-PLAIN = {
-    "model_": "expected keys and values",
-    "dict_": "expected keys and values",
-    "list_": "expected a list",
-    "tuple_": "expected a list of three numbers",
-    "string_pattern": "a name is of letters, digits, spaces and any of . + = , - _ and begins with a letter or digit",
-    "string_type": "expected text",
-    "too_short": "give at least one",
-    "too_long": "expected a list of three numbers",
-    "float_type": "expected a number",
-}
-MOST_RUNS = 20_000
-
-
-def _validated(document: Document, data: dict[str, Any]) -> CaseSpec:
-    try:
-        return CaseSpec.model_validate(data)
-    except ValidationError as failure:
-        first = failure.errors()[0]
-        key: Key = tuple(first["loc"])
-        context = first.get("ctx", {})
-        if first["type"] == "unknown_key":
-            key = (*key, context["key"])
-        raise document.error(
-            key, _sentence(first["type"], first["msg"], first.get("input"), key[-1] if key else "")
-        ) from failure
-
-
-def _sentence(kind: str, message: str, given: object, last: str | int) -> str:
-    if kind == "missing" and not isinstance(last, int):
-        return "this key is missing; the case needs it."
-    text = message[0].lower() + message[1:]
-    if kind == "missing" and isinstance(last, int):
-        return "expected a list of three numbers."
-    text = text.replace("input should be greater", "expected a number greater").replace(
-        "input should be less", "expected a number less"
-    )
-    text = text.replace("input should be", "expected").replace("a valid number", "a number")
-    for start, plain in PLAIN.items():
-        if kind.startswith(start):
-            text = plain
-    if kind in ("unknown_key", "one_of", "scale"):
-        return f"{text}."
-    shown = repr(given)
-    return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}."
-
-
-def _swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str, Any], dict[Key, int]]]:
-    """The case's data once for each point of its sweep's grid, with the label of that point."""
-    if not spec.sweep:
-        return [(None, document.data, {})]
-    runs: list[tuple[str | None, dict[str, Any], dict[Key, int]]] = []
-    for key, listed in spec.sweep.items():
-        if len(set(map(repr, listed))) < len(listed):
-            raise document.error(("sweep", key), "a value stands here twice; give each once.")
-    count = math.prod(len(listed) for listed in spec.sweep.values())
-    if count > MOST_RUNS:
-        raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
-    for values in itertools.product(*spec.sweep.values()):
-        data = copy.deepcopy(document.data)
-        del data["sweep"]
-        keys: dict[Key, int] = {}
-        for key, value in zip(spec.sweep, values, strict=True):
-            keys[_assign(document, data, key, value)] = document.lines["sweep", key]
-        label = ",".join(f"{k}={v}" for k, v in zip(spec.sweep, values, strict=True))
-        runs.append((label.replace("/", "_"), data, keys))
-    return runs
-
-
-def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
-    """Set a dotted key (list items by their number); it may be new, what holds it may not."""
-    parts: Key = tuple(int(p) if p.isdigit() else p for p in key.split("."))
-    holder: Any = data
-    try:
-        for part in parts[:-1]:
-            holder = holder[part]
-        holder[parts[-1]] = value
-    except (KeyError, IndexError, TypeError) as error:
-        raise document.error(
-            ("sweep", key),
-            f'"{key}" is no key of this case; write it as in medium.sigma_a or lights.0.pencil.power.',
-        ) from error
-    return parts
-
-
-def _case(document: Document, spec: CaseSpec, name: str, surfaces: dict[str, Surface]) -> Case:
-    def located(key: Key, error: InputError) -> InputError:
-        return document.error(key, str(error))
-
-    try:
-        medium = Medium(**spec.medium.model_dump())
-        check_scattering(medium)
-    except InputError as error:
-        raise located(("medium", *_named_first(str(error), spec.medium.model_dump())), error) from error
-    try:
-        label = spec.surface.model_dump_json() + spec.unit
-        started = time.perf_counter()
-        if label not in surfaces:
-            surface = _surface(spec.surface, spec.unit, document.path.parent)
-            surfaces[label] = replace(surface, crease_angle=spec.surface.crease_angle)
-        reading_seconds = time.perf_counter() - started
-        surface = surfaces[label]
-        check_size(surface, medium)
-    except InputError as error:
-        raise located(("surface",), error) from error
-    lights, deposits = [], []
-    for index, light_spec in enumerate(spec.lights):
-        try:
-            light = _light(light_spec)
-            deposits.append(light.deposit_in(surface, medium))
-        except InputError as error:
-            raise located(("lights", index), error) from error
-        lights.append(light)
-    try:
-        comparison = comparison_for(spec.surface, medium, deposits, spec.compare) if spec.compare else None
-    except InputError as error:
-        raise located(("compare",), error) from error
+def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:
+    reader.seconds = 0.0
+    with document.at(("surface",)):
+        surface = reader.surface(spec.surface, spec.unit)
+    channels = channel_names(document, spec)
+    media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
+    with document.at(("surface",)):
+        for medium in media:
+            check_size(surface, base_of(medium))
+    region_names, regions = _regions(document, spec, surface, media, reader)
+    names = light_names(spec)
+    check_different(document, "lights", names)
+    _check_value_names(document, channels, names)
+    lights, deposits = _lights(document, spec, names, surface, media, region_names, reader)
+    with document.at(("compare",)):
+        comparison = None
+        if spec.compare:
+            if len(media) > 1 or regions or not isinstance(media[0], Medium):
+                raise InputError("closed forms are those of one channel and one even medium; leave compare out.")
+            comparison = comparison_for(spec.surface, media[0], deposits, spec.compare)
+    check_different(document, "detectors", [detector.name for detector in spec.detectors])
+    sensors = []
+    for i, detector in enumerate(spec.detectors):
+        with document.at(("detectors", i)):
+            sensors.append(sensor_of(detector, surface, base_of(media[0])))
     return Case(
         name=name,
         source=document.path,
         surface=surface,
-        medium=medium,
-        lights=tuple(lights),
+        channels=tuple(map(Channel, channels, media, lights)),
+        light_names=names,
+        regions=regions,
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
-        reading_seconds=reading_seconds,
+        sensors=tuple(sensors),
+        camera=spec.camera.position if spec.camera else None,
+        reading_seconds=reader.seconds,
         comparison=comparison,
     )
 
 
-def _named_first(message: str, fields: dict[str, Any]) -> Key:
-    """The key that a message begins with, if it does."""
-    word = message.split(maxsplit=1)[0]
-    return (word,) if word in fields else ()
+def _regions(
+    document: Document, spec: CaseSpec, surface: Surface, media: tuple[AnyMedium, ...], reader: Reader
+) -> tuple[tuple[str, ...], tuple[Region, ...]]:
+    """Names of the regions, and the regions."""
+    names = tuple(region.name or f"region_{i}" for i, region in enumerate(spec.regions, 1))
+    check_different(document, "regions", names)
+    if BODY in names:
+        raise document.error(("regions", names.index(BODY)), f'"{BODY}" is what is outside all regions; rename it.')
+    regions = []
+    for i, region in enumerate(spec.regions):
+        key: Key = ("regions", i)
+        with document.at((*key, "surface")):
+            inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
+        own = media_of(document, (*key, "medium"), region.medium, inner, len(media), reader)
+        with document.at((*key, "medium")):
+            for outside, inside in zip(media, own, strict=True):
+                check_media(surface, [base_of(outside), base_of(inside)])
+        regions.append(Region(inner, own))
+    with document.at(("regions",)):
+        check_regions(surface, [region.surface for region in regions])
+    return names, tuple(regions)
 
 
-def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:
-    if spec.file is not None:
-        return read_surface(folder / spec.file, unit=unit, scale=spec.scale)
-    if spec.sphere:
-        return shapes.sphere(spec.sphere.radius, center=spec.sphere.center, unit=unit)
-    if spec.slab:
-        return shapes.slab(spec.slab.width, spec.slab.depth, unit=unit)
-    if spec.box:
-        return shapes.box(spec.box.size, center=spec.box.center, unit=unit)
-    if spec.cylinder:
-        c = spec.cylinder
-        return shapes.cylinder(c.radius, c.height, center=c.center, unit=unit)
-    assert spec.torus is not None
-    return shapes.torus(spec.torus.major, spec.torus.minor, center=spec.torus.center, unit=unit)
+def _lights(
+    document: Document,
+    spec: CaseSpec,
+    names: tuple[str, ...],
+    surface: Surface,
+    media: tuple[AnyMedium, ...],
+    regions: tuple[str, ...],
+    reader: Reader,
+) -> tuple[list[dict[str, Light]], list[Deposit]]:
+    """The lights of each channel by name, and what those of the first leave in the body."""
+    lights: list[dict[str, Light]] = [{} for _ in media]
+    deposits = []
+    for i, light_spec in enumerate(spec.lights):
+        with document.at(("lights", i)):
+            for channel, medium in enumerate(media):
+                light = light_of(light_spec, channel, len(media), regions, reader)
+                if light is None:
+                    continue
+                lights[channel][names[i]] = light
+                uniform = not regions and isinstance(medium, Medium)
+                deposit = light.deposit_in(surface, base_of(medium), uniform=uniform)
+                if channel == 0:
+                    deposits.append(deposit)
+    if not all(lights):
+        raise document.error(("lights",), "all lights are dark in one channel; give each channel some.")
+    return lights, deposits
 
 
-def _light(spec: LightSpec) -> Light:
-    if spec.pencil:
-        return PencilBeam(**spec.pencil.model_dump())
-    if spec.point:
-        return PointSource(**spec.point.model_dump())
-    assert spec.diffuse is not None
-    return DiffuseLight(**spec.diffuse.model_dump())
+def _check_value_names(document: Document, channels: tuple[str, ...], lights: tuple[str, ...]) -> None:
+    """Refuse names by which two sets of values in a file would be called the same.
+
+    Raises
+    ------
+    InputError
+    """
+    if ALL in lights:
+        raise document.error(("lights", lights.index(ALL)), f'"{ALL}" is the sum of all lights; give another name.')
+    names = [*channels, *lights, *(f"{light}_{channel}" for light in lights for channel in channels)]
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise document.error(
+            ("lights",), f'names of lights and channels make "{twice[0]}" twice; give one of them another name.'
+        )

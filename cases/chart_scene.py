@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.cases.case import Case
 from tetlux.cases.chart_measure import relative_error, surface_samples
-from tetlux.cases.compare import comparison_for
+from tetlux.cases.compare import are_points, comparison_for
 from tetlux.cases.document import read_document
 from tetlux.cases.schema import CaseSpec, SurfaceSpec
 from tetlux.fem.grading import lit_points
@@ -95,7 +95,7 @@ class Scene:
     @property
     def in_points(self) -> bool:
         """Whether all light is deposited in points."""
-        return not any(len(deposit.starts) or deposit.irradiance for deposit in self.deposits)
+        return are_points(self.deposits)
 
     def error_of(self, exitance: FloatArray) -> float:
         """Relative L2 error of an exitance (n,) at the samples."""
@@ -113,8 +113,10 @@ def scene_of(case: Case, *, quick: bool = False) -> Scene:
     Raises
     ------
     RunError
-        If the run that is to be the reference fails, or no light leaves the body.
+        If the run that is to be the reference fails, no light leaves the body, or it is of several media.
     """
+    if not case.is_simple:
+        raise RunError("a chart is of one channel and one even medium; leave lists, regions and fields out.")
     shape = spec_of(case).surface
     surface, medium = case.surface, case.medium
     deposits = [light.deposit_in(surface, medium) for light in case.lights]

@@ -88,6 +88,11 @@ class Compared:
     single_valued: bool
 
 
+def are_points(deposits: list[Deposit]) -> bool:
+    """Whether all light is deposited in points."""
+    return not any(len(d.points) == 0 or len(d.starts) or d.on_mesh is not None for d in deposits)
+
+
 def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], names: list[ClosedForm]) -> Comparison:
     """Closed forms of a built-in shape under point deposits.
 
@@ -102,9 +107,10 @@ def comparison_for(shape: SurfaceSpec, medium: Medium, deposits: list[Deposit], 
         if name not in known:
             have = f"for a {kind} there is {', '.join(known)}" if known else f"there is none for a {kind}"
             raise InputError(f'"{name}" is no closed form here; {have}.')
-    if any(len(d.points) == 0 or len(d.starts) or d.on_mesh is not None for d in deposits):
+    if not are_points(deposits):
         raise InputError(
-            'closed forms here are those of point sources; give pencil beams deposit: "point", and no diffuse light.'
+            'closed forms here are those of point sources; give pencil beams deposit: "point", and no diffuse light, '
+            "beams of another kind or emission."
         )
     sources = np.vstack([d.points for d in deposits])
     powers = np.concatenate([d.powers for d in deposits])

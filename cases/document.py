@@ -1,6 +1,8 @@
 """A YAML document that knows the line of every key."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,6 +50,21 @@ class Document:
         where = f"{self.path}, line {self.lines[known]}" if known else f"{self.path}"
         name = dotted(key)
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
+
+    @contextmanager
+    def at(self, key: Key, *names: str) -> Iterator[None]:
+        """Within this, an error is one of the value at a key, or of one of `names` in it that its message begins with.
+
+        Raises
+        ------
+        InputError
+            With this file, the line and the key. What is within must not raise such an error itself.
+        """
+        try:
+            yield
+        except InputError as error:
+            word = str(error).split(maxsplit=1)[0]
+            raise self.error((*key, word) if word in names else key, str(error)) from error
 
 
 def dotted(key: Key) -> str:

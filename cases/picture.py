@@ -12,7 +12,6 @@ import numpy as np
 from tetlux.cases.picture_frame import frame
 from tetlux.cases.picture_plain import draw_plain
 from tetlux.cases.picture_stage import (
-    BACKGROUND,
     FULL,
     LIGHT,
     OVERSAMPLING,
@@ -55,6 +54,8 @@ class Scene:
     unit, title : str
     lights : tuple of Ray
         The lights to draw in.
+    colours : ((n, 3) ndarray of uint8, float), optional
+        Colours of the vertices, in place of those of their exitance, and what white stands for, W/unit².
     """
 
     points: FloatArray
@@ -63,13 +64,14 @@ class Scene:
     unit: str
     title: str
     lights: tuple[Ray, ...] = ()
+    colours: tuple[Image, float] | None = None
 
 
 def draw(scene: Scene, path: Path) -> list[str]:
     """Draw a body in the colours of its exitance.
 
-    The colours follow the logarithm of the exitance, down to six decades below its maximum. The camera
-    looks at the lit side.
+    The colours follow the logarithm of the exitance, down to six decades below its maximum, or are those given. The
+    camera looks at the lit side.
 
     Parameters
     ----------
@@ -88,7 +90,8 @@ def draw(scene: Scene, path: Path) -> list[str]:
         If the picture cannot be written.
     """
     ends = exitance_range(scene.exitance)
-    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights)
+    colours = None if scene.colours is None else scene.colours[0] / 255.0
+    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights, colours)
     image = _drawn_with_pyvista(stage)
     warnings = [] if image is not None else [WITHOUT_PYVISTA]
     unfinished = path.with_name(path.name + ".part")
@@ -101,6 +104,7 @@ def draw(scene: Scene, path: Path) -> list[str]:
             ends=ends,
             table=stage.table,
             below=ends is not None and bool((scene.exitance < ends[0] * (1 - 1e-9)).any()),
+            white=None if scene.colours is None else scene.colours[1],
             unit=scene.unit,
             title=scene.title,
             extent=np.ptp(scene.points, axis=0),
@@ -119,13 +123,14 @@ def _drawn_with_pyvista(stage: Stage) -> Image | None:
         np.savez(
             job,
             size=OVERSAMPLING * np.array(PANEL),
-            background=BACKGROUND,
+            background=stage.background,
             light=LIGHT,
             shading=(SHADED, FULL),
             lamp=camera.lamp,
             corners=stage.corners,
             normals=stage.normals,
             shares=stage.shares,
+            colours=np.zeros(0) if stage.colours is None else stage.colours,
             table=stage.table,
             arrows=stage.arrows,
             arrow_normals=stage.arrow_normals,

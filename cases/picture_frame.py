@@ -8,6 +8,7 @@ import numpy as np
 
 from tetlux.cases.picture_stage import (
     BACKGROUND,
+    DARK,
     LIGHT,
     PANEL,
     Camera,
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 SIZE = (1400, 1050)
 # The panel's left and top edges within the picture.
 LEFT, TOP = 30, 100
+# Colours of lines and words, and the fainter ones, on the light and on the dark background.
 INK, FAINT = "#20242b", "#5d6673"
+PALE, PALE_FAINT = "#e8eaee", "#9aa3b0"
 DPI = 100
 
 
@@ -35,6 +38,7 @@ def frame(
     ends: tuple[float, float] | None,
     table: FloatArray,
     below: bool,
+    white: float | None,
     unit: str,
     title: str,
     extent: FloatArray,
@@ -55,6 +59,8 @@ def frame(
         The colour map.
     below : bool
         Whether some of the body is darker than the lower end.
+    white : float or None
+        What white stands for where the body is drawn in colours of its own, which have no bar, W/unit².
     unit, title : str
     extent : (3,) ndarray
         The body's size along x, y and z, unit.
@@ -63,18 +69,22 @@ def frame(
     from matplotlib.figure import Figure  # noqa: PLC0415
 
     # A figure of its own, never pyplot: pyplot's figures and backend belong to the caller.
-    figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor=BACKGROUND)
+    background, ink, faint = (BACKGROUND, INK, FAINT) if white is None else (DARK, PALE, PALE_FAINT)
+    figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor=background)
     FigureCanvasAgg(figure)
     canvas = _panel(figure, (0, 0, *SIZE))
     canvas.set_axis_off()
     canvas.imshow(image, extent=(LEFT, LEFT + PANEL[0], TOP + PANEL[1], TOP), interpolation="none", zorder=1)
     canvas.set(xlim=(0, SIZE[0]), ylim=(SIZE[1], 0), aspect="auto")
-    canvas.text(LEFT + 12, 56, _fitted(title), size=21, color=INK, va="center", parse_math=False)
-    _size_marks(canvas, camera, unit, extent)
-    _axes_cross(canvas, camera)
+    canvas.text(LEFT + 12, 56, _fitted(title), size=21, color=ink, va="center", parse_math=False)
+    _size_marks(canvas, camera, unit, extent, ink, faint)
+    _axes_cross(canvas, camera, faint)
     _light_marks(canvas, camera, lights)
-    _color_bar(figure, ends, table, below, unit)
-    figure.savefig(path, format="png", dpi=DPI, facecolor=BACKGROUND)
+    if white is None:
+        _color_bar(figure, ends, table, below, unit)
+    else:
+        _white_note(canvas, white, unit)
+    figure.savefig(path, format="png", dpi=DPI, facecolor=background)
 
 
 def _panel(figure: "Figure", box: tuple[float, float, float, float]) -> "Axes":
@@ -89,16 +99,16 @@ def _fitted(title: str) -> str:
     return line if len(line) <= 84 else line[:83] + "…"
 
 
-def _size_marks(canvas: "Axes", camera: Camera, unit: str, extent: FloatArray) -> None:
+def _size_marks(canvas: "Axes", camera: Camera, unit: str, extent: FloatArray, ink: str, faint: str) -> None:
     """A scale bar, true since the projection is parallel, and the body's size in words."""
     length = round_length(0.22 * PANEL[0] * camera.pixel)
     left, low, width = LEFT + 12, SIZE[1] - 36, length / camera.pixel
-    canvas.plot([left, left + width], [low, low], color=INK, linewidth=3.2, solid_capstyle="butt")
+    canvas.plot([left, left + width], [low, low], color=ink, linewidth=3.2, solid_capstyle="butt")
     for x in (left, left + width):
-        canvas.plot([x, x], [low - 7, low + 7], color=INK, linewidth=1.6, solid_capstyle="butt")
-    canvas.text(left + 0.5 * width, low - 12, f"{length:g} {unit}", size=15, color=INK, ha="center", va="bottom")
+        canvas.plot([x, x], [low - 7, low + 7], color=ink, linewidth=1.6, solid_capstyle="butt")
+    canvas.text(left + 0.5 * width, low - 12, f"{length:g} {unit}", size=15, color=ink, ha="center", va="bottom")
     sizes = " × ".join(f"{value:.3g}" for value in extent)
-    canvas.text(left + width + 28, low, f"body {sizes} {unit}", size=13, color=FAINT, va="center")
+    canvas.text(left + width + 28, low, f"body {sizes} {unit}", size=13, color=faint, va="center")
 
 
 def round_length(longest: float) -> float:
@@ -107,16 +117,16 @@ def round_length(longest: float) -> float:
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest)
 
 
-def _axes_cross(canvas: "Axes", camera: Camera) -> None:
+def _axes_cross(canvas: "Axes", camera: Camera, faint: str) -> None:
     """Which way x, y and z point, at the lower right."""
     x0, y0, length = LEFT + PANEL[0] + 95.0, SIZE[1] - 50.0, 40.0
     for axis, name in zip(np.eye(3), "xyz", strict=True):
         dx, dy = float(length * axis @ camera.right), float(-length * axis @ camera.up)
         if math.hypot(dx, dy) < 0.12 * length:
             continue  # it points at the eye
-        canvas.plot([x0, x0 + dx], [y0, y0 + dy], color=FAINT, linewidth=1.8, solid_capstyle="round")
+        canvas.plot([x0, x0 + dx], [y0, y0 + dy], color=faint, linewidth=1.8, solid_capstyle="round")
         stretch = 1.0 + 13.0 / math.hypot(dx, dy)
-        canvas.text(x0 + stretch * dx, y0 + stretch * dy, name, size=13, color=FAINT, ha="center", va="center")
+        canvas.text(x0 + stretch * dx, y0 + stretch * dy, name, size=13, color=faint, ha="center", va="center")
 
 
 def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> None:
@@ -139,6 +149,18 @@ def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> Non
             markeredgecolor=edge,
             markeredgewidth=width,
         )
+
+
+def _white_note(canvas: "Axes", white: float, unit: str) -> None:
+    """What white stands for in a picture in the body's own colours, under a patch of white."""
+    center, top, size = LEFT + PANEL[0] + 95, 190, 64
+    left, right, low = center - size / 2, center + size / 2, top + size
+    canvas.fill([left, right, right, left], [top, top, low, low], facecolor="white")
+    if not white > 0:
+        lines = "no light leaves\nthe body"
+    else:
+        lines = f"white is\nexitance of\n{_label(float(f'{white:.3g}'))} W/{unit}²"
+    canvas.text(center, low + 16, lines, size=14, color=PALE, ha="center", va="top", linespacing=1.4)
 
 
 def _color_bar(figure: "Figure", ends: tuple[float, float] | None, table: FloatArray, below: bool, unit: str) -> None:

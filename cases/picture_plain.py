@@ -3,7 +3,6 @@
 import numpy as np
 
 from tetlux.cases.picture_stage import (
-    BACKGROUND,
     FULL,
     LIGHT,
     OVERSAMPLING,
@@ -30,8 +29,11 @@ def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     weights = _weights(placed[flat, :, :2], pixels % width + 0.5, pixels // width + 0.5)
     colors = np.empty((len(pixels), 3))
     lit = flat >= body
-    shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
-    colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
+    if stage.colours is None:
+        shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
+        colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
+    else:
+        colors[~lit] = np.einsum("ij,ijk->ik", weights[~lit], stage.colours[flat[~lit]])
     colors[lit] = LIGHT
     normals = np.concatenate([stage.normals, stage.arrow_normals])
     lamp, eye = (
@@ -40,7 +42,7 @@ def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     # As VTK does, a normal that points away from the eye is turned round.
     cosine = np.clip(np.where(eye < 0, -lamp, lamp), 0.0, 1.0)
     colors *= (SHADED + (FULL - SHADED) * cosine)[:, None]
-    image = np.tile(np.round(255 * np.asarray(BACKGROUND)).astype(np.uint8), (owner.size, 1))
+    image = np.tile(np.round(255 * np.asarray(stage.background)).astype(np.uint8), (owner.size, 1))
     image[pixels] = np.round(255 * colors).astype(np.uint8)
     return image.reshape(*owner.shape, 3)
 

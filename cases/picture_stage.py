@@ -19,6 +19,8 @@ NARROWEST = 2.0
 # The darkest colours of the map are left out: on black no shape can be seen.
 COLOR_MAP, DARKEST = "inferno", 0.2
 BACKGROUND: Vector = (0.953, 0.957, 0.965)
+# Behind a body in colours of its own, most of which are darker than white.
+DARK: Vector = (0.11, 0.12, 0.14)
 LIGHT: Vector = (0.0, 0.62, 0.72)
 # Brightness of a face turned away from the lamp and of one that faces it; between them it follows the
 # cosine. Near enough to 1 that colours can be read off the bar.
@@ -99,6 +101,8 @@ class Stage:
         Corners and normals of the lights' arrows.
     table : (256, 3) ndarray
         The colour map, red, green and blue from 0 to 1.
+    colours : (m, 3, 3) ndarray or None
+        Colours of the corners themselves, from 0 to 1, in place of the colour map.
     """
 
     camera: Camera
@@ -108,6 +112,12 @@ class Stage:
     arrows: FloatArray
     arrow_normals: FloatArray
     table: FloatArray
+    colours: FloatArray | None = None
+
+    @property
+    def background(self) -> Vector:
+        """Red, green and blue behind the body."""
+        return BACKGROUND if self.colours is None else DARK
 
 
 def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
@@ -140,7 +150,13 @@ def color_table() -> FloatArray:
     return np.asarray(colormaps[COLOR_MAP](np.linspace(DARKEST, 1.0, 256))[:, :3])
 
 
-def build_stage(points: FloatArray, triangles: IntArray, exitance: FloatArray, lights: tuple[Ray, ...]) -> Stage:
+def build_stage(
+    points: FloatArray,
+    triangles: IntArray,
+    exitance: FloatArray,
+    lights: tuple[Ray, ...],
+    colours: FloatArray | None = None,
+) -> Stage:
     """Choose the camera, and make arrows, normals and colours for it."""
     shares = map_shares(exitance, exitance_range(exitance))
     corners = points[triangles]
@@ -160,6 +176,7 @@ def build_stage(points: FloatArray, triangles: IntArray, exitance: FloatArray, l
         arrows=np.concatenate([np.empty((0, 3, 3)), *(c for c, _ in arrows)]),
         arrow_normals=np.concatenate([np.empty((0, 3, 3)), *(n for _, n in arrows)]),
         table=color_table(),
+        colours=None if colours is None else colours[triangles],
     )
 
 

@@ -9,20 +9,19 @@ from pathlib import Path
 from tetlux.cases.case import Case
 from tetlux.cases.compare import as_json, compare
 from tetlux.cases.compare_picture import draw_comparison
-from tetlux.cases.picture import Ray, Scene, draw
+from tetlux.cases.picture import Scene, draw
+from tetlux.cases.picture_rays import rays
+from tetlux.cases.ply import write_ply
+from tetlux.cases.results import Results, results_of, surface_values, volume_values
+from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
-from tetlux.fem.lights import PencilBeam, PointSource
-from tetlux.fem.lights.point import unit_vector
-from tetlux.fem.solution import Solution
-from tetlux.fem.solve import solve
-from tetlux.fem.surface_exitance import surface_exitance
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.files import write_mesh, write_surface
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.files import write_mesh
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+READINGS = "detectors.csv"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 
@@ -54,12 +53,20 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
         If the mesher or the solver fails, or the results cannot be written.
     """
     started = time.perf_counter()
-    solution = solve(case.surface, case.medium, case.lights, tolerance=case.tolerance, cache=cache, report=report)
+    solutions = solve_each(
+        case.surface,
+        [channel.medium for channel in case.channels],
+        [list(channel.lights.values()) for channel in case.channels],
+        regions=case.regions,
+        tolerance=case.tolerance,
+        cache=cache,
+        report=report,
+    )
     target = out / case.name
     try:
         out.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".partial-", dir=out) as folder:
-            warnings = _write(case, solution, Path(folder), started)
+            warnings = _write(results_of(case, solutions), Path(folder), started)
             target.mkdir(parents=True, exist_ok=True)
             _move(Path(folder), target)
     except OSError as error:
@@ -71,36 +78,45 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
     return target
 
 
-def _write(case: Case, solution: Solution, folder: Path, started: float) -> list[str]:
+def _write(results: Results, folder: Path, started: float) -> list[str]:
     """Write all files of a run into a folder, and return its warnings."""
     writing = time.perf_counter()
-    mesh = solution.mesh
-    warnings = list(solution.warnings)
-    surface, exitance = surface_exitance(solution)
+    case, first = results.case, results.solutions[0]
+    unit = case.surface.unit
+    warnings = _warnings(results)
     if "surface" in case.outputs:
-        write_surface(surface, folder / FILES["surface"], {"exitance": exitance})
+        comments = [f"lengths in {unit}, exitance in W/{unit}^2"]
+        if results.has_colours:
+            comments.append(f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2")
+        write_ply(results.surface, folder / FILES["surface"], surface_values(results), comments)
     if "volume" in case.outputs:
-        write_mesh(mesh, folder / FILES["volume"], {"fluence": solution.fluence})
+        write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
     if "picture" in case.outputs:
+        # One that is dark in the first channel may be bright in another.
+        lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
         scene = Scene(
-            points=surface.points,
-            triangles=surface.faces,
-            exitance=exitance,
-            unit=mesh.unit,
+            points=results.surface.points,
+            triangles=results.surface.faces,
+            exitance=results.exitance(),
+            unit=unit,
             title=case.name,
-            lights=tuple(ray for light in case.lights for ray in _rays(light, case.surface)),
+            lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
+            colours=results.preview if results.has_colours else None,
         )
         warnings += draw(scene, folder / FILES["picture"])
+    found = readings(case.sensors, results.by_light())
+    if found:
+        write_readings(found, unit, folder / READINGS)
     compared = None
     if case.comparison is not None:
-        compared = compare(case.comparison, solution)
+        compared = compare(case.comparison, first)
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
-        draw_comparison(compared, case.name, mesh.unit, image)
+        draw_comparison(compared, case.name, unit, image)
     now = time.perf_counter()
-    seconds = {**solution.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
+    seconds = {**first.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
     seconds["surface"] += case.reading_seconds
-    figures = summarize(case, solution, exitance, seconds, warnings)
+    figures = summarize(results, found, seconds, warnings)
     if compared is not None:
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)
@@ -108,28 +124,28 @@ def _write(case: Case, solution: Solution, folder: Path, started: float) -> list
     return warnings
 
 
+def _warnings(results: Results) -> list[str]:
+    """Those of all channels; a sentence that holds for some of several channels names them."""
+    names, solutions = results.case.channel_names, results.solutions
+    told: dict[str, list[str]] = {}
+    for name, solution in zip(names, solutions, strict=True):
+        for warning in solution.warnings:
+            told.setdefault(warning, []).append(name)
+    return [
+        *results.case.region_warnings,
+        *(
+            warning if len(whose) == len(names) else f"in {' and '.join(whose)}: {warning}"
+            for warning, whose in told.items()
+        ),
+    ]
+
+
 def _move(folder: Path, target: Path) -> None:
     """Replace an earlier run's results by this one's, never leaving a summary beside another run's files."""
     (target / SUMMARY).unlink(missing_ok=True)
-    for name in (*FILES.values(), *COMPARISON):
+    for name in (*FILES.values(), READINGS, *COMPARISON):
         if (folder / name).exists():
             (folder / name).replace(target / name)
         else:
             (target / name).unlink(missing_ok=True)
     (folder / SUMMARY).replace(target / SUMMARY)
-
-
-def _rays(light: object, surface: Surface) -> tuple[Ray, ...]:
-    """How a picture draws a light; diffuse light comes from everywhere and is not drawn."""
-    if isinstance(light, PencilBeam):
-        end = light.entry(surface)
-        start = end - 0.3 * surface.diagonal * unit_vector(light.direction, "direction")
-        return (Ray(_vector(start), _vector(end)),)
-    if isinstance(light, PointSource):
-        return (Ray(light.position, light.position),)
-    return ()
-
-
-def _vector(point: FloatArray) -> Vector:
-    x, y, z = point.tolist()
-    return x, y, z

@@ -1,62 +1,13 @@
 """The case file: its keys, their types, and what they are made into."""
 
-import difflib
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
-Vector3 = tuple[Number, Number, Number]
-
-
-class Section(BaseModel):
-    """A mapping of the case file, which holds no other keys than these."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        if not isinstance(data, dict):
-            return data
-        for key in data:
-            if key not in cls.model_fields:
-                close = difflib.get_close_matches(str(key), cls.model_fields, n=1)
-                hint = f'did you mean "{close[0]}"? ' if close else ""
-                raise PydanticCustomError(
-                    "unknown_key",
-                    "unknown key; {hint}the keys here are {known}",
-                    {"key": str(key), "hint": hint, "known": ", ".join(cls.model_fields)},
-                )
-        return data
-
-
-class Choice(Section):
-    """A mapping that holds exactly one of the keys that have no default."""
-
-    @model_validator(mode="after")
-    def _exactly_one(self) -> "Choice":
-        kinds = self.kinds()
-        given = [name for name in kinds if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise PydanticCustomError(
-                "one_of",
-                "give exactly one of {known}, not {given}",
-                {"known": ", ".join(kinds), "given": " and ".join(given) if given else "none"},
-            )
-        return self
-
-    @classmethod
-    def kinds(cls) -> list[str]:
-        """The keys of which one is given."""
-        return [name for name, field in cls.model_fields.items() if field.default is None]
-
-    @property
-    def kind(self) -> str:
-        """The key that is given."""
-        return next(name for name in self.kinds() if getattr(self, name) is not None)
+from tetlux.cases.schema_lights import CameraSpec, DetectorSpec, LightSpec
+from tetlux.cases.schema_media import Media
+from tetlux.cases.schema_parts import Choice, Label, Length, Number, Section, Vector3
 
 
 class SphereSpec(Section):
@@ -117,46 +68,12 @@ class SurfaceSpec(Choice):
         return self
 
 
-class MediumSpec(Section):
-    """The medium; the rules between its keys are those of `tetlux.fem.Medium`."""
+class RegionSpec(Section):
+    """A closed surface inside the body, and what it holds."""
 
-    sigma_a: Number = Field(description="absorption coefficient, 1/unit")
-    eta: Number = Field(description="refractive index relative to the outside")
-    sigma_s_prime: Number | None = Field(None, description="reduced scattering coefficient, 1/unit")
-    sigma_s: Number | None = Field(None, description="scattering coefficient, 1/unit; with g")
-    g: Number | None = Field(None, description="mean cosine of the scattering angle; with sigma_s")
-    boundary: Literal["exact", "classic"] = "exact"
-
-
-class PencilSpec(Section):
-    """A pencil beam, as `tetlux.fem.PencilBeam`."""
-
-    origin: Vector3
-    direction: Vector3
-    power: Number = Field(1.0, description="W")
-    radius: Number = Field(0.0, description="unit")
-    deposit: Literal["point", "line"] = "point"
-
-
-class PointSpec(Section):
-    """An isotropic point inside the body, as `tetlux.fem.PointSource`."""
-
-    position: Vector3
-    power: Number = Field(1.0, description="W")
-
-
-class DiffuseSpec(Section):
-    """Diffuse light from all around, as `tetlux.fem.DiffuseLight`."""
-
-    irradiance: Number = Field(description="W/unit²")
-
-
-class LightSpec(Choice):
-    """One light."""
-
-    pencil: PencilSpec | None = None
-    point: PointSpec | None = None
-    diffuse: DiffuseSpec | None = None
+    name: Label = Field("", description="default: region and number, as in region_1")
+    surface: SurfaceSpec
+    medium: Media
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
@@ -172,12 +89,18 @@ class CaseSpec(Section):
     )
     unit: Literal["nm", "um", "mm", "cm", "m", "in"] = "mm"
     surface: SurfaceSpec
-    medium: MediumSpec
+    medium: Media
+    channels: Annotated[list[Label], Field(min_length=1)] | None = Field(
+        None, description="names of the channels, as many as lists in the case have values"
+    )
+    regions: list[RegionSpec] = Field([])
     lights: Annotated[list[LightSpec], Field(min_length=1)]
     tolerance: Annotated[float, Field(strict=True, ge=1e-4, lt=1)] = Field(
         0.02, description="wanted relative L2 error of the exitance"
     )
-    outputs: list[Output] = ["surface", "volume", "picture"]
+    detectors: list[DetectorSpec] = Field([])
+    camera: CameraSpec | None = Field(None, description="radiance towards it is written with the surface")
+    outputs: list[Output] = Field(["surface", "volume", "picture"])
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,
         description="closed forms to compare with: robin, images, dipole for slabs; series for spheres and cylinders",

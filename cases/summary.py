@@ -5,8 +5,10 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
-from tetlux.cases.case import Case
-from tetlux.fem.solution import Solution
+from tetlux.cases.case import Channel
+from tetlux.cases.results import Results, lights_in
+from tetlux.fem.coefficients import base_of
+from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
 
@@ -14,11 +16,15 @@ LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "py
 
 
 def summarize(
-    case: Case, solution: Solution, exitance: FloatArray, seconds: dict[str, float], warnings: list[str]
+    results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
 ) -> dict[str, Any]:
     """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
-    mesh, power = solution.mesh, solution.power
-    estimate = solution.error_estimate
+    case, mesh = results.case, results.solutions[0].mesh
+    several = len(case.light_names) > 1
+    channels = [
+        _channel(channel, solution, results.exitance(channel.name), several)
+        for channel, solution in zip(case.channels, results.solutions, strict=True)
+    ]
     return {
         "case": case.name,
         "unit": case.surface.unit,
@@ -32,30 +38,43 @@ def summarize(
             "surface_deviation": surface_deviation(mesh, case.surface),
             "min_quality": float(mesh.quality.min()),
         },
-        "channels": [
-            {
-                "name": "all",
-                "sigma_tr": case.medium.sigma_tr,
-                "albedo": case.medium.albedo,
-                "power": {
-                    "incident": power.incident,
-                    "specular": power.specular,
-                    "absorbed": power.absorbed,
-                    "exited": power.exited,
-                    "ballistic": power.ballistic,
-                    "balance_error": power.balance_error,
-                },
-                "exitance": {
-                    "min": float(exitance.min()),
-                    "max": float(exitance.max()),
-                    "mean": power.exited / mesh.area,
-                },
-                "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
-                "error_estimate": estimate if math.isfinite(estimate) else None,
-            }
-        ],
+        "channels": channels,
+        **({"preview_white": results.preview[1]} if results.has_colours else {}),
+        **({"detectors": readings} if readings else {}),
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
-        "repairs": list(case.surface.repairs),
+        "repairs": list(case.repairs),
         "warnings": warnings,
         "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+    }
+
+
+def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several: bool) -> dict[str, Any]:
+    medium, estimate = base_of(channel.medium), solution.error_estimate
+    figures: dict[str, Any] = {
+        "name": channel.name,
+        "sigma_tr": medium.sigma_tr,
+        "albedo": medium.albedo,
+        "power": _power(solution.power),
+        "exitance": {
+            "min": float(exitance.min()),
+            "max": float(exitance.max()),
+            "mean": solution.power.exited / solution.mesh.area,
+        },
+        "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
+        "error_estimate": estimate if math.isfinite(estimate) else None,
+    }
+    if several:
+        lights = lights_in(list(channel.lights), solution)
+        figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
+    return figures
+
+
+def _power(power: Power) -> dict[str, float]:
+    return {
+        "incident": power.incident,
+        "specular": power.specular,
+        "absorbed": power.absorbed,
+        "exited": power.exited,
+        "ballistic": power.ballistic,
+        "balance_error": power.balance_error,
     }

@@ -189,7 +189,8 @@ def test_files_that_are_no_case(content: bytes, message: str, tmp_path: Path) ->
 def test_a_missing_case_names_those_that_ship(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "unicorn"]) == 2
     assert (
-        "unicorn is neither a file nor one of the cases that ship: hare, slab, sphere, torus" in capsys.readouterr().err
+        "unicorn is neither a file nor one of the cases that ship: candle, hare, inclusion, laser, marble, slab, "
+        "sphere, torus." in capsys.readouterr().err
     )
     assert main(["run", "no/such.yaml"]) == 2
     assert "no/such.yaml does not exist" in capsys.readouterr().err
@@ -216,7 +217,7 @@ def test_check_says_what_is_right_and_what_is_not(tmp_path: Path, capsys: pytest
 
 def test_every_case_that_ships_is_right() -> None:
     names = sorted(p.stem for p in library_folder().glob("*.yaml"))
-    assert names == ["hare", "slab", "sphere", "torus"]
+    assert names == ["candle", "hare", "inclusion", "laser", "marble", "slab", "sphere", "torus"]
     assert main(["check", *names]) == 0
 
 

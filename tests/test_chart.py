@@ -400,7 +400,11 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["ball"], "ball is neither a file nor one of the cases that ship: hare, slab, sphere, torus."),
+        (
+            ["ball"],
+            "ball is neither a file nor one of the cases that ship: "
+            "candle, hare, inclusion, laser, marble, slab, sphere, torus.",
+        ),
         (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),
         (
             ["sphere", "--out", "sweep.yaml"],

@@ -15,8 +15,10 @@ from tetlux.cases.picture_frame import LEFT, TOP, bar_ticks
 from tetlux.cases.picture_plain import draw_plain
 from tetlux.cases.picture_stage import (
     BACKGROUND,
+    DARK,
     OVERSAMPLING,
     PANEL,
+    SHADED,
     Camera,
     build_stage,
     corner_normals,
@@ -111,6 +113,38 @@ def test_both_drawers_draw_the_same() -> None:
     # Measured: 0.12 to 0.17 % of the pixels differ by more than three steps, those on outlines.
     apart = np.abs(ours - theirs.astype(np.int64)).max(axis=2)
     assert (apart > 3).mean() < 0.004
+
+
+@pytest.mark.usefixtures("rendering")
+def test_both_drawers_draw_the_same_colours() -> None:
+    body = torus(10.0, 4.0, segments=48)
+    scene = lit(body, (-14.0, 0.0, 0.0), (-30.0, 0.0, 0.0))
+    colours = np.clip(0.5 + body.points / 30.0, 0.0, 1.0)
+    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights, colours)
+    ours = draw_plain(stage).astype(np.int64)
+    theirs = picture._drawn_with_pyvista(stage)
+    assert theirs is not None
+    apart = np.abs(ours - theirs.astype(np.int64)).max(axis=2)
+    assert (apart > 3).mean() < 0.004
+
+
+def test_a_body_in_its_own_colours_is_drawn_on_a_dark_ground(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "RENDERER", DIES)
+    cube = box((2.0, 2.0, 2.0))
+    colours = np.tile(np.array([200, 100, 50], dtype=np.uint8), (8, 1))
+    target = tmp_path / "picture.png"
+    draw(Scene(cube.points, cube.faces, np.ones(8), "mm", "orange", (), (colours, 0.25)), target)
+    image = pixels(target)
+    middle = image[TOP + PANEL[1] // 2, LEFT + PANEL[0] // 2]
+    # Shaded, the same in all three colours.
+    assert middle / middle[0] == pytest.approx([1.0, 0.5, 0.25], abs=0.02)
+    assert SHADED * 200 - 1 <= middle[0] <= 200
+    np.testing.assert_array_equal(image[2, 2], np.round(255 * np.array(DARK)))
+    # A patch of white stands where the colour bar would be, and nothing else at the right is as bright.
+    rows, columns = np.nonzero((image[:, LEFT + PANEL[0] :] == 255).all(axis=2))
+    assert len(rows) > 3000
+    assert np.ptp(rows) == pytest.approx(64, abs=2)
+    assert np.ptp(columns) == pytest.approx(64, abs=2)
 
 
 @pytest.mark.parametrize("command", [DIES, ("no-such-command",), (sys.executable, "-c", "")])

@@ -33,26 +33,50 @@ def test_the_python_lines_run_and_say_what_they_promise() -> None:
 
 
 def test_the_case_file_is_right(tmp_path: Path) -> None:
-    (text,) = blocks("yaml")
+    text, marble = blocks("yaml")
     (tmp_path / "plate.yaml").write_text(text)
     assert [case.name for case in load_cases(tmp_path / "plate.yaml")] == [
         f"plate/medium.sigma_a={value}" for value in (0.001, 0.01, 0.1)
     ]
 
+    # The example of channels needs a surface only.
+    (tmp_path / "marble.yaml").write_text("surface: {sphere: {radius: 5}}\n" + marble)
+    (case,) = load_cases(tmp_path / "marble.yaml")
+    assert case.channel_names == ("red", "green", "blue")
+
 
 def test_every_key_of_the_case_file_is_explained() -> None:
-    keys = set(re.findall(r"`([a-z_.\[\]]+)`", README))
+    keys = set(re.findall(r"`([a-z0-9_.\[\]]+)`", README))
     for name in CaseSpec.model_fields:
         assert any(key == name or key.startswith((f"{name}.", f"{name}[")) for key in keys), name
-    for section, prefix in (
-        ("SurfaceSpec", "surface."),
-        ("MediumSpec", "medium."),
-        ("PencilSpec", "lights[].pencil."),
-        ("PointSpec", "lights[].point."),
-        ("DiffuseSpec", "lights[].diffuse."),
+    for section, prefixes in (
+        ("SurfaceSpec", ["surface."]),
+        ("MediumSpec", ["medium."]),
+        ("MaterialSpec", ["medium."]),
+        ("PhaseSpec", ["medium.phase."]),
+        ("TwoTermSpec", ["medium.phase.two_term."]),
+        ("TableSpec", ["medium.phase.table."]),
+        ("VolumeSpec", ["medium.sigma_a.volume."]),
+        ("ImagesSpec", ["medium.sigma_a.images."]),
+        ("ArraySpec", ["medium.sigma_a.array."]),
+        ("RegionSpec", ["regions[]."]),
+        ("PencilSpec", ["lights[].pencil."]),
+        ("PointSpec", ["lights[].point."]),
+        ("DiffuseSpec", ["lights[].diffuse."]),
+        ("CollimatedSpec", ["lights[].collimated."]),
+        ("SpotSpec", ["lights[].collimated.spot."]),
+        ("DiscSpec", ["lights[].collimated.spot.disc.", "detectors[].disc."]),
+        ("RectangleSpec", ["lights[].collimated.spot.rectangle."]),
+        ("ImageSpec", ["lights[].collimated.spot.image."]),
+        ("EnvironmentSpec", ["lights[].environment."]),
+        ("EmissionSpec", ["lights[].emission."]),
+        ("DetectorSpec", ["detectors[]."]),
+        ("FibreSpec", ["detectors[].fibre."]),
+        ("CameraSpec", ["camera."]),
     ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
-            assert f"{prefix}{name}" in keys, f"{prefix}{name}"
+            for prefix in prefixes:
+                assert f"{prefix}{name}" in keys or any(k.startswith(f"{prefix}{name}.") for k in keys), prefix + name
 
 
 def test_the_two_commands_are_there() -> None:

@@ -8,13 +8,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from PIL import Image
 
 from tetlux.cases import picture, run
 from tetlux.cases.case import Case, find_case_file, load_cases
 from tetlux.cases.cli import main
 from tetlux.cases.run import run_case
 from tetlux.fem.exact import slab
-from tetlux.fem.solve import solve
+from tetlux.fem.solve import solve_each
 from tetlux.meshing import RunError
 from tetlux.meshing.files import read_mesh
 
@@ -132,9 +133,9 @@ def test_a_failing_case_does_not_stop_the_others(
     def failing(surface: object, *rest: object, **options: object) -> object:
         if surface.name == "box":  # type: ignore[attr-defined]
             raise RunError("the mesher failed.")
-        return solve(surface, *rest, **options)  # type: ignore[arg-type]
+        return solve_each(surface, *rest, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(run, "solve", failing)
+    monkeypatch.setattr(run, "solve_each", failing)
     (tmp_path / "a.yaml").write_text(QUICK.replace("sphere: {radius: 10}", "box: {size: [9, 9, 9]}"))
     (tmp_path / "b.yaml").write_text(QUICK + "outputs: [surface]\n")
     assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(tmp_path / "out")]) == 1
@@ -176,6 +177,50 @@ def test_a_machine_without_rendering_still_gets_its_picture(
     assert "apt-get install" in summary["warnings"][-1]
 
 
+def test_a_warning_of_some_channels_names_them(tmp_path: Path) -> None:
+    (tmp_path / "two.yaml").write_text(
+        "surface: {box: {size: [9, 9, 9]}}\nmedium: {sigma_a: [0.01, 0.3], sigma_s_prime: 1, eta: 1.4}\n"
+        "channels: [clear, dark]\nlights: [{point: {position: [0, 0, 0]}}]\ntolerance: 0.5\noutputs: []\n"
+    )
+    folder = run_case(load_cases(tmp_path / "two.yaml")[0], tmp_path / "out")
+    warnings = json.loads((folder / "summary.json").read_text())["warnings"]
+    assert [w for w in warnings if "albedo" in w] == [
+        w for w in warnings if w.startswith("in dark: the reduced albedo")
+    ]
+    assert len([w for w in warnings if "albedo" in w]) == 1
+
+
+def test_regions_fields_and_surroundings_run(tmp_path: Path) -> None:
+    """A region and a field of the same coefficients as the body change nothing, and even surroundings are diffuse."""
+    np.save(tmp_path / "even.npy", np.full((2, 2, 2), 0.02))
+    Image.new("L", (128, 64), 255).save(tmp_path / "sky.png")
+    field = "{array: {file: even.npy, origin: [-4, -4, -4], spacing: 8}}"
+    medium = "{sigma_a: 0.02, sigma_s_prime: 1, eta: 1.4}"
+    text = (
+        f"surface: {{box: {{size: [8, 8, 8]}}}}\nmedium: {medium}\ntolerance: 0.1\noutputs: [volume]\n"
+        "lights: [{diffuse: {irradiance: 0.5}}]\n"
+    )
+    region = f"regions: [{{surface: {{sphere: {{radius: 2}}}}, medium: {medium}}}]\n"
+    sky = "environment: {file: sky.png, brightest: 0.15915494}"
+    others = {
+        "plain": text,
+        "region": text + region,
+        "field": text.replace("sigma_a: 0.02", f"sigma_a: {field}"),
+        "sky": text.replace("diffuse: {irradiance: 0.5}", sky),
+    }
+    exited, regions = {}, {}
+    for name, content in others.items():
+        (tmp_path / f"{name}.yaml").write_text(content)
+        folder = run_case(load_cases(tmp_path / f"{name}.yaml")[0], tmp_path / "out")
+        (channel,) = json.loads((folder / "summary.json").read_text())["channels"]
+        exited[name] = channel["power"]["exited"]
+        regions[name] = meshio.read(folder / "volume.vtu").cell_data.get("region")
+    for name in ("region", "field", "sky"):
+        assert exited[name] == pytest.approx(exited["plain"], rel=0.02), name
+    assert regions["plain"] is None
+    assert set(np.unique(regions["region"])) == {0, 1}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["slab", "torus", "hare"])
 def test_the_cases_that_ship_run(name: str, tmp_path: Path) -> None:
@@ -193,6 +238,43 @@ def test_the_cases_that_ship_run(name: str, tmp_path: Path) -> None:
         scattered = case.medium.albedo * (1 - channel["power"]["specular"])
         # The plate ends 30 mm from the beam, five decay lengths: its rim takes less than 0.1 %.
         assert channel["power"]["exited"] == pytest.approx(scattered * (front + back), rel=0.004)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["marble", "laser", "inclusion", "candle"])
+def test_the_cases_of_new_lights_and_media_run(name: str, tmp_path: Path) -> None:
+    (case,) = load_cases(find_case_file(name))
+    folder = run_case(replace(case, outputs=("surface",)), tmp_path)
+    summary = json.loads((folder / "summary.json").read_text())
+    for channel in summary["channels"]:
+        assert abs(channel["power"]["balance_error"]) < 1e-9
+        assert channel["error_estimate"] <= case.tolerance
+    assert summary["warnings"] == []
+    power = [channel["power"] for channel in summary["channels"]]
+    values = meshio.read(folder / "surface.ply").point_data
+    if name == "marble":
+        # Marble absorbs blue light most and red light least, and little of any.
+        lost = [one["absorbed"] / (one["incident"] - one["specular"]) for one in power]
+        assert 0.02 < lost[0] < lost[1] < lost[2] < 0.2
+        assert (values["exitance_sun"] < 0.3 * values["exitance_sky"]).any()
+    if name == "laser":
+        assert power[0]["incident"] == pytest.approx(0.01, rel=2e-3)
+        # At 45 degrees 3.66 % are reflected at an index of 1.4.
+        assert power[0]["specular"] == pytest.approx(0.0366 * 0.01, rel=0.02)
+        read = [one["power"] for one in summary["detectors"]]
+        assert len(read) == 10
+        # Far from the light r² M falls like exp(-sigma_tr r): here from 8 to 10 mm.
+        decay = np.log((read[6] * 8**2) / (read[8] * 10**2)) / 2
+        assert decay == pytest.approx(summary["channels"][0]["sigma_tr"], rel=0.15)
+    if name == "inclusion":
+        above, opposite = (one["exitance"] for one in summary["detectors"])
+        assert above == pytest.approx(0.83 * opposite, rel=0.03)
+    if name == "candle":
+        emitted = 4 / 3 * np.pi * 4**3 * np.array([0.004, 0.0026, 0.0012])
+        lights = [channel["lights"][0]["power"]["incident"] for channel in summary["channels"]]
+        assert lights == pytest.approx(emitted, rel=0.02)
+        glow = [values[f"exitance_emission_1_{channel}"] for channel in ("red", "green", "blue")]
+        assert glow[0].max() > glow[1].max() > glow[2].max()
 
 
 def test_no_cache_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

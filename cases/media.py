@@ -1,0 +1,77 @@
+"""From the case file's media to those that are solved with."""
+
+from tetlux.cases.channels import of_channel
+from tetlux.cases.document import Document, Key
+from tetlux.cases.reading import Reader
+from tetlux.cases.schema_media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
+from tetlux.fem.coefficients import AnyMedium
+from tetlux.fem.materials import material
+from tetlux.fem.medium import Medium
+from tetlux.fem.phase import PhaseFunction, henyey_greenstein, table, two_term
+from tetlux.fem.validity import check_scattering
+from tetlux.fem.varying import Field, VaryingMedium
+from tetlux.meshing.surface import Surface
+
+
+def media_of(
+    document: Document, key: Key, spec: Media, surface: Surface, count: int, reader: Reader
+) -> tuple[AnyMedium, ...]:
+    """The media of a body or a region, one for each channel.
+
+    Parameters
+    ----------
+    document : Document
+    key : Key
+        Where in it the medium stands.
+    spec : MediumSpec, MaterialSpec or list of MediumSpec
+    surface : Surface
+        Of the body or region; what varies must be known everywhere on it.
+    count : int
+        Number of channels.
+    reader : Reader
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+    """
+    if isinstance(spec, MaterialSpec):
+        with document.at((*key, "material")):
+            return material(spec.material, unit=surface.unit)
+    if isinstance(spec, list):
+        return tuple(_medium(document, (*key, i), each, surface, i, reader) for i, each in enumerate(spec))
+    return tuple(_medium(document, key, spec, surface, channel, reader) for channel in range(count))
+
+
+def _medium(
+    document: Document, key: Key, spec: MediumSpec, surface: Surface, channel: int, reader: Reader
+) -> AnyMedium:
+    fields: dict[str, Field] = {}
+    numbers: dict[str, float] = {}
+    for name in ("sigma_a", "eta", "sigma_s_prime", "sigma_s", "g"):
+        value = getattr(spec, name)
+        if isinstance(value, FieldSpec):
+            with document.at((*key, name)):
+                fields[name] = reader.field(value)
+                numbers[name] = float(fields[name](surface.points).mean())
+        elif value is not None:
+            numbers[name] = of_channel(value, channel)
+    with document.at((*key, "phase")):
+        phase = _phase(spec.phase) if spec.phase else None
+    with document.at(key, *MediumSpec.model_fields):
+        medium = Medium(**numbers, phase=phase, boundary=spec.boundary)
+        check_scattering(medium)
+        if not fields:
+            return medium
+        varying = VaryingMedium(base=medium, **fields)
+        varying.at(surface.points)
+        return varying
+
+
+def _phase(spec: PhaseSpec) -> PhaseFunction:
+    if spec.henyey_greenstein is not None:
+        return henyey_greenstein(spec.henyey_greenstein)
+    if spec.two_term:
+        return two_term(spec.two_term.g1, spec.two_term.g2, spec.two_term.share)
+    assert spec.table is not None
+    return table(spec.table.angles, spec.table.values)

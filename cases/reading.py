@@ -1,0 +1,84 @@
+"""Files that a case names, each read once for all runs of its sweep."""
+
+import time
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.cases.images import read_pixels
+from tetlux.cases.schema import SurfaceSpec
+from tetlux.cases.schema_media import FieldSpec
+from tetlux.cases.schema_parts import Encoding
+from tetlux.fem.varying import Field
+from tetlux.meshing import shapes
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.read import read_surface
+from tetlux.meshing.surface import Surface
+
+
+@dataclass
+class Reader:
+    """Reads and remembers.
+
+    Attributes
+    ----------
+    folder : Path
+        That of the case file, to which names are relative.
+    seconds : float
+        Spent on reading and checking surfaces since this was set to 0.
+    """
+
+    folder: Path
+    seconds: float = 0.0
+    _surfaces: dict[str, Surface] = field(default_factory=dict)
+    _fields: dict[str, Field] = field(default_factory=dict)
+    _pixels: dict[tuple[str, Encoding], FloatArray] = field(default_factory=dict)
+
+    def surface(self, spec: SurfaceSpec, unit: str) -> Surface:
+        """A surface file or a built-in shape."""
+        label = spec.model_dump_json() + unit
+        started = time.perf_counter()
+        if label not in self._surfaces:
+            self._surfaces[label] = replace(_surface(spec, unit, self.folder), crease_angle=spec.crease_angle)
+        self.seconds += time.perf_counter() - started
+        return self._surfaces[label]
+
+    def field(self, spec: FieldSpec) -> Field:
+        """A coefficient that varies."""
+        label = spec.model_dump_json()
+        if label not in self._fields:
+            self._fields[label] = _field(spec, self.folder)
+        return self._fields[label]
+
+    def pixels(self, file: str, encoding: Encoding) -> FloatArray:
+        """An image, (rows, columns, 3)."""
+        label = file, encoding
+        if label not in self._pixels:
+            self._pixels[label] = read_pixels(self.folder / file, encoding)
+        return self._pixels[label]
+
+
+def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:
+    if spec.file is not None:
+        return read_surface(folder / spec.file, unit=unit, scale=spec.scale)
+    if spec.sphere:
+        return shapes.sphere(spec.sphere.radius, center=spec.sphere.center, unit=unit)
+    if spec.slab:
+        return shapes.slab(spec.slab.width, spec.slab.depth, unit=unit)
+    if spec.box:
+        return shapes.box(spec.box.size, center=spec.box.center, unit=unit)
+    if spec.cylinder:
+        c = spec.cylinder
+        return shapes.cylinder(c.radius, c.height, center=c.center, unit=unit)
+    assert spec.torus is not None
+    return shapes.torus(spec.torus.major, spec.torus.minor, center=spec.torus.center, unit=unit)
+
+
+def _field(spec: FieldSpec, folder: Path) -> Field:
+    if spec.volume:
+        return read_mesh_field(folder / spec.volume.file, spec.volume.name, scale=spec.volume.scale)
+    if spec.images:
+        s = spec.images
+        return read_image_field(folder / s.files, origin=s.origin, spacing=s.spacing, values=s.values)
+    assert spec.array is not None
+    return read_array_field(folder / spec.array.file, origin=spec.array.origin, spacing=spec.array.spacing)

@@ -1,0 +1,121 @@
+"""What a run found: the solutions of its channels, and their exitance on one set of vertices."""
+
+from dataclasses import dataclass, fields
+from functools import cached_property, reduce
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.cases.case import Case
+from tetlux.cases.channels import ALL
+from tetlux.cases.colours import RGB, Bytes, preview
+from tetlux.fem.radiance import radiance
+from tetlux.fem.solution import Solution
+from tetlux.fem.surface_exitance import surface_exitance
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class _Together(Solution):
+    """Solutions of several channels, whose exitances are added: their media may differ."""
+
+    channels: tuple[Solution, ...] = ()
+
+    def exitance_on(self, queries: FloatArray) -> FloatArray:
+        return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """A case, solved.
+
+    Attributes
+    ----------
+    case : Case
+    solutions : tuple of Solution
+        One for each channel.
+    surface : Surface
+        That of the case, with vertices added where its triangles are too large to show the exitance.
+    parts : dict of (v,) ndarray
+        Exitance at the surface's vertices by channel and light, W/unit².
+    """
+
+    case: Case
+    solutions: tuple[Solution, ...]
+    surface: Surface
+    parts: dict[tuple[str, str], FloatArray]
+
+    def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
+        """Exitance (v,) of a channel and a light, or the sum over all of them, W/unit²."""
+        of = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
+        return reduce(np.add, of, np.zeros(len(self.surface.points)))
+
+    @property
+    def has_colours(self) -> bool:
+        """Whether its channels are red, green and blue."""
+        return self.case.channel_names == RGB
+
+    @cached_property
+    def preview(self) -> tuple[Bytes, float]:
+        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `tetlux.cases.colours.preview`."""
+        return preview(self.surface, np.column_stack([self.exitance(channel) for channel in RGB]))
+
+    def by_light(self) -> list[tuple[str, str, Solution]]:
+        """All solutions with the names of channel and light: the sum, and each light if the case has several."""
+        found = []
+        for channel, solution in zip(self.case.channels, self.solutions, strict=True):
+            found.append((channel.name, ALL, solution))
+            if len(self.case.light_names) > 1:
+                found += [(channel.name, *one) for one in lights_in(list(channel.lights), solution)]
+        return found
+
+
+def lights_in(names: list[str], solution: Solution) -> list[tuple[str, Solution]]:
+    """What each light adds to a solution, by name."""
+    return list(zip(names, solution.of_lights or (solution,), strict=True))
+
+
+def results_of(case: Case, solutions: list[Solution]) -> Results:
+    """Choose vertices that show the exitance of all channels together, and take that of each at them."""
+    first = solutions[0]
+    if len(solutions) > 1:
+        same = {field.name: getattr(first, field.name) for field in fields(Solution)}
+        first = _Together(**same, channels=tuple(solutions))
+    surface, total = surface_exitance(first)
+    parts = {}
+    for channel, solution in zip(case.channels, solutions, strict=True):
+        for name, part in lights_in(list(channel.lights), solution):
+            parts[channel.name, name] = total if part is first else part.exitance_on(surface.points)
+    return Results(case, tuple(solutions), surface, parts)
+
+
+def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
+    """What `surface.ply` holds at each vertex."""
+    case = results.case
+    channels, lights = case.channel_names, case.light_names
+    values: dict[str, npt.NDArray[np.generic]] = {"exitance": results.exitance()}
+    if len(channels) > 1:
+        values |= {f"exitance_{channel}": results.exitance(channel) for channel in channels}
+    if len(lights) > 1:
+        values |= {f"exitance_{light}": results.exitance(light=light) for light in lights}
+    if len(channels) > 1 and len(lights) > 1:
+        values |= {
+            f"exitance_{one}_{channel}": results.exitance(channel, one) for one in lights for channel in channels
+        }
+    if case.camera is not None:
+        seen = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        values["radiance"] = np.sum(seen, axis=0)
+        if len(channels) > 1:
+            values |= {f"radiance_{channel}": one for channel, one in zip(channels, seen, strict=True)}
+    if results.has_colours:
+        values |= dict(zip(RGB, results.preview[0].T, strict=True))
+    return values
+
+
+def volume_values(results: Results) -> dict[str, FloatArray]:
+    """What `volume.vtu` holds at each node."""
+    names = results.case.channel_names
+    if len(names) == 1:
+        return {"fluence": results.solutions[0].fluence}
+    return {f"fluence_{name}": one.fluence for name, one in zip(names, results.solutions, strict=True)}

@@ -1,0 +1,88 @@
+"""What sections of the case file are made of: numbers, choices, and values that may differ by channel."""
+
+import difflib
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
+Vector3 = tuple[Number, Number, Number]
+Numbers = Annotated[list[Number], Field(min_length=1)]
+# Of channels, lights, regions and detectors: it becomes part of the names of values in files.
+Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=60)]
+Encoding = Literal["srgb", "linear"]
+
+# Tags of alternatives begin with this, so that they can be left out of the keys that errors name.
+TAG = "?"
+
+
+def shape_of(value: Any) -> str:
+    """The tag of a value by its shape: list, mapping, or one."""
+    if isinstance(value, list | tuple):
+        return TAG + "list"
+    return TAG + ("mapping" if isinstance(value, dict | BaseModel) else "one")
+
+
+def _one_or_list(value: Any) -> str:
+    return TAG + ("list" if isinstance(value, list | tuple) else "one")
+
+
+# One number, or one for each channel.
+Each = Annotated[
+    Annotated[Number, Tag(TAG + "one")] | Annotated[Numbers, Tag(TAG + "list")], Discriminator(_one_or_list)
+]
+# One length, or one along each axis.
+Spacing = Annotated[
+    Annotated[Length, Tag(TAG + "one")] | Annotated[tuple[Length, Length, Length], Tag(TAG + "list")],
+    Discriminator(_one_or_list),
+]
+
+
+class Section(BaseModel):
+    """A mapping of the case file, which holds no other keys than these."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        for key in data:
+            if key not in cls.model_fields:
+                close = difflib.get_close_matches(str(key), cls.model_fields, n=1)
+                hint = f'did you mean "{close[0]}"? ' if close else ""
+                raise PydanticCustomError(
+                    "unknown_key",
+                    "unknown key; {hint}the keys here are {known}",
+                    {"key": str(key), "hint": hint, "known": ", ".join(cls.model_fields)},
+                )
+        return data
+
+
+class Choice(Section):
+    """A mapping that holds exactly one of the keys whose default is None."""
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> "Choice":
+        kinds = self.kinds()
+        given = [name for name in kinds if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise PydanticCustomError(
+                "one_of",
+                "give exactly one of {known}, not {given}",
+                {"known": ", ".join(kinds), "given": " and ".join(given) if given else "none"},
+            )
+        return self
+
+    @classmethod
+    def kinds(cls) -> list[str]:
+        """The keys of which one is given."""
+        return [name for name, field in cls.model_fields.items() if field.default is None]
+
+    @property
+    def kind(self) -> str:
+        """The key that is given."""
+        return next(name for name in self.kinds() if getattr(self, name) is not None)

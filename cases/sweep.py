@@ -1,0 +1,49 @@
+"""Sweeps: one case file, many runs."""
+
+import copy
+import itertools
+import math
+from typing import Any
+
+from tetlux.cases.document import Document, Key
+from tetlux.cases.schema import CaseSpec
+
+MOST_RUNS = 20_000
+
+
+def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str, Any], dict[Key, int]]]:
+    """The case's data once for each point of its sweep's grid, with the label of that point."""
+    if not spec.sweep:
+        return [(None, document.data, {})]
+    runs: list[tuple[str | None, dict[str, Any], dict[Key, int]]] = []
+    for key, listed in spec.sweep.items():
+        if len(set(map(repr, listed))) < len(listed):
+            raise document.error(("sweep", key), "a value stands here twice; give each once.")
+    count = math.prod(len(listed) for listed in spec.sweep.values())
+    if count > MOST_RUNS:
+        raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
+    for values in itertools.product(*spec.sweep.values()):
+        data = copy.deepcopy(document.data)
+        del data["sweep"]
+        keys: dict[Key, int] = {}
+        for key, value in zip(spec.sweep, values, strict=True):
+            keys[_assign(document, data, key, value)] = document.lines["sweep", key]
+        label = ",".join(f"{k}={v}" for k, v in zip(spec.sweep, values, strict=True))
+        runs.append((label.replace("/", "_"), data, keys))
+    return runs
+
+
+def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
+    """Set a dotted key (list items by their number); it may be new, what holds it may not."""
+    parts: Key = tuple(int(p) if p.isdigit() else p for p in key.split("."))
+    holder: Any = data
+    try:
+        for part in parts[:-1]:
+            holder = holder[part]
+        holder[parts[-1]] = value
+    except (KeyError, IndexError, TypeError) as error:
+        raise document.error(
+            ("sweep", key),
+            f'"{key}" is no key of this case; write it as in medium.sigma_a or lights.0.pencil.power.',
+        ) from error
+    return parts
