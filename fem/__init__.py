@@ -1,5 +1,7 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
+from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
+from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -14,30 +16,47 @@ from tetlux.fem.lights import (
     PointSource,
     Rectangle,
 )
+from tetlux.fem.materials import material
 from tetlux.fem.medium import Medium
+from tetlux.fem.phase import henyey_greenstein, table, two_term
+from tetlux.fem.radiance import radiance
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.solve import solve, solve_each
 from tetlux.fem.system import System
+from tetlux.fem.varying import VaryingMedium
 
 __all__ = [
     "CollimatedBeam",
     "Deposit",
     "DiffuseLight",
     "Disc",
+    "DiscDetector",
     "Emission",
     "EnvironmentLight",
+    "FibreDetector",
     "Gaussian",
     "Image",
     "Light",
     "Medium",
     "PencilBeam",
+    "PointDetector",
     "PointSource",
     "Power",
+    "Reading",
     "Rectangle",
     "Region",
     "Solution",
     "System",
+    "VaryingMedium",
+    "grid_field",
+    "henyey_greenstein",
+    "material",
+    "mesh_field",
+    "radiance",
+    "read",
     "solve",
     "solve_each",
+    "table",
+    "two_term",
 ]

@@ -17,9 +17,9 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_python_lines_run_and_say_what_they_promise() -> None:
-    (code,) = blocks("python")
+    first, second = blocks("python")
     names: dict[str, Any] = {}
-    exec(code, names)
+    exec(first, names)
     solution = names["solution"]
     assert solution.exitance.shape == solution.mesh.boundary_nodes.shape
     # The series at 90 degrees, times the share of the power that is scattered; far from the light the mesh is
@@ -30,6 +30,13 @@ def test_the_python_lines_run_and_say_what_they_promise() -> None:
     assert solution.error_estimate <= 0.02
     assert names["same"].mesh is names["mesh"]
     assert 0 < names["same"].error_estimate < 1
+    exec(second, names)
+    lit = names["lit"]
+    assert len(lit.of_lights) == 2
+    assert lit.power.exited == pytest.approx(sum(each.power.exited for each in lit.of_lights))
+    # Marble is whiter in red than in blue.
+    assert names["red"].power.exited > names["green"].power.exited > names["blue"].power.exited
+    assert names["red"].mesh is names["blue"].mesh
 
 
 def test_the_case_file_is_right(tmp_path: Path) -> None:
