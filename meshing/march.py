@@ -5,8 +5,10 @@ It has to be known in which tetrahedron each of them begins.
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import SLACK, Stretches
@@ -67,7 +69,7 @@ def _marched(mesh: TetMesh, coordinates: FloatArray, lines: FloatArray, cells: I
     lost = np.zeros(lines.shape[1], dtype=bool)
     # Of each path that is still on its way: its number, how far it has come, and for how many steps it has not.
     paths, reached, stalls = np.arange(len(lost)), np.zeros(len(lost)), np.zeros(len(lost), dtype=np.int64)
-    parts = [(paths[:0], cells[:0], reached[:0], reached[:0], np.zeros((4, 0)), np.zeros((4, 0)))]
+    parts = [[paths[:0], cells[:0], reached[:0], reached[:0], np.zeros((4, 0)), np.zeros((4, 0))]]
     for _ in range(len(mesh.tetrahedra) + MOST_STALLS):
         base, slopes = _coordinates(coordinates, mesh.tetrahedra[cells].T, lines, reached)
         # Nothing leaves through a face that it runs along or away from.
@@ -81,20 +83,25 @@ def _marched(mesh: TetMesh, coordinates: FloatArray, lines: FloatArray, cells: I
         leave[done] = lengths[done]
         got_on = leave > reached
         stalls = np.where(leave > reached + ROUNDING * lengths, 0, stalls + 1)
-        failed = (got_on & (base.min(axis=0) < -ASIDE)) | ((outside | (stalls > MOST_STALLS)) & ~done) | np.isnan(way)
-        some = np.flatnonzero(got_on)
-        parts.append((paths[some], cells[some], reached[some], leave[some], base[:, some], slopes[:, some]))
+        failed = (got_on & (base.min(axis=0) < -ASIDE)) | ((outside | (stalls > MOST_STALLS)) & ~done)
+        failed |= ~np.isfinite(base[0] + slopes[0])
+        parts.append(_some(got_on, paths, cells, reached, leave, base, slopes))
         lost[paths[failed]] = True
-        going_on = np.flatnonzero(~(done | failed))
-        paths, stalls, cells, reached = paths[going_on], stalls[going_on], beyond[going_on], leave[going_on]
-        lines = lines[:, going_on]
+        paths, stalls, cells, reached, lines = _some(~(done | failed), paths, stalls, beyond, leave, lines)
         if len(paths) == 0:
             break
     lost[paths] = True
     every = [np.concatenate(column, axis=-1) for column in zip(*parts, strict=True)]
-    kept = np.flatnonzero(~lost[every[0]])
-    owners, passed, enter, leave, weights, changes = (column[..., kept] for column in every)
+    owners, passed, enter, leave, weights, changes = _some(~lost[every[0]], *every)
     return Stretches(owners, passed, enter, leave, weights.T, changes.T), lost
+
+
+def _some(chosen: BoolArray, *arrays: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+    """The chosen ones along the last axis of arrays; as they are where all are chosen."""
+    if chosen.all():
+        return list(arrays)
+    places = np.flatnonzero(chosen)
+    return [array.take(places, axis=-1) for array in arrays]
 
 
 def _coordinates(
