@@ -159,6 +159,9 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         rays, gone, reflected = beyond(mesh, coefficients, arrived[going_on], met[going_on])
         ballistic += gone
         specular += reflected
+        faint = rays.powers <= faintest
+        stopped.append(rays[faint])
+        rays = rays[~faint]
     every, left = joined(segments), joined([*stopped, rays])
     scattered = _scattered_share(mesh, coefficients, left.starts) * left.powers
     absorbed += float((left.powers - scattered).sum())
@@ -220,13 +223,14 @@ def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArr
         Power that is gone, and that was reflected where rays came in again, W.
     """
     eta = coefficients.outer.eta
-    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
-    inner, outer = _at_boundary(replace(arrived, cells=mesh.boundary_cells[met]), normals[met], eta)
+    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces[met])
+    inner, outer = _at_boundary(replace(arrived, cells=mesh.boundary_cells[met]), normals, eta)
     distances, hit = mesh.rays.first(outer.starts, outer.directions)
-    again = (hit >= 0) & (np.einsum("ij,ij->i", outer.directions, normals[hit]) < 0)
+    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces[hit])
+    again = (hit >= 0) & (np.einsum("ij,ij->i", outer.directions, normals) < 0)
     places = outer.starts + np.where(again, distances, 0.0)[:, None] * outer.directions
     met_again = Rays(places, outer.directions, outer.powers, mesh.boundary_cells[hit])[again]
-    coming, specular = entered(met_again, normals[hit[again]], eta)
+    coming, specular = entered(met_again, normals[again], eta)
     return joined([inner, coming]), float(outer.powers[~again].sum()), specular
 
 
@@ -234,6 +238,8 @@ def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Ray
     """What of rays that meet the boundary from inside stays in, and what goes out."""
     cosine = np.clip(np.einsum("ij,ij->i", rays.directions, normals), 0.0, 1.0)
     reflected = reflectance(cosine, eta)
+    # Where the indices match, what is reflected is rounding alone.
+    reflected = np.where(reflected < np.finfo(float).eps, 0.0, reflected)
     back = rays.directions - 2.0 * cosine[:, None] * normals
     inner = Rays(rays.starts, back, reflected * rays.powers, rays.cells)[reflected > 0]
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
