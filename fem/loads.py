@@ -11,7 +11,7 @@ from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.paths import cells_of, optical_depths
 from tetlux.meshing.arrays import FloatArray, summed
-from tetlux.meshing.cell_tree import CellTree
+from tetlux.meshing.march import march
 from tetlux.meshing.tetmesh import TetMesh
 
 
@@ -32,12 +32,11 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
     """
     load = np.zeros(len(mesh.points))
     if len(deposit.points) or len(deposit.starts):
-        tree = mesh.tree
-        line, points, powers = _line_load(mesh, tree, coefficients, deposit)
+        line, points, powers = _line_load(mesh, coefficients, deposit)
         load += line
         # Points go with what is left of the lines.
         points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
-        load += _point_load(mesh, tree, points, powers)
+        load += _point_load(mesh, points, powers)
     if np.any(deposit.transmitted_irradiance):
         _, c2 = moments(coefficients.outer.eta)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
@@ -46,8 +45,10 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
     return load
 
 
-def _point_load(mesh: TetMesh, tree: CellTree, points: FloatArray, powers: FloatArray) -> FloatArray:
-    cells, weights = tree.locate(points)
+def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray) -> FloatArray:
+    if len(points) == 0:
+        return np.zeros(len(mesh.points))
+    cells, weights = mesh.tree.locate(points)
     inside = cells >= 0
     load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
@@ -58,7 +59,7 @@ def _point_load(mesh: TetMesh, tree: CellTree, points: FloatArray, powers: Float
 
 
 def _line_load(
-    mesh: TetMesh, tree: CellTree, coefficients: Coefficients, deposit: Deposit
+    mesh: TetMesh, coefficients: Coefficients, deposit: Deposit
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, integrated in closed form over every tetrahedron that they pass.
 
@@ -67,7 +68,7 @@ def _line_load(
     """
     load = np.zeros(len(mesh.points))
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
-    for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths):
+    for part in march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells):
         cells = cells_of(mesh, coefficients, part, deposit.starts, deposit.directions)
         extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter

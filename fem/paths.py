@@ -3,7 +3,7 @@
 Rays refract and reflect at the mesh's own flat facets, whose tilt is right on average to second order in their size.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import Stretches
+from tetlux.meshing.march import march
+from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -19,6 +21,8 @@ from tetlux.meshing.tetmesh import TetMesh
 FAINTEST = 1e-10
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
+
+_UNKNOWN = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +35,21 @@ class Rays:
         Directions are unit vectors.
     powers : (r,) ndarray
         W.
+    cells : (r,) ndarray, optional
+        The tetrahedra of a mesh in which they begin; -1, as when not given, where not known.
     """
 
     starts: FloatArray
     directions: FloatArray
     powers: FloatArray
+    cells: IntArray = field(default_factory=lambda: _UNKNOWN)
+
+    def __post_init__(self) -> None:
+        if self.cells is _UNKNOWN:
+            object.__setattr__(self, "cells", np.full(len(self.powers), -1))
 
     def __getitem__(self, some: BoolArray) -> "Rays":
-        return Rays(self.starts[some], self.directions[some], self.powers[some])
+        return Rays(self.starts[some], self.directions[some], self.powers[some], self.cells[some])
 
 
 def joined(parts: list[Rays]) -> Rays:
@@ -47,6 +58,7 @@ def joined(parts: list[Rays]) -> Rays:
         np.vstack([np.zeros((0, 3)), *(part.starts for part in parts)]),
         np.vstack([np.zeros((0, 3)), *(part.directions for part in parts)]),
         np.concatenate([np.zeros(0), *(part.powers for part in parts)]),
+        np.concatenate([_UNKNOWN, *(part.cells for part in parts)]),
     )
 
 
@@ -60,7 +72,7 @@ def entered(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
     # From a denser medium into a thinner one nothing passes beyond the critical angle.
     passed = lost < 1.0
     specular = float(rays.powers @ lost)
-    return Rays(rays.starts, refracted, (1.0 - lost) * rays.powers)[passed], specular
+    return Rays(rays.starts, refracted, (1.0 - lost) * rays.powers, rays.cells)[passed], specular
 
 
 def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
@@ -100,7 +112,7 @@ def _fade(mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatA
         ends = rays.powers * np.exp(-extinction * lengths)
         return ends, float(((rays.powers - ends) * sigma_a / extinction).sum())
     depth, absorbed = np.zeros(len(lengths)), 0.0
-    for part in mesh.tree.cut(rays.starts, rays.directions, lengths):
+    for part in march(mesh, rays.starts, rays.directions, lengths, rays.cells):
         cells = cells_of(mesh, coefficients, part, rays.starts, rays.directions)
         here, step = at_cells(extinction, cells), part.leave - part.enter
         carried = rays.powers[part.paths] * np.exp(-optical_depths(part, extinction, cells))
@@ -123,6 +135,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
     Deposit
         Their segments, and what of their power was absorbed, left the body, or was reflected at it from outside.
     """
+    rays = _placed(mesh, rays)
     faintest = FAINTEST * float(rays.powers.sum()) / max(len(rays.powers), 1)
     # Nothing is left after so long a way.
     longest = -np.log(FAINTEST) / float(np.min(coefficients.extinction))
@@ -146,6 +159,9 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         rays, gone, reflected = beyond(mesh, coefficients, arrived[going_on], met[going_on])
         ballistic += gone
         specular += reflected
+        faint = rays.powers <= faintest
+        stopped.append(rays[faint])
+        rays = rays[~faint]
     every, left = joined(segments), joined([*stopped, rays])
     scattered = _scattered_share(mesh, coefficients, left.starts) * left.powers
     absorbed += float((left.powers - scattered).sum())
@@ -159,7 +175,21 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         directions=every.directions,
         lengths=np.concatenate([np.zeros(0), *lengths_of]),
         fluxes=every.powers,
+        cells=every.cells,
     )
+
+
+def _placed(mesh: TetMesh, rays: Rays) -> Rays:
+    """The same rays, and behind which facets they begin where that was not known.
+
+    A guess, which `march` does not rely on: the first facet that is met from a little before the start.
+    """
+    unknown = np.flatnonzero(rays.cells < 0)
+    before = rays.starts[unknown] - 2.0 * OFFSET * mesh.diagonal * rays.directions[unknown]
+    _, facets = mesh.rays.first(before, rays.directions[unknown])
+    cells = rays.cells.copy()
+    cells[unknown] = np.where(facets >= 0, mesh.boundary_cells[facets], -1)
+    return replace(rays, cells=cells)
 
 
 def _scattered_share(mesh: TetMesh, coefficients: Coefficients, points: FloatArray) -> FloatArray | float:
@@ -193,12 +223,14 @@ def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArr
         Power that is gone, and that was reflected where rays came in again, W.
     """
     eta = coefficients.outer.eta
-    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
-    inner, outer = _at_boundary(arrived, normals[met], eta)
+    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces[met])
+    inner, outer = _at_boundary(replace(arrived, cells=mesh.boundary_cells[met]), normals, eta)
     distances, hit = mesh.rays.first(outer.starts, outer.directions)
-    again = (hit >= 0) & (np.einsum("ij,ij->i", outer.directions, normals[hit]) < 0)
+    normals, _ = triangle_areas(mesh.points, mesh.boundary_faces[hit])
+    again = (hit >= 0) & (np.einsum("ij,ij->i", outer.directions, normals) < 0)
     places = outer.starts + np.where(again, distances, 0.0)[:, None] * outer.directions
-    coming, specular = entered(Rays(places, outer.directions, outer.powers)[again], normals[hit[again]], eta)
+    met_again = Rays(places, outer.directions, outer.powers, mesh.boundary_cells[hit])[again]
+    coming, specular = entered(met_again, normals[again], eta)
     return joined([inner, coming]), float(outer.powers[~again].sum()), specular
 
 
@@ -206,8 +238,10 @@ def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Ray
     """What of rays that meet the boundary from inside stays in, and what goes out."""
     cosine = np.clip(np.einsum("ij,ij->i", rays.directions, normals), 0.0, 1.0)
     reflected = reflectance(cosine, eta)
+    # Where the indices match, what is reflected is rounding alone.
+    reflected = np.where(reflected < np.finfo(float).eps, 0.0, reflected)
     back = rays.directions - 2.0 * cosine[:, None] * normals
-    inner = Rays(rays.starts, back, reflected * rays.powers)[reflected > 0]
+    inner = Rays(rays.starts, back, reflected * rays.powers, rays.cells)[reflected > 0]
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
     out = eta * rays.directions + (outside - eta * cosine)[:, None] * normals
     out /= np.linalg.norm(out, axis=1, keepdims=True)

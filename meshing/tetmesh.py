@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 from tetlux.meshing.blocks import grouped, in_blocks, once
@@ -106,9 +107,8 @@ class TetMesh:
         """The edges of each tetrahedron, (m, 6), between the corners 01, 02, 03, 12, 13 and 23."""
         return self._edges[1]
 
-    @cached_property
-    def _boundary(self) -> tuple[IntArray, IntArray]:
-        """Faces that belong to one tetrahedron only, as ``4 tetrahedron + face``, and their corners (f, 3)."""
+    def _face_keys(self) -> npt.NDArray[np.uint64]:
+        """A number for each face of each tetrahedron, (4m,), the same for the two sides of a face."""
         nodes, keys = len(self.points), np.empty((len(self.tetrahedra), 4), dtype=np.uint64)
         # Three node numbers fit 64 bits up to here; beyond, the first two give way to the number of their pair.
         small = nodes <= 2_600_000
@@ -128,7 +128,22 @@ class TetMesh:
         in_blocks(fill, len(keys))
         if not small:
             keys += (grouped(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
-        places = once(keys.reshape(-1))
+        return keys.reshape(-1)
+
+    @cached_property
+    def neighbours(self) -> IndexArray:
+        """The tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
+        unique, face = grouped(self._face_keys())
+        # Sums of the numbers of the tetrahedra on both sides: less the one's own it is the other's.
+        owners = np.repeat(np.arange(len(self.tetrahedra)), 4)
+        both = np.bincount(face, minlength=len(unique)) == 2
+        sides = np.bincount(face, owners, len(unique)).astype(np.int64)
+        return np.where(both[face], sides[face] - owners, -1).astype(np.int32).reshape(-1, 4)
+
+    @cached_property
+    def _boundary(self) -> tuple[IntArray, IntArray]:
+        """Faces that belong to one tetrahedron only, as ``4 tetrahedron + face``, and their corners (f, 3)."""
+        places = once(self._face_keys())
         return places, self.tetrahedra[places[:, None] // 4, FACES[places % 4]]
 
     @property

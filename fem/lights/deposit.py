@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -43,6 +43,8 @@ class Deposit:
     starts, directions, lengths, fluxes : (s, 3), (s, 3), (s,), (s,) ndarray
         Beam segments: start, unit direction, length, and power carried at the start, W. The power fades
         as ``exp(-sigma_t* l)``.
+    cells : (s,) ndarray, optional
+        The tetrahedra of a mesh in which they begin, -1 where not known.
     irradiance, transmitted_irradiance : float or (b,) ndarray
         Diffuse light on the outside, of the whole surface or at each boundary node of a mesh, and what of it
         passes to the inside, W/unit².
@@ -67,6 +69,7 @@ class Deposit:
     directions: FloatArray = field(default_factory=_no_vectors)
     lengths: FloatArray = field(default_factory=_no_values)
     fluxes: FloatArray = field(default_factory=_no_values)
+    cells: IntArray | None = None
     irradiance: float | FloatArray = 0.0
     transmitted_irradiance: float | FloatArray = 0.0
     emission: float | FloatArray = 0.0
@@ -96,6 +99,7 @@ def together(parts: Sequence[Deposit]) -> Deposit:
         directions=np.vstack([p.directions for p in parts]),
         lengths=np.concatenate([p.lengths for p in parts]),
         fluxes=np.concatenate([p.fluxes for p in parts]),
+        cells=_cells_of(parts),
         irradiance=sum((p.irradiance for p in parts), 0.0),
         transmitted_irradiance=sum((p.transmitted_irradiance for p in parts), 0.0),
         emission=sum((p.emission for p in parts), 0.0),
@@ -106,6 +110,13 @@ def together(parts: Sequence[Deposit]) -> Deposit:
         if not on_mesh
         else lambda mesh, surface, coefficients: together([one(mesh, surface, coefficients) for one in on_mesh]),
     )
+
+
+def _cells_of(parts: Sequence[Deposit]) -> IntArray | None:
+    """Where the segments of all parts begin, (s,)."""
+    if all(part.cells is None for part in parts):
+        return None
+    return np.concatenate([np.full(len(p.starts), -1) if p.cells is None else p.cells for p in parts])
 
 
 class Light(Protocol):

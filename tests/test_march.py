@@ -1,0 +1,345 @@
+"""That paths are marched as the box tree cuts them, and that it has those which cannot be."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.conftest import block
+from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
+from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, paths
+from tetlux.fem.coefficients import Coefficients, coefficients_of
+from tetlux.fem.lights.deposit import Light, together
+from tetlux.fem.loads import load_vector
+from tetlux.fem.paths import Rays, follow
+from tetlux.meshing import Surface, TetMesh
+from tetlux.meshing import march as marching
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.cell_tree import CellTree, Stretches
+from tetlux.meshing.march import march
+
+
+class NoTree:
+    """Stands for the tree where nothing should be left to it."""
+
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+        raise AssertionError(f"{len(starts)} paths were left to the tree.")
+
+
+class CountingTree:
+    """Counts the paths that are left to the tree."""
+
+    def __init__(self, tree: CellTree) -> None:
+        self.tree = tree
+        self.count = 0
+
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+        self.count += len(starts)
+        return self.tree.cut(starts, directions, lengths)
+
+    def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        return self.tree.locate(points)
+
+
+def with_tree(mesh: TetMesh, tree: object) -> TetMesh:
+    """The same mesh with another tree in the place of its own."""
+    other = TetMesh(mesh.points, mesh.tetrahedra)
+    other.__dict__["tree"] = tree
+    return other
+
+
+def from_facets(mesh: TetMesh, count: int, seed: int) -> Deposit:
+    """Paths from random places on the boundary of a convex body to others."""
+    random = np.random.default_rng(seed)
+    facets = random.integers(len(mesh.boundary_faces), size=(2, count))
+    corners = mesh.points[mesh.boundary_faces[facets]]
+    starts, ends = np.einsum("sij,sijk->sik", random.dirichlet(np.ones(3), (2, count)), corners)
+    apart = np.linalg.norm(ends - starts, axis=1) > 1e-3 * mesh.diagonal
+    deposit = beams(starts[apart], ends[apart])
+    return replace(deposit, cells=mesh.boundary_cells[facets[0, apart]])
+
+
+def located(mesh: TetMesh, deposit: Deposit) -> Deposit:
+    return replace(deposit, cells=mesh.locate(deposit.starts)[0])
+
+
+def check_stretches(mesh: TetMesh, deposit: Deposit, aside: float, rounding: float = 1e-9) -> None:
+    """They cover every path once, without gaps, and have the coordinates that they should."""
+    numbers = []
+    for part in march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells):
+        order = np.lexsort((part.enter, part.paths))
+        path, enter, leave = part.paths[order], part.enter[order], part.leave[order]
+        first = np.diff(path, prepend=-1) > 0
+        last = np.roll(first, -1)
+        assert (leave > enter).all()
+        assert (enter[first] == 0).all()
+        assert (leave[last] == deposit.lengths[path[last]]).all()
+        assert (enter[1:][~first[1:]] == leave[:-1][~last[:-1]]).all()
+        numbers.append(path[first])
+        inside = part.cells >= 0
+        assert part.weights[inside].sum(axis=1) == pytest.approx(1.0, abs=1e-14)
+        for along in (part.enter, 0.5 * (part.enter + part.leave), part.leave):
+            weights = part.weights + (along - part.enter)[:, None] * part.slopes
+            assert weights[inside].min() >= -aside
+            places = deposit.starts[part.paths] + along[:, None] * deposit.directions[part.paths]
+            corners = mesh.points[mesh.tetrahedra[part.cells[inside]]]
+            got = np.einsum("ij,ijk->ik", weights[inside], corners)
+            assert got == pytest.approx(places[inside], abs=rounding * mesh.diagonal)
+    assert sorted(np.concatenate(numbers).tolist()) == list(range(len(deposit.starts)))
+
+
+@pytest.mark.parametrize("counts", [(1, 1, 1), (3, 4, 5)])
+def test_neighbours_share_a_face(counts: tuple[int, int, int]) -> None:
+    check_neighbours(block(counts, (1.0, 2.0, 3.0)))
+
+
+def check_neighbours(mesh: TetMesh) -> None:
+    corners = [set(nodes) for nodes in mesh.tetrahedra.tolist()]
+    for cell, others in enumerate(mesh.neighbours.tolist()):
+        for corner, other in enumerate(others):
+            if other >= 0:
+                assert other != cell
+                assert corners[cell] - {int(mesh.tetrahedra[cell, corner])} == corners[cell] & corners[other]
+                assert mesh.neighbours[other].tolist().count(cell) == 1
+    alone, face = np.nonzero(mesh.neighbours < 0)
+    assert (4 * alone + face).tolist() == mesh._boundary[0].tolist()
+
+
+def test_neighbours_in_a_ball_share_a_face(ball_mesh: TetMesh) -> None:
+    assert ball_mesh.neighbours.shape == ball_mesh.tetrahedra.shape
+    check_neighbours(ball_mesh)
+
+
+def test_paths_through_a_ball_are_marched_as_the_tree_cuts_them(ball_mesh: TetMesh) -> None:
+    deposit = from_facets(ball_mesh, 3000, 1)
+    check_stretches(ball_mesh, deposit, 1e-8)
+    expected = load_vector(ball_mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
+    # None needs the tree.
+    load = load_vector(with_tree(ball_mesh, NoTree()), coefficients_of(FORWARD), deposit)
+    assert load == pytest.approx(expected, abs=1e-12 * expected.max())
+    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
+
+
+@pytest.mark.parametrize("power", [3.0, 5.0])
+def test_paths_through_a_graded_mesh_are_marched_as_the_tree_cuts_them(power: float) -> None:
+    mesh, _ = turned(pressed(block((8, 8, 8), (2.0, 2.0, 1.0)), power), 2)
+    deposit = from_facets(mesh, 1000, 3)
+    check_stretches(mesh, deposit, 1e-7)
+    expected = load_vector(mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
+    assert expected.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
+    tree = CountingTree(mesh.tree)
+    load = load_vector(with_tree(mesh, tree), coefficients_of(FORWARD), deposit)
+    # Where a thin tetrahedron is a billionth thick, which one has that makes a difference.
+    assert load == pytest.approx(expected, abs=1e-9 * expected.max())
+    assert load.sum() == pytest.approx(expected.sum(), rel=1e-12)
+    # None.
+    assert tree.count < 0.01 * len(deposit.starts)
+
+
+@pytest.mark.parametrize("seed", [None, 0, 1, 2])
+@pytest.mark.parametrize("name", AWKWARD)
+def test_awkward_paths_are_marched_as_one_by_one(name: str, seed: int | None) -> None:
+    mesh, turn = (block((4, 4, 4), (4.0, 4.0, 4.0)), np.eye(3))
+    if seed is not None:
+        mesh, turn = turned(mesh, seed)
+    deposit = beams(*(turn @ np.array(end, dtype=float) for end in AWKWARD[name]))
+    # From each of the tetrahedra that it touches where it begins.
+    base = mesh.barycentric(np.repeat(deposit.starts, len(mesh.tetrahedra), axis=0), np.arange(len(mesh.tetrahedra)))
+    touched = np.flatnonzero(base.min(axis=1) > -1e-12)
+    expected = careful_load(mesh, FORWARD, deposit)
+    for cell in touched:
+        from_it = replace(deposit, cells=np.array([cell]))
+        check_stretches(mesh, from_it, CLOSE)
+        load = load_vector(mesh, coefficients_of(FORWARD), from_it)
+        assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
+        assert load == pytest.approx(expected, abs=CLOSE)
+
+
+def test_awkward_paths_do_without_the_tree() -> None:
+    """Along edges, faces and diagonals, and through nodes."""
+    mesh = block((4, 4, 4), (4.0, 4.0, 4.0))
+    deposit = located(mesh, beams(*np.array(list(AWKWARD.values()), dtype=float).swapaxes(0, 1)))
+    tree = CountingTree(mesh.tree)
+    load_vector(with_tree(mesh, tree), coefficients_of(FORWARD), deposit)
+    assert tree.count == 0
+
+
+def test_paths_within_faces_are_covered() -> None:
+    mesh, _ = turned(pressed(block((5, 5, 5), (2.0, 2.0, 1.0)), 3.0), 10)
+    random = np.random.default_rng(11)
+    cells = random.integers(len(mesh.tetrahedra), size=500)
+    faces = mesh.tetrahedra[cells, :3]
+    starts, ends = (np.einsum("ij,ijk->ik", random.dirichlet(np.ones(3), 500), mesh.points[faces]) for _ in range(2))
+    deposit = replace(beams(starts, ends), cells=cells)
+    check_stretches(mesh, deposit, CLOSE)
+    expected = load_vector(mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
+    assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(expected, abs=CLOSE)
+
+
+def test_paths_through_the_thinnest_tetrahedra_are_covered() -> None:
+    """Tetrahedra of quality 1e-5, and paths from node to node of them, which the tree itself does not cut right."""
+    mesh, _ = turned(pressed(block((6, 6, 6), (2.0, 2.0, 2.0)), 7.0), 1)
+    assert mesh.quality.min() < 1e-5
+    starts, ends = np.random.default_rng(12).choice(mesh.points, size=(2, 1000))
+    deposit = together([located(mesh, beams(starts, ends + 1e-12)), from_facets(mesh, 1000, 13)])
+    tree = CountingTree(mesh.tree)
+    mesh = with_tree(mesh, tree)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
+    # 64.
+    assert tree.count < 200
+    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
+    # Linear functions are integrated exactly, but for what their gradients lose there.
+    assert load @ mesh.points == pytest.approx(first_moments(deposit, FORWARD), abs=1e-3)
+    # 3e-7: the rounding of barycentric coordinates in these tetrahedra, whoever cuts.
+    check_stretches(mesh, deposit, 1e-7, 1e-6)
+
+
+def first_moments(deposit: Deposit, medium: Medium) -> FloatArray:
+    """``∫ Q0 x + (1/sigma_t') ∫ Q1`` of segments, (3,)."""
+    scattering, cosine = medium.delta_eddington
+    extinction = medium.sigma_a + scattering
+    depth = extinction * deposit.lengths
+    power = deposit.fluxes * scattering / extinction * -np.expm1(-depth)
+    along = deposit.fluxes * scattering * (1.0 - (1.0 + depth) * np.exp(-depth)) / extinction**2
+    along += cosine * power / medium.sigma_t_prime
+    return np.asarray(power @ deposit.starts + along @ deposit.directions)
+
+
+def test_paths_that_begin_elsewhere_are_left_to_the_tree(ball_mesh: TetMesh) -> None:
+    deposit = from_facets(ball_mesh, 300, 4)
+    assert deposit.cells is not None
+    expected = load_vector(ball_mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
+    wrong = deposit.cells.copy()
+    wrong[::3] = np.roll(wrong, 1)[::3]
+    wrong[1::3] = -1
+    moved = int((wrong != deposit.cells).sum())
+    assert moved > 190
+    tree = CountingTree(ball_mesh.tree)
+    load = load_vector(with_tree(ball_mesh, tree), coefficients_of(FORWARD), replace(deposit, cells=wrong))
+    # From some wrong ones the steps lead to the right one.
+    assert 0.98 * moved <= tree.count <= moved
+    assert load == pytest.approx(expected, abs=1e-12 * expected.max())
+
+
+def test_paths_that_end_outside_are_left_to_the_tree() -> None:
+    """Past the far side, and across a hole."""
+    whole = block((4, 4, 4), (4.0, 4.0, 4.0))
+    middle = whole.points[whole.tetrahedra].mean(axis=1)
+    gap = (np.abs(middle - np.array([0.0, 0.0, -2.0])) < 1.0).all(axis=1)
+    mesh = TetMesh(whole.points, whole.tetrahedra[~gap])
+    x, y = np.array([0.3, -0.6, 1.2]), np.array([0.5, 0.2, -1.6])
+    deposit = located(mesh, beams(np.column_stack([x, y, np.zeros(3)]), np.column_stack([x, y, [-4.0, -4.002, -4.0]])))
+    tree = CountingTree(mesh.tree)
+    load = load_vector(with_tree(mesh, tree), coefficients_of(FORWARD), deposit)
+    assert tree.count == 2
+    assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
+
+
+@pytest.mark.parametrize("name", ["MOST_STALLS", "ASIDE"])
+def test_paths_that_are_lost_are_left_to_the_tree(
+    name: str, ball_mesh: TetMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    deposit = from_facets(ball_mesh, 100, 5)
+    expected = load_vector(ball_mesh, coefficients_of(FORWARD), deposit)
+    # No step is short enough, and no stretch begins inside enough.
+    monkeypatch.setattr(marching, name, -1)
+    tree = CountingTree(ball_mesh.tree)
+    load = load_vector(with_tree(ball_mesh, tree), coefficients_of(FORWARD), deposit)
+    assert tree.count == len(deposit.starts)
+    assert load == pytest.approx(expected, abs=1e-12 * expected.max())
+
+
+@pytest.mark.parametrize("portion", [1, 7, 100])
+def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = block((5, 5, 5), (5.0, 5.0, 5.0))
+    deposit = from_facets(mesh, 60, 6)
+    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
+    monkeypatch.setattr(marching, "PORTION", portion)
+    parts = list(march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells))
+    assert len(parts) >= -(-len(deposit.starts) // portion)
+    assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(load, abs=1e-14)
+
+
+def test_a_flat_tetrahedron_is_left_to_the_tree() -> None:
+    """No mesh has one; were there one, it would be no harm."""
+    mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
+    flat = np.zeros((3, len(mesh.points)))
+    lines = np.array([[0.1, 0.1, -0.1, 0.0, 0.0, -1.0, 1.0]]).T
+    part, lost = marching._marched(mesh, flat, lines, np.array([0]))
+    assert lost.all()
+    assert len(part.paths) == 0
+
+
+def several(mesh: TetMesh, medium: Medium) -> Coefficients:
+    """Coefficients that differ from tetrahedron to tetrahedron."""
+    scattering, cosine = medium.delta_eddington
+    shares = 0.5 + np.random.default_rng(7).random(len(mesh.tetrahedra))
+    return Coefficients(
+        medium.sigma_a * shares, medium.sigma_t_prime * shares, scattering * shares, cosine * shares**0, medium
+    )
+
+
+CLEAR = Medium(sigma_a=0.01, sigma_s=0.2, g=0.5, eta=1.4)
+LIGHTS: dict[str, Light] = {
+    "collimated": CollimatedBeam((0.3, 0.1, -1.0)),
+    "pencil": PencilBeam((0.3, -0.4, 20.0), (0.1, 0.3, -1.0), deposit="line"),
+}
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+@pytest.mark.parametrize("uniform", [True, False])
+def test_beams_know_where_they_begin(
+    name: str, uniform: bool, ball: Surface, ball_mesh: TetMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also those that are reflected inside: the boundary's index is 1.4."""
+    coefficients = coefficients_of(CLEAR) if uniform else several(ball_mesh, CLEAR)
+    light = LIGHTS[name].deposit_in(ball, CLEAR, uniform=uniform)
+    deposit = light.on(ball_mesh, ball, coefficients)
+    assert deposit.cells is not None
+    known = np.flatnonzero(deposit.cells >= 0)
+    # The first part of a pencil beam in one medium is known without a mesh.
+    assert len(known) >= len(deposit.starts) - (name == "pencil")
+    assert len(known) > 2
+    weights = ball_mesh.barycentric(deposit.starts[known], deposit.cells[known])
+    assert (weights.min(axis=1) > -1e-9).mean() > 0.99
+    expected = load_vector(ball_mesh, coefficients, replace(deposit, cells=None))
+    load = load_vector(ball_mesh, coefficients, deposit)
+    assert load == pytest.approx(expected, abs=1e-12 * expected.max())
+
+    def with_tree_alone(
+        mesh: TetMesh, starts: FloatArray, directions: FloatArray, lengths: FloatArray, cells: IntArray
+    ) -> Iterator[Stretches]:
+        assert len(cells) == len(starts)
+        return mesh.tree.cut(starts, directions, lengths)
+
+    monkeypatch.setattr(paths, "march", with_tree_alone)
+    other = light.on(ball_mesh, ball, coefficients)
+    assert deposit.absorbed == pytest.approx(other.absorbed, rel=1e-12)
+    assert deposit.ballistic == pytest.approx(other.ballistic, rel=1e-12)
+
+
+def test_beams_that_enter_again_know_where() -> None:
+    """Through a hollow in the middle of a block."""
+    whole = block((5, 5, 5), (5.0, 5.0, 5.0))
+    middle = whole.points[whole.tetrahedra].mean(axis=1)
+    hollow = (np.abs(middle - np.array([0.0, 0.0, -2.5])) < 0.5).all(axis=1)
+    mesh = TetMesh(whole.points, whole.tetrahedra[~hollow])
+    matched = Medium(sigma_a=0.01, sigma_s=0.2, g=0.5, eta=1.0)
+    rays = Rays(np.array([[0.1, 0.2, 0.0]]), np.array([[0.0, 0.0, -1.0]]), np.ones(1))
+    assert rays.cells.tolist() == [-1]
+    deposit = follow(mesh, coefficients_of(matched), rays)
+    assert deposit.starts[:, 2] == pytest.approx([0.0, -3.0])
+    assert deposit.lengths == pytest.approx([2.0, 2.0])
+    assert deposit.cells is not None
+    assert mesh.barycentric(deposit.starts, deposit.cells).min() > -1e-12
+    load = load_vector(with_tree(mesh, NoTree()), coefficients_of(matched), deposit)
+    assert load.sum() == pytest.approx(1.0 - deposit.ballistic - deposit.absorbed, rel=1e-12)
+
+
+def test_deposits_together_keep_what_is_known() -> None:
+    line = beams([0, 0, 0], [0, 0, -1])
+    both = together([line, replace(line, cells=np.array([7])), Deposit()])
+    assert both.cells is not None
+    assert both.cells.tolist() == [-1, 7]
+    assert together([line, Deposit()]).cells is None
