@@ -315,7 +315,12 @@ def _kernel() -> ModuleType:
 
 
 def _scattering(medium: Medium) -> tuple[float, float]:
-    """sigma_s and g; sigma_s' and 0 for a medium that does not tell."""
+    """sigma_s and g; sigma_s' and 0 for a medium that does not tell.
+
+    Photons are scattered by Henyey and Greenstein's phase function.
+    """
+    if medium.phase is not None:
+        raise InputError("Monte Carlo knows no other phase function than Henyey-Greenstein; give the medium g instead.")
     if medium.sigma_s is None or medium.g is None:
         return medium.reduced_scattering, 0.0
     return medium.sigma_s, medium.g
