@@ -246,6 +246,8 @@ def _as_line(entry: _Entry, surface: Surface, medium: Medium, *, uniform: bool) 
     extinction = medium.sigma_a + scattering
     start, direction, power = entry.point, entry.direction, entry.transmitted
     known = Deposit(incident=entry.incident, specular=entry.specular, resolution=0.5 / extinction)
+    if power <= 0.0:
+        return known  # from a denser medium into a thinner one nothing passes beyond the critical angle
 
     def ray_on(mesh: TetMesh) -> Rays:
         """The beam from where it meets a facet of the mesh."""
