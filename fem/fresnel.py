@@ -26,15 +26,16 @@ def reflectance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
         Reflected share of the power, 1 beyond the critical angle.
     """
     mu = np.clip(np.asarray(cosine, dtype=float), 0.0, 1.0)
+    if eta == 1.0:
+        # Nothing at all: of what rounding would reflect, each crumb would be a ray to follow.
+        return np.zeros(mu.shape)
     sine_squared = eta**2 * (1.0 - mu**2)
     mu_other = np.sqrt(np.maximum(1.0 - sine_squared, 0.0))
     with np.errstate(invalid="ignore", divide="ignore"):
         r_s = (eta * mu - mu_other) / (eta * mu + mu_other)
         r_p = (mu - eta * mu_other) / (mu + eta * mu_other)
         value = 0.5 * (r_s**2 + r_p**2)
-    # Grazing light at matched indices is 0/0 above: it passes.
-    matched = 0.0 if eta == 1.0 else 1.0
-    return np.asarray(np.where((sine_squared >= 1.0) | ~np.isfinite(value), matched, value))
+    return np.asarray(np.where((sine_squared >= 1.0) | ~np.isfinite(value), 1.0, value))
 
 
 @lru_cache(maxsize=256)

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive, unit_vector
-from tetlux.fem.lights.spot import Spot, sunflower
+from tetlux.fem.lights.spot import Spot, scattered, sunflower
 from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, entered, follow
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
@@ -18,9 +18,10 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.
 LOOKS = 2000
-# Facets that a spot's edge crosses are cut into parts as small as this share of its detail.
-EDGE = 1.0 / 16.0
+# Facets are quartered at most so many times to see a spot. What each part sees of it is looked up at so many points, at
+# least and at most, and at so many together where that lies in between.
 _CUTS = 16
+_POINTS = (16, 256, 500_000)
 
 
 @dataclass(frozen=True)
@@ -70,18 +71,17 @@ class CollimatedBeam:
         depth = 1.0 / (medium.sigma_a + scattering)
         # As far apart as rays on the body are, at least.
         apart = surface.diagonal / np.sqrt(LOOKS)
-        detail = np.inf if self.spot is None else max(self.spot.detail, 0.5 * depth)
-        return Deposit(resolution=min(max(depth, apart), detail), lit=lit, on_mesh=self._on_mesh)
+        # What is smaller than its depth in a spot is blurred; the spot itself may be a thin beam.
+        narrow = np.inf if self.spot is None else max(0.5 * self.spot.reach, 0.5 * depth)
+        return Deposit(resolution=min(max(depth, apart), narrow), lit=lit, on_mesh=self._on_mesh)
 
     def entries(self, surface: Surface) -> FloatArray:
         """Some of the places where the light meets the body first, (q, 3)."""
         direction = unit_vector(self.direction, "direction")
         middle = 0.5 * (surface.points.min(axis=0) + surface.points.max(axis=0))
         reach = 0.5 * surface.diagonal
-        center = middle
-        if self.spot is not None:
-            reach, center = self.spot.reach, np.asarray(self.spot.center, dtype=float)
-        offsets = np.vstack([np.zeros((1, 3)), sunflower(LOOKS, reach, direction)])
+        center = middle if self.spot is None else np.asarray(self.spot.center, dtype=float)
+        offsets = sunflower(LOOKS, reach, direction) if self.spot is None else self.spot.looks(LOOKS, direction)
         if self.spot is not None:
             offsets = offsets[self.spot.brightness(offsets, direction) > 0]
         starts = center + offsets
@@ -112,15 +112,16 @@ class CollimatedBeam:
         caught = -0.5 * sides @ direction
         powers, way = self.irradiance * caught, np.full(len(points), np.inf)
         if self.spot is not None:
-            offsets = points - np.asarray(self.spot.center, dtype=float)
-            powers *= self.spot.brightness(offsets, direction)
+            center = np.asarray(self.spot.center, dtype=float)
+            points, bright = _seen(self.spot, corners - center, direction)
+            points, powers = center + points, bright * powers
             if self.from_center:
-                way = offsets @ direction
+                way = (points - center) @ direction
         lit = np.flatnonzero((powers > 0) & (way > 0))
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= way[lit]]
         along = np.broadcast_to(direction, (len(lit), 3))
-        return Rays(points[lit], along, powers[lit]), normals[owner[lit]]
+        return Rays(points[lit], along, powers[lit], mesh.boundary_cells[owner[lit]]), normals[owner[lit]]
 
     def _pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
         """Parts of facets (f, 3, 3) that are small enough to see the spot, (p, 3, 3), and whose they are, (p,)."""
@@ -132,14 +133,12 @@ class CollimatedBeam:
         for cut in range(_CUTS):
             size = longest_sides(corners)
             offsets = corners.mean(axis=1) - np.asarray(spot.center, dtype=float)
-            across = np.linalg.norm(offsets - np.outer(offsets @ direction, direction), axis=1)
-            near = across <= spot.reach + size
-            corners, owner, size, offsets = corners[near], owner[near], size[near], offsets[near]
+            near = spot.away(offsets, direction) <= size
+            corners, owner, size = corners[near], owner[near], size[near]
             cutting = size > spot.detail
-            if spot.has_edge:
-                values = spot.brightness(corners.reshape(-1, 3) - np.asarray(spot.center, dtype=float), direction)
-                crossed = np.ptp(values.reshape(-1, 3), axis=1) > 0
-                cutting |= crossed & (size > EDGE * spot.detail)
+            fine = np.flatnonzero(~cutting & (size > spot.edge))
+            offsets = corners[fine].reshape(-1, 3) - np.asarray(spot.center, dtype=float)
+            cutting[fine] = np.ptp(spot.brightness(offsets, direction).reshape(-1, 3), axis=1) > 0
             cutting &= cut < _CUTS - 1
             done.append(corners[~cutting])
             owners.append(owner[~cutting])
@@ -147,3 +146,17 @@ class CollimatedBeam:
             if len(corners) == 0:
                 break
         return np.concatenate(done), np.concatenate(owners)
+
+
+def _seen(spot: Spot, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The middle of what triangles (p, 3, 3) see of a spot, (p, 3), and its mean brightness there, (p,)."""
+    least, most, together = _POINTS
+    count = int(np.clip(together // max(len(corners), 1), least, most))
+    u, v = scattered(count).T
+    # A square folded along its diagonal is a triangle.
+    u, v = np.where(u + v > 1.0, (1.0 - u, 1.0 - v), (u, v))
+    points = np.column_stack([1.0 - u - v, u, v]) @ corners
+    bright = spot.brightness(points.reshape(-1, 3), direction).reshape(-1, count)
+    mean = bright.mean(axis=1)
+    middles = np.einsum("pk,pki->pi", bright, points) / np.where(mean > 0, count * mean, 1.0)[:, None]
+    return middles, mean

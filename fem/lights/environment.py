@@ -19,6 +19,8 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # The map is summed to as many directions, each the mean of what it stands for: even light is right to 0.1 %.
 DIRECTIONS = 512
+# An image of fewer rows and columns is divided, since a pixel of it stands for more than one direction.
+FEWEST = (64, 128)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,10 @@ class EnvironmentLight:
     @cached_property
     def directions(self) -> tuple[FloatArray, FloatArray]:
         """Unit vectors towards the light (d, 3), and the irradiance across each that comes from there (d,), W/unit²."""
-        rows, columns = self.radiance.shape
+        radiance = self.radiance
+        for axis, fewest in enumerate(FEWEST):
+            radiance = np.repeat(radiance, -(-fewest // radiance.shape[axis]), axis=axis)
+        rows, columns = radiance.shape
         edges = np.linspace(0.0, np.pi, rows + 1)
         polar = np.arccos(np.clip(0.5 * (np.cos(edges[:-1]) + np.cos(edges[1:])), -1.0, 1.0))
         around = ((np.arange(columns) + 0.5) / columns - 0.5) * 2.0 * np.pi
@@ -68,7 +73,7 @@ class EnvironmentLight:
         right = np.cross(front, up)
         level = np.outer(np.cos(around), front) + np.outer(np.sin(around), right)
         towards = np.sin(polar)[:, None, None] * level + np.cos(polar)[:, None, None] * up
-        power = (self.radiance * solid[:, None]).ravel()
+        power = (radiance * solid[:, None]).ravel()
         bright = power > 0
         towards, power = towards.reshape(-1, 3)[bright], power[bright]
         # Each pixel goes to the nearest of points that are spread evenly over the sphere.
