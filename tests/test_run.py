@@ -249,7 +249,10 @@ def test_the_cases_of_new_lights_and_media_run(name: str, tmp_path: Path) -> Non
     for channel in summary["channels"]:
         assert abs(channel["power"]["balance_error"]) < 1e-9
         assert channel["error_estimate"] <= case.tolerance
-    assert summary["warnings"] == []
+    # The ball in the plate absorbs more than diffusion likes, and the run says so.
+    assert [warning[:35] for warning in summary["warnings"]] == (
+        ["region 1: the reduced albedo is 0.8"] if name == "inclusion" else []
+    )
     power = [channel["power"] for channel in summary["channels"]]
     values = meshio.read(folder / "surface.ply").point_data
     if name == "marble":
@@ -272,7 +275,8 @@ def test_the_cases_of_new_lights_and_media_run(name: str, tmp_path: Path) -> Non
     if name == "candle":
         emitted = 4 / 3 * np.pi * 4**3 * np.array([0.004, 0.0026, 0.0012])
         lights = [channel["lights"][0]["power"]["incident"] for channel in summary["channels"]]
-        assert lights == pytest.approx(emitted, rel=0.02)
+        # The drop's facets lie inside it: 2.6 % of its volume lack, at a tolerance of 0.1.
+        assert lights == pytest.approx(emitted, rel=0.04)
         glow = [values[f"exitance_emission_1_{channel}"] for channel in ("red", "green", "blue")]
         assert glow[0].max() > glow[1].max() > glow[2].max()
 

@@ -153,8 +153,15 @@ def _entries(
     """Where parallel rays from outside first meet a surface, and its normals there, (e, 3) each."""
     directions = np.broadcast_to(direction, origins.shape)
     distances, faces = surface.rays.first(origins, directions)
-    # From outside a surface is met from its front, but for rays through an edge.
     met = (faces >= 0) & (surface.normals[faces] @ direction < 0)
+    # From outside a surface is met from its front, but for rays along a face or through an edge: those are looked at
+    # in full precision.
+    unclear = ~met & ((faces >= 0) | (len(origins) == 1))
+    for ray in np.flatnonzero(unclear).tolist():
+        along, crossed = surface.crossings(origins[ray], direction)
+        inward = np.flatnonzero(surface.normals[crossed] @ direction < 0)
+        if len(inward):
+            distances[ray], faces[ray], met[ray] = along[inward[0]], crossed[inward[0]], True
     points, faces = origins[met] + distances[met, None] * direction, faces[met]
     flat = surface.normals[faces]
     if not curved or len(points) == 0:
