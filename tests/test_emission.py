@@ -15,7 +15,7 @@ MESH = TetMesh(WHOLE.points, WHOLE.tetrahedra, regions=INSIDE.astype(np.int64))
 REGION = Region(box((2.0, 2.0, 2.0), center=(0.0, 0.0, -3.0)), TISSUE)
 
 
-@pytest.mark.parametrize("sigma_a", [0.0, 0.01, 0.3])
+@pytest.mark.parametrize("sigma_a", [0.0, 0.01, 0.1])
 def test_a_ball_that_glows_against_its_closed_form(sigma_a: float, ball: Surface) -> None:
     """``phi = q/sigma_a (1 - c sinh(kr)/r)``, and without absorption a paraboloid: all of it comes out."""
     medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
