@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.fem.medium import Medium
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import TetMesh
 
 AnyMedium = Medium | VaryingMedium
@@ -74,14 +75,17 @@ def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
     Raises
     ------
     InputError
-        If a coefficient that varies is not known, or not sensible, somewhere on the mesh.
+        If a coefficient that varies is not known, or not sensible, somewhere on the mesh; or if the mesh has other
+        regions than there are media. One medium is that of the whole mesh.
     """
     outer = base_of(media[0])
     if len(media) == 1 and isinstance(media[0], Medium):
         return coefficients_of(media[0])
+    regions = mesh.regions if len(media) > 1 else np.zeros_like(mesh.regions)
+    _check_regions(np.bincount(regions, minlength=len(media)), len(media))
     values = np.empty((4, len(mesh.tetrahedra)))
     for region, medium in enumerate(media):
-        inside = np.flatnonzero(mesh.regions == region)
+        inside = np.flatnonzero(regions == region)
         if isinstance(medium, Medium):
             values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington])[:, None]
             continue
@@ -93,6 +97,15 @@ def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
         values[:, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
     each: list[FloatArray] = list(values)
     return Coefficients(each[0], each[1], each[2], each[3], outer)
+
+
+def _check_regions(sizes: IntArray, media: int) -> None:
+    """Refuse a mesh whose regions, by their numbers of tetrahedra, are not those that media are given for."""
+    if len(sizes) > media:
+        raise InputError(f"the mesh has {len(sizes) - 1} regions, and {media - 1} have a medium; give one for each.")
+    for region in range(1, media):
+        if sizes[region] == 0:
+            raise InputError(f"the mesh has no region {region}; make one that has, or leave the region out.")
 
 
 def base_of(medium: AnyMedium) -> Medium:

@@ -72,7 +72,7 @@ def test_a_ball_of_another_index_against_monte_carlo() -> None:
     """Ten mean free paths across: diffusion itself is off by up to 1 % on the lit side and 2 to 5 % on the dark one.
 
     Measured: -.6 to +.2 % from 0 to 70 degrees, -1 % at 70 to 80, then +1.2 to 4.4 %, of which 1 % is Monte Carlo's
-    own error near 180 degrees. A point deposit instead of the path is off by tens of per cent on the dark side.
+    own error near 180 degrees.
     """
     medium = Medium(sigma_a=0.01, sigma_s=0.99, g=0.0, eta=1.3)
     solution = solve(sphere(5.0), medium, [CollimatedBeam(DOWN)], tolerance=0.02)
@@ -128,7 +128,7 @@ def test_van_de_hulsts_slab() -> None:
     """Optical depth 2, albedo .9, g .75, n 1: R .09739 and T .66096 by radiative transfer.
 
     Delta-Eddington's R is .10597, 8.8 % above it; this is diffusion's error and not the mesh's, which adds .2 %. With
-    sigma_s' exp(-sigma_t' z) instead it would be .140, 44 % above. T, ballistic light with it, is 1.5 % below.
+    sigma_s' exp(-sigma_t' z) instead it would be .140, 44 % above. T, ballistic light with it, is .5 % above.
     """
     medium = Medium(sigma_a=0.1, sigma_s=0.9, g=0.75, eta=1.0)
     solution = System(block((30, 30, 8), (30.0, 30.0, 2.0)), medium).solve([CollimatedBeam(DOWN)])

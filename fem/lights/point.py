@@ -27,6 +27,7 @@ def unit_vector(value: Vector, name: str) -> FloatArray:
     if not largest > 0:
         raise InputError(f"{name} is zero; give the {name} in which the light travels.")
     vector = vector / largest  # its square may be out of range
+    vector[np.abs(vector) < 1e-30] = 0.0  # and what is divided by it
     return np.asarray(vector / np.linalg.norm(vector))
 
 
