@@ -50,6 +50,8 @@ RIPPLE = 1.0 / 30.0
 # Facets whose distance from the surface could add no more than this share of the rest are not measured: a facet's
 # distance is at most this share of its longest edge, where the surface is smooth.
 NOT_MEASURED, FARTHEST = 0.02, 0.2
+# What leaves of this share of the light is what the solver's residual makes of nothing.
+ROUNDING = 1e-12
 # A facet that is farther than this share of its longest edge from the surface does not just cut a curve short.
 BULGE = 0.1
 # The mean distance of a paraboloid from a triangle through three of its points, over that at the middle.
@@ -107,8 +109,8 @@ def estimated(
     fluence, exitance, patches = solution.fluence, solution.exitance, solution.patches
     areas = mesh.boundary_node_areas
     size, total = float(np.sqrt(areas @ exitance**2)), float(areas @ np.abs(exitance))
-    if not size > 0:
-        # Where no light leaves at all, there is nothing to be wrong about.
+    if total <= ROUNDING * solution.power.incident:
+        # Where no light leaves, there is nothing to be wrong about.
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
     loads = np.zeros((len(mesh.points), 2))
     robin = coefficients.escape

@@ -9,6 +9,7 @@ import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.region import Region
@@ -201,11 +202,11 @@ def solve_each(
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
         inner = tuple(region.surface for region in regions)
+        media = media_of(medium, regions, len(scenes))
         if mesh is None:
             check_regions(surface, inner)
         else:
             _check_mesh(mesh, surface, len(inner))
-        media = media_of(medium, regions, len(scenes))
         for each in dict.fromkeys(media):
             check_media(surface, each)
         sources = [
@@ -356,7 +357,7 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetra
             "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
             "tolerance, or give a finer mesh."
         )
-    if solution.power.exited == 0.0:
+    if abs(solution.power.exited) <= ROUNDING * solution.power.incident:
         warnings.append(
             "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed."
         )
