@@ -218,8 +218,7 @@ def _of_facets(
     most = FARTHEST * length * areas * (along + outflow / extrapolation)
     order = np.argsort(most)
     measured = order[np.cumsum(most[order]) > NOT_MEASURED * rest]
-    middles = corners[measured].mean(axis=1)
-    distance = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
+    distance = mesh.boundary_distances(surface, measured)
     # A sphere through the corners of an equilateral triangle stands h²/6R above its middle. What is farther is a node
     # that could not be moved onto the surface, and tells nothing of its curvature.
     curvature = np.where(distance < BULGE * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0)

@@ -302,6 +302,18 @@ class TetMesh:
         return nearest, face, barycentric_of(nearest, self.points[self.boundary_faces[face]])
 
     @cached_property
+    def _distances(self) -> dict[Surface, FloatArray]:
+        return {}
+
+    def boundary_distances(self, surface: Surface, faces: IntArray) -> FloatArray:
+        """How far the middles of boundary triangles (q,) are from a surface, (q,), unit; each is measured once."""
+        known = self._distances.setdefault(surface, np.full(len(self.boundary_faces), np.nan))
+        new = faces[np.isnan(known[faces])]
+        middles = self.points[self.boundary_faces[new]].mean(axis=1)
+        known[new] = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
+        return np.asarray(known[faces])
+
+    @cached_property
     def rays(self) -> RayCaster:
         """The boundary, ready to be met by rays; faces are numbered as `boundary_faces`."""
         return RayCaster(self.points, self.boundary_faces)
