@@ -103,6 +103,7 @@ def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
         directions=deposit.directions[faint_parts],
         lengths=(deposit.lengths - reaches)[faint_parts],
         fluxes=left[faint_parts],
+        cells=None,
     )
     return bright, faint
 

@@ -1,15 +1,13 @@
-"""Volume meshes on disk, and surfaces with values on them, through meshio."""
+"""Volume meshes on disk, through meshio."""
 
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 SUFFIXES = (".vtu", ".msh")
@@ -80,35 +78,16 @@ def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray]
     file_format = "vtu" if path.suffix == ".vtu" else "gmsh"
     # gmsh's values are floating-point numbers.
     tags = mesh.regions.astype(np.int32 if file_format == "vtu" else np.float64)
-    cell_values = {REGION: tags} if tags.any() else {}
-    _write(path, mesh.points, "tetra", mesh.tetrahedra, values, file_format, cell_values)
+    import meshio  # noqa: PLC0415
 
-
-def write_surface(surface: Surface, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:
-    """Write a triangle mesh as binary PLY, with named values at its vertices."""
-    _write(Path(path), surface.points, "triangle", surface.faces.astype(np.int32), values, "ply")
+    meshio.Mesh(
+        mesh.points,
+        [("tetra", mesh.tetrahedra)],
+        point_data=dict(values or {}),
+        cell_data={REGION: [tags]} if tags.any() else {},
+    ).write(path, file_format=file_format)
 
 
 def _check_suffix(path: Path) -> None:
     if path.suffix not in SUFFIXES:
         raise InputError(f'{path}: "{path.suffix}" is no volume mesh format here; use {" or ".join(SUFFIXES)}.')
-
-
-def _write(
-    path: Path,
-    points: FloatArray,
-    kind: str,
-    cells: IntArray | np.ndarray[tuple[int, int], np.dtype[np.int32]],
-    values: Mapping[str, FloatArray] | None,
-    file_format: str,
-    cell_values: Mapping[str, npt.NDArray[np.generic]] | None = None,
-) -> None:
-    import meshio  # noqa: PLC0415
-
-    mesh = meshio.Mesh(
-        points,
-        [(kind, cells)],
-        point_data=dict(values or {}),
-        cell_data={name: [array] for name, array in (cell_values or {}).items()},
-    )
-    mesh.write(path, file_format=file_format)

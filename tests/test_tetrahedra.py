@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -272,8 +273,20 @@ def test_the_mesher_dies_with_its_parent() -> None:
         process.kill()
         # Closed when the last process that can write to it is gone.
         assert process.stdout.read() == ""
-    stat = Path(f"/proc/{pid}/stat")
-    assert not stat.exists() or stat.read_text().split()[2] == "Z"
+    # Its files are closed before it is gone.
+    for _ in range(100):
+        if not _lives(pid):
+            break
+        time.sleep(0.05)
+    assert not _lives(pid)
+
+
+def _lives(pid: int) -> bool:
+    """Whether a process is there, and no zombie."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().split()[2] not in "ZX"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
 
 
 @pytest.mark.parametrize("found", [True, False])
