@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
@@ -187,6 +189,9 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
             sensors.append(sensor_of(detector, surface, base_of(media[0])))
+    if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
+        with document.at(("camera", "position")):
+            raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
     return Case(
         name=name,
         source=document.path,

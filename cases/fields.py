@@ -1,5 +1,7 @@
 """Coefficients that vary in space, from files: tetrahedra with values, stacks of images, and arrays."""
 
+import contextlib
+import io
 import re
 import warnings
 from pathlib import Path
@@ -172,7 +174,9 @@ def _read_mesh(path: Path) -> "meshio.Mesh":
     import meshio  # noqa: PLC0415
 
     try:
-        return meshio.read(path, file_format="vtu")
+        # It says in a line of its own what is said below.
+        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
+            return meshio.read(path, file_format="vtu")
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
         raise InputError(f"{path} is not a readable VTU mesh; export it again.") from error
 

@@ -18,6 +18,7 @@ from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -125,7 +126,7 @@ class System:
         """The solution, where its charges are good guesses, what was put on the nodes, and the emission."""
         mesh = self.mesh
         with watch.stage("assemble"):
-            deposits = [deposit.on(mesh, self.body, self.coefficients) for deposit in sources.on_mesh]
+            deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
             loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.any()]
@@ -182,6 +183,14 @@ class System:
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
+
+    def _emitting(self, deposit: Deposit) -> Deposit:
+        """What regions emit, as it is of their true volume: facets of a round one lie inside it."""
+        if np.ndim(deposit.emission) == 0 or not self.regions:
+            return deposit
+        held = np.bincount(self.mesh.regions, self.mesh.volumes, minlength=len(self.regions) + 1)
+        share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
+        return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
 
     def _region_of(self, points: FloatArray) -> IntArray:
         """The regions that points inside lie in, (q,)."""

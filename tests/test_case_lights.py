@@ -205,6 +205,7 @@ WRONG = [
         "detectors: [{name: a, fibre: {center: [0, 0, 4], radius: 1, numerical_aperture: 2}}]\n",
         r"detectors\[0\]: numerical_aperture is 2",
     ),
+    (POINT, "camera: {position: [0, 0, 1]}\n", r"camera\.position: the camera is inside the body"),
     (POINT, "camera: {position: [0, 0]}\n", r"camera\.position\[2\]: expected a list of three numbers"),
 ]
 

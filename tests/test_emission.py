@@ -83,3 +83,14 @@ def test_regions_that_are_not_there(region: int) -> None:
         System(MESH, TISSUE, regions=(REGION,)).solve([Emission(1.0, region=region)])
     with pytest.raises(InputError, match="emission is of region 1, and there is none"):
         solve(sphere(10.0), TISSUE, [Emission(1.0, region=1)])
+
+
+def test_a_region_emits_what_its_surface_holds() -> None:
+    """Also on a coarse mesh, whose part of it is 4 % too small, and less what lies in regions within."""
+    core, shell = sphere(2.0), sphere(4.0)
+    regions = [Region(shell, TISSUE), Region(core, TISSUE)]
+    for number, volume in ((1, shell.volume - core.volume), (2, core.volume)):
+        solution = solve(sphere(8.0), TISSUE, [Emission(2.0, region=number)], regions=regions, tolerance=0.5)
+        assert solution.mesh.volumes[solution.mesh.regions == 2].sum() < 0.985 * core.volume
+        assert solution.power.incident == pytest.approx(2.0 * volume, rel=1e-9)
+        assert abs(solution.power.balance_error) < 1e-9

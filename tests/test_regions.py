@@ -435,3 +435,9 @@ def test_a_region_that_the_mesher_lost_is_missed(monkeypatch: pytest.MonkeyPatch
     assert epsilons[1] == pytest.approx(mesher.SECOND * epsilons[0])
     with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh's area is .* give a smaller deviation"):
         tetrahedralize(BODY, [sphere(3.0)], cache=False)
+
+
+def test_a_region_that_would_keep_the_mesher_busy_for_minutes_is_refused() -> None:
+    check_regions(sphere(10.0), [sphere(0.2, subdivisions=2)])
+    with pytest.raises(InputError, match=r"region 2 is 0\.1\d* mm across, less than 0\.5% of the body"):
+        check_regions(sphere(10.0), [sphere(0.2, subdivisions=2), sphere(0.04, center=(3.0, 0.0, 0.0))])

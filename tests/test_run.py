@@ -275,8 +275,8 @@ def test_the_cases_of_new_lights_and_media_run(name: str, tmp_path: Path) -> Non
     if name == "candle":
         emitted = 4 / 3 * np.pi * 4**3 * np.array([0.004, 0.0026, 0.0012])
         lights = [channel["lights"][0]["power"]["incident"] for channel in summary["channels"]]
-        # The drop's facets lie inside it: 2.6 % of its volume lack, at a tolerance of 0.1.
-        assert lights == pytest.approx(emitted, rel=0.04)
+        # Of the drop as it is given, whose 5,120 facets lie 0.2 % inside the ball, and not of its coarse mesh.
+        assert lights == pytest.approx(emitted, rel=3e-3)
         glow = [values[f"exitance_emission_1_{channel}"] for channel in ("red", "green", "blue")]
         assert glow[0].max() > glow[1].max() > glow[2].max()
 
