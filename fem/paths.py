@@ -238,8 +238,6 @@ def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Ray
     """What of rays that meet the boundary from inside stays in, and what goes out."""
     cosine = np.clip(np.einsum("ij,ij->i", rays.directions, normals), 0.0, 1.0)
     reflected = reflectance(cosine, eta)
-    # Where the indices match, what is reflected is rounding alone.
-    reflected = np.where(reflected < np.finfo(float).eps, 0.0, reflected)
     back = rays.directions - 2.0 * cosine[:, None] * normals
     inner = Rays(rays.starts, back, reflected * rays.powers, rays.cells)[reflected > 0]
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))

@@ -67,10 +67,14 @@ def scattered(count: int) -> FloatArray:
     return np.asarray(np.modf(0.5 + np.outer(np.arange(count), [0.7548776662466927, 0.5698402909980532]))[0])
 
 
+def _squared(offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    """Squared lengths of offsets (q, 3) across a direction, (q,)."""
+    return np.asarray(np.einsum("ij,ij->i", offsets, offsets) - (offsets @ direction) ** 2)
+
+
 def _beyond(offsets: FloatArray, direction: FloatArray, radius: float) -> FloatArray:
     """How far from a disc offsets (q, 3) are, across a direction, (q,)."""
-    along = offsets @ direction
-    across = np.sqrt(np.maximum(np.einsum("ij,ij->i", offsets, offsets) - along**2, 0.0))
+    across = np.sqrt(np.maximum(_squared(offsets, direction), 0.0))
     return np.asarray(np.maximum(across - radius, 0.0))
 
 
@@ -134,9 +138,7 @@ class Disc:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        along = offsets @ direction
-        across = np.einsum("ij,ij->i", offsets, offsets) - along**2
-        return np.where(across <= self.radius**2, 1.0, 0.0)
+        return np.where(_squared(offsets, direction) <= self.radius**2, 1.0, 0.0)
 
     def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
@@ -185,8 +187,7 @@ class Gaussian:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        along = offsets @ direction
-        across = np.einsum("ij,ij->i", offsets, offsets) - along**2
+        across = _squared(offsets, direction)
         share = np.exp(-2.0 * across / self.radius**2)
         return np.where(across <= self.reach**2, share, 0.0)
 
