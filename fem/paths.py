@@ -144,8 +144,8 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         if len(rays.powers) == 0:
             break
         distances, met = mesh.rays.first(rays.starts, rays.directions)
-        # At the very rim of a facet a ray may be out before it was in.
-        slipped = met < 0
+        # At the very rim of a facet a ray may be out before it was in, and one that grazes a facet meets it for ever.
+        slipped = (met < 0) | (distances < OFFSET * mesh.diagonal)
         ballistic += float(rays.powers[slipped].sum())
         rays, distances, met = rays[~slipped], distances[~slipped], met[~slipped]
         lengths = np.minimum(distances, longest)

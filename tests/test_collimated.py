@@ -213,6 +213,14 @@ def test_behind_a_gap_arrives_what_has_passed_before_it(ring_mesh: TetMesh) -> N
     assert out + scattered == pytest.approx(deposit.incident, rel=1e-9)
 
 
+def test_rays_that_graze_facets_go_on(ring_mesh: TetMesh) -> None:
+    """One direction in fifteen has a ray along a facet; none of them may meet it again and again, and stay there."""
+    clear = Medium(sigma_a=0.05, sigma_s_prime=0.35, eta=1.0)
+    for direction in on_sphere(1.0, np.linspace(0.6, 1.4, 60)):
+        deposit = on_mesh(CollimatedBeam(tuple(direction)), ring_mesh, clear)
+        assert deposit.powers.sum() == 0
+
+
 def test_lights_that_cannot_be() -> None:
     with pytest.raises(InputError, match="direction is zero"):
         CollimatedBeam((0.0, 0.0, 0.0))
