@@ -69,6 +69,7 @@ class Assembly:
         sigma_a: float | FloatArray,
         escape: float | FloatArray,
         mass: Mass = "lumped",
+        kept: FloatArray | None = None,
     ) -> csr_array:
         """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ escape phi v``.
 
@@ -81,6 +82,8 @@ class Assembly:
         escape : float or (f,) ndarray
             1/(2A), of all or of each boundary triangle.
         mass : {"lumped", "consistent"}
+        kept : (n,) ndarray, optional
+            The share of its absorption that the lumped mass of each node keeps, see `tetlux.fem.fitting`.
 
         Returns
         -------
@@ -92,7 +95,7 @@ class Assembly:
         edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
         diagonal = -summed(low, edges, nodes) - summed(high, edges, nodes)
         absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
-        diagonal += absorbed
+        diagonal += absorbed if kept is None else kept * absorbed
         diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
         if mass == "consistent":
             # Their rows sum to what those of the lumped ones hold on the diagonal.

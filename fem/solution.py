@@ -67,6 +67,8 @@ class Solution:
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
+    moved : float
+        Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.limiter`.
     of_lights : tuple of Solution
         What each light adds, in their order, if there are several.
     """
@@ -81,6 +83,7 @@ class Solution:
     error_estimate: float = np.nan
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    moved: float = 0.0
     of_lights: "tuple[Solution, ...]" = ()
 
     @cached_property
@@ -125,11 +128,16 @@ class Solution:
 
     def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> FloatArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
-        fluence = (weights * self.fluence[nodes]).sum(axis=1)
+        linear = (weights * self.fluence[nodes]).sum(axis=1)
+        known, guessed = np.zeros(len(points)), np.zeros(len(points))
         for patch in self.patches:
             inside = patch.cells[cells]
-            guess = patch.charges.fluence(points[inside])
-            fluence[inside] += guess - (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
+            known[inside] += patch.charges.fluence(points[inside])
+            guessed[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
+        fluence = linear + (known - guessed)
+        # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
+        shares = (fluence < 0) & (linear >= 0) & (known >= 0) & (guessed > 0)
+        fluence[shares] = linear[shares] * known[shares] / guessed[shares]
         return np.asarray(fluence)
 
     def fluence_at(self, points: FloatArray) -> FloatArray:
@@ -171,5 +179,6 @@ def added(parts: Sequence[Solution]) -> Solution:
         power=Power(*(sum(column) for column in zip(*powers, strict=True))),
         patches=tuple(patch for part in parts for patch in part.patches),
         transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
+        moved=sum(part.moved for part in parts),
         of_lights=tuple(parts),
     )

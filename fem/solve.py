@@ -51,6 +51,7 @@ def solve(
     mesh: TetMesh | None = ...,
     mass: Mass = ...,
     subtract: Subtract = ...,
+    limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
     report: Callable[[str], None] = ...,
@@ -68,6 +69,7 @@ def solve(
     mesh: TetMesh | None = ...,
     mass: Mass = ...,
     subtract: Subtract = ...,
+    limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
     report: Callable[[str], None] = ...,
@@ -84,6 +86,7 @@ def solve(
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
     subtract: Subtract = "half-space",
+    limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Callable[[str], None] = lambda _: None,
@@ -112,6 +115,8 @@ def solve(
     subtract : {"half-space", "free-space", "nothing"}
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
         `tetlux.fem.subtraction`.
+    limit : bool
+        Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.limiter`.
     most_tetrahedra : int
         Where refinement stops even if the tolerance is not met; the solution then carries a warning. The
         mesher's own mesh, of some thousands, is the least.
@@ -148,6 +153,7 @@ def solve(
         mesh=mesh,
         mass=mass,
         subtract=subtract,
+        limit=limit,
         most_tetrahedra=most_tetrahedra,
         cache=cache,
         report=report,
@@ -165,6 +171,7 @@ def solve_each(
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
     subtract: Subtract = "half-space",
+    limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Callable[[str], None] = lambda _: None,
@@ -173,7 +180,7 @@ def solve_each(
 
     Parameters
     ----------
-    body, regions, tolerance, mesh, mass, subtract, most_tetrahedra, cache, report
+    body, regions, tolerance, mesh, mass, subtract, limit, most_tetrahedra, cache, report
         As in `solve`.
     medium : Medium, VaryingMedium, or sequence of these
         That of all scenes, or of each.
@@ -213,7 +220,7 @@ def solve_each(
             sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
             for lights, each in zip(scenes, media, strict=True)
         ]
-    work = _Work(surface, inner, media, sources, mass, watch)
+    work = _Work(surface, inner, media, sources, mass, limit, watch)
     given = mesh is not None
     if mesh is None:
         with watch.stage("mesh"):
@@ -244,6 +251,7 @@ class _Work:
     media: list[tuple[AnyMedium, ...]]
     sources: list[Sources]
     mass: Mass
+    limit: bool
     watch: Stopwatch
 
     def solver_on(self, mesh: TetMesh) -> Callable[[int, Step | None], Step]:
@@ -253,7 +261,7 @@ class _Work:
         for media in dict.fromkeys(self.media):
             regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
             expected = self.media.count(media)
-            systems[media] = System(mesh, media[0], self.surface, self.mass, expected, regions, assembly)
+            systems[media] = System(mesh, media[0], self.surface, self.mass, expected, regions, assembly, self.limit)
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
@@ -370,4 +378,17 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetra
         )
         share = lowest / float(solution.fluence.max())
         warnings.append(f"the fluence dips below zero, to {share:.1e} of its largest value, {cause}")
+    if solution.moved > NEGLIGIBLE_POWER * power.incident:
+        warnings.append(
+            f"{solution.moved / power.incident:.2%} of the power was moved between nodes to keep the fluence from "
+            "going below zero, where tetrahedra are too coarse or too flat for light that fades so fast; ask for a "
+            "smaller tolerance, or give a finer mesh."
+        )
+    brightest = float(np.max(solution.transmitted_irradiance))
+    if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
+        warnings.append(
+            "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
+            f"{1 / solution.medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
+        )
     return list(dict.fromkeys(warnings))

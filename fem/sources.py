@@ -47,7 +47,7 @@ class Sources:
     @property
     def dips(self) -> bool:
         """Whether the equation itself may have a fluence below zero: that of a source of a first moment may."""
-        return any((charges.strengths[: charges.sources] < 0).any() for charges in self.charges)
+        return any(charges.dips for charges in self.charges)
 
 
 def sources_of(

@@ -9,7 +9,9 @@ import numpy as np
 from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.coefficients import AnyMedium, Coefficients, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
+from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.region import Region, only_medium
@@ -54,6 +56,9 @@ class System:
         The mesh's regions 1, 2, ..., each with one medium.
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
+    limit : bool
+        Whether the fluence is kept from going below zero, see `tetlux.fem.limiter`; not under a light for which the
+        diffusion equation itself does.
     """
 
     mesh: TetMesh
@@ -63,6 +68,7 @@ class System:
     expected: int = 1
     regions: tuple[Region, ...] = ()
     assembly: Assembly | None = None
+    limit: bool = True
 
     @property
     def media(self) -> tuple[AnyMedium, ...]:
@@ -78,7 +84,18 @@ class System:
     def solver(self) -> Solver:
         """The solver of its matrix."""
         assembly = self.assembly or Assembly(self.mesh)
-        return solver_for(assembly.of(self.coefficients, self.mass), LOADS_OF_A_LIGHT * self.expected)
+        coefficients, fitting = self.coefficients, self.fitting
+        if fitting is None:
+            matrix = assembly.of(coefficients, self.mass)
+        else:
+            escape = coefficients.escape
+            matrix = assembly.matrix(fitting.diffusion, coefficients.sigma_a, escape, self.mass, fitting.kept)
+        return solver_for(matrix, LOADS_OF_A_LIGHT * self.expected)
+
+    @cached_property
+    def fitting(self) -> Fitting | None:
+        """What its matrix has in place of some coefficients."""
+        return fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
 
     @property
     def body(self) -> Surface:
@@ -117,7 +134,7 @@ class System:
         solution, good, load, emission = self._solved(sources, watch, before)
         with watch.stage("solve"):
             inner = tuple(region.surface for region in self.regions)
-            estimate = estimated(solution, self.coefficients, self.solver, load, emission, inner)
+            estimate = estimated(solution, self.coefficients, self.solver, load, emission, inner, self.fitting)
         return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
@@ -139,7 +156,7 @@ class System:
                     patch_of(mesh, charges, inherited(good, coarse, mesh))
                     for charges, good in zip(sources.charges, before.good, strict=True)
                 ]
-            terms = [patch_terms(patch, self.mass) for patch in patches]
+            terms = [patch_terms(patch, self.mass, self.fitting) for patch in patches]
             solver = self.solver
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
@@ -151,7 +168,7 @@ class System:
             with watch.stage("assemble"):
                 for i in worse:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(patches[i], self.mass)
+                    terms[i] = patch_terms(patches[i], self.mass, self.fitting)
             with watch.stage("solve"):
                 parts[:, worse] = solver.solve(np.column_stack([terms[i].load for i in worse]))
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
@@ -167,7 +184,9 @@ class System:
         self, deposit: Deposit, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]
     ) -> Solution:
         """The solution of one light, by its deposit on this mesh."""
-        mesh = self.mesh
+        mesh, moved = self.mesh, 0.0
+        if self.limit and not (self._has_first_moment(deposit) or any(patch.charges.dips for patch in patches)):
+            fluence, moved = nonnegative(fluence, mesh.edges, self._losing)
         outside = mesh.boundary_node_areas * deposit.irradiance
         transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
         emitted = float((mesh.volumes * deposit.emission).sum())
@@ -179,10 +198,21 @@ class System:
             ballistic=deposit.ballistic,
         )
         solution = Solution(
-            mesh, self.body, self.coefficients.outer, fluence, ledger, tuple(patches), deposit.transmitted_irradiance
+            mesh,
+            self.body,
+            self.coefficients.outer,
+            fluence,
+            ledger,
+            tuple(patches),
+            deposit.transmitted_irradiance,
+            moved=moved,
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
+
+    def _has_first_moment(self, deposit: Deposit) -> bool:
+        """Whether it has a Q1, beside which the diffusion equation itself may have a fluence below zero."""
+        return len(deposit.starts) > 0 and bool(np.any(self.coefficients.cosine != 0))
 
     def _emitting(self, deposit: Deposit) -> Deposit:
         """What regions emit, as it is of their true volume: facets of a round one lie inside it."""
@@ -200,7 +230,14 @@ class System:
     @cached_property
     def _absorbing(self) -> FloatArray:
         """What a fluence of 1 at each node loses, (n,), unit²."""
-        sigma_a = self.coefficients.sigma_a
+        sigma_a, kept = self.coefficients.sigma_a, 1.0 if self.fitting is None else self.fitting.kept
         if self.coefficients.uniform:
-            return np.asarray(sigma_a * self.mesh.node_volumes)
-        return self.mesh.to_nodes(sigma_a * self.mesh.volumes)
+            return np.asarray(kept * (sigma_a * self.mesh.node_volumes))
+        return np.asarray(kept * self.mesh.to_nodes(sigma_a * self.mesh.volumes))
+
+    @cached_property
+    def _losing(self) -> FloatArray:
+        """The same, and what leaves for it through the boundary, (n,), unit²."""
+        losing = self._absorbing.copy()
+        losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
+        return losing

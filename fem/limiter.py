@@ -1,0 +1,66 @@
+"""No fluence below zero: what a node lacks is taken from its neighbours, and no power is lost.
+
+With lumped mass the matrix keeps the fluence from going below zero where no angle between faces is obtuse (Brandts,
+Korotov & Křížek 2007); meshers return others too, where the fluence overshoots in the dark by up to some per cent of
+its maximum. Each node stands for the power that is absorbed in its part of the volume and leaves through its part of
+the boundary, which is what a row of the matrix sums to; moving power from node to node leaves the ledger as it is. Of
+all fluences that differ from the one given by this, the one returned is near it: nothing moves farther than needed.
+"""
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+
+# From neighbour to neighbour so many times; what is lacking still is taken from all nodes alike.
+SWEEPS = 10
+# Quotients by less could overflow.
+NOTHING = 1e-250
+
+
+def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
+    """Raise a fluence to zero where it is below, at the cost of the nodes around.
+
+    Parameters
+    ----------
+    fluence : (n,) ndarray
+        W/unit².
+    edges : (e, 2) ndarray
+        Pairs of neighbours.
+    weights : (n,) ndarray
+        Power that is absorbed or leaves through the boundary for a fluence of 1 at each node, unit². None is negative.
+
+    Returns
+    -------
+    fluence : (n,) ndarray
+        None below zero, and the sum of weights times fluence as before; as it was if that sum is below zero.
+    moved : float
+        Power that was taken from some nodes and given to others, W.
+    """
+    power = weights * fluence
+    total = float(power.sum())
+    if fluence.min(initial=0.0) >= 0 or total < 0:
+        return fluence, 0.0
+    lacking, left = np.maximum(-power, 0.0), np.maximum(power, 0.0)
+    moved = float(lacking.sum())
+
+    def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
+        return np.bincount(nodes, values, minlength=len(power))
+
+    for _ in range(SWEEPS):
+        ways = edges[(lacking[edges] > 0).any(axis=1)]
+        if len(ways) == 0:
+            break
+        takers, givers = np.concatenate([ways, ways[:, ::-1]]).T
+        # All ask of their neighbours in proportion to what these have, and a neighbour gives no more than that.
+        asked = _ratio(lacking, at_nodes(takers, left[givers]))[takers] * left[givers]
+        given = asked * np.minimum(_ratio(left, at_nodes(givers, asked)), 1.0)[givers]
+        lacking = np.maximum(lacking - at_nodes(takers, given), 0.0)
+        left = np.maximum(left - at_nodes(givers, given), 0.0)
+    # Rounding too: so much is left in all.
+    left *= _ratio(np.array(total), left.sum())
+    return np.where(weights > 0, _ratio(left, weights), np.maximum(fluence, 0.0)), moved
+
+
+def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
+    """``a/b``, and 0 where b is next to nothing."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > NOTHING)
