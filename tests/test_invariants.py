@@ -156,7 +156,7 @@ def test_light_is_nowhere_negative_on_a_mesh_without_obtuse_angles(
 ) -> None:
     """Lumping in the volume and on the boundary, and not one of them alone, makes the inverse non-negative."""
     medium = Medium(sigma_a=absorption, sigma_s_prime=scattering, eta=eta)
-    solution = solve(BLOCK, medium, [PointSource(place)], subtract="nothing")
+    solution = solve(BLOCK, medium, [PointSource(place)], subtract="nothing", limit=False)
     # Down to the solver's own residual, which is 1e-12 of the load.
     assert solution.fluence.min() > -1e-10 * solution.fluence.max()
 
