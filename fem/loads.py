@@ -10,7 +10,7 @@ from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.paths import cells_of, optical_depths
-from tetlux.meshing.arrays import FloatArray, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.march import march
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -36,7 +36,10 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
         load += line
         # Points go with what is left of the lines.
         points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
-        load += _point_load(mesh, points, powers)
+        homes = np.full(len(points), -1)
+        if deposit.homes is not None:
+            homes[: len(deposit.homes)] = deposit.homes
+        load += _point_load(mesh, points, powers, homes)
     if np.any(deposit.transmitted_irradiance):
         _, c2 = moments(coefficients.outer.eta)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
@@ -45,10 +48,15 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
     return load
 
 
-def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray) -> FloatArray:
+def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, homes: IntArray) -> FloatArray:
+    """Points by their barycentric coordinates, in tetrahedra that are known or have to be found."""
     if len(points) == 0:
         return np.zeros(len(mesh.points))
-    cells, weights = mesh.tree.locate(points)
+    known, lost = np.flatnonzero(homes >= 0), np.flatnonzero(homes < 0)
+    cells, weights = homes.copy(), np.empty((len(points), 4))
+    weights[known] = mesh.barycentric(points[known], homes[known])
+    if len(lost):
+        cells[lost], weights[lost] = mesh.locate(points[lost])
     inside = cells >= 0
     load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
