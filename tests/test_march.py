@@ -267,9 +267,10 @@ def test_a_flat_tetrahedron_is_left_to_the_tree() -> None:
     mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
     flat = np.zeros((3, len(mesh.points)))
     lines = np.array([[0.1, 0.1, -0.1, 0.0, 0.0, -1.0, 1.0]]).T
-    part, lost = marching._marched(mesh, flat, lines, np.array([0]))
-    assert lost.all()
-    assert len(part.paths) == 0
+    mesh.__dict__["points"] = flat.T
+    marched = marching._marched(mesh, lines, np.array([0]), np.zeros(1))
+    assert marched.lost.all()
+    assert len(marched.stretches.paths) == 0
 
 
 def several(mesh: TetMesh, medium: Medium) -> Coefficients:
