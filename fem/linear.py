@@ -15,6 +15,8 @@ from tetlux.meshing.errors import RunError
 # The iteration aims here; a true residual above the second is refused.
 AIM = 1e-11
 REFUSED = 1e-8
+# And here where a few digits are enough; a residual ten times as large is not taken for that.
+ROUGH_AIM = 1e-4
 ITERATIONS = 1000
 # Right-hand sides that are iterated on together: each pass over the matrix then serves all of them.
 TOGETHER = 8
@@ -219,6 +221,17 @@ class Solver:
             columns = slice(start, start + TOGETHER)
             result[:, columns] = self._solved(np.ascontiguousarray(loads[:, columns], dtype=np.float64))
         return result.reshape(load.shape)
+
+    def roughly(self, load: FloatArray) -> FloatArray:
+        """Solve to a few digits, for less than half of the iterations: as `solve`, to a residual of 1e-3 at most."""
+        columns = []
+        # For as few as there are of these SciPy's product with one column at a time is quicker than with all.
+        for column in load.T:
+            size = float(np.linalg.norm(column)) * ROUGH_AIM / AIM or 1.0
+            result = size * self._ready[0](column[:, None] / size)[:, 0]
+            left = float(np.linalg.norm(column - self._product(result[:, None])[:, 0]))
+            columns.append(result if left <= 10.0 * AIM * size else self.solve(column))
+        return np.column_stack(columns)
 
     def _solved(self, loads: FloatArray) -> FloatArray:
         size = np.linalg.norm(loads, axis=0)
