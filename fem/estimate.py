@@ -173,8 +173,8 @@ def _averaging(mesh: TetMesh) -> Callable[[FloatArray], FloatArray]:
     starts = np.arange(0, groups.size + 1, 4)
     shape = (int(groups.max()) + 1, len(groups))
     around = csc_array((np.repeat(mesh.volumes, 4), groups.reshape(-1), starts), shape=shape)
-    volumes = np.asarray(around.sum(axis=1))[:, None]
-    return lambda vectors: np.asarray((around @ vectors / volumes)[groups])
+    volumes: FloatArray = np.asarray(around.sum(axis=1))
+    return lambda vectors: np.asarray((np.asarray(around @ vectors) / volumes[:, None])[groups])
 
 
 def _roughness(mesh: TetMesh, mean: Callable[[FloatArray], FloatArray], values: FloatArray) -> FloatArray:

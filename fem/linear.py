@@ -18,9 +18,8 @@ REFUSED = 1e-8
 # And here where a few digits are enough; a residual ten times as large is not taken for that.
 ROUGH_AIM = 1e-4
 ITERATIONS = 1000
-# Right-hand sides that are iterated on together: each pass over the matrix then serves all of them. SciPy's products with
-# few columns take longer than with each alone.
-TOGETHER, FEW = 8, 3
+# Right-hand sides that are iterated on together: each pass over the matrix then serves all of them.
+TOGETHER = 8
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000
 # Multigrid solves directly for this many unknowns, and estimates spectral radii in so many steps.
@@ -218,9 +217,8 @@ class Solver:
         """
         loads = load.reshape(len(load), -1)
         result = np.empty(loads.shape)
-        together = TOGETHER if loads.shape[1] > FEW else 1
-        for start in range(0, loads.shape[1], together):
-            columns = slice(start, start + together)
+        for start in range(0, loads.shape[1], TOGETHER):
+            columns = slice(start, start + TOGETHER)
             result[:, columns] = self._solved(np.ascontiguousarray(loads[:, columns], dtype=np.float64))
         return result.reshape(load.shape)
 
@@ -229,6 +227,7 @@ class Solver:
         # In units in which the iteration stops there.
         size = np.sqrt(_dots(load, load)) * ROUGH_AIM / AIM
         size[size == 0] = 1.0
+        # Two at a time take longer than one by one, for SciPy's products with them.
         each = np.split(load / size, load.shape[1], axis=1)
         result = np.column_stack([self._ready[0](np.ascontiguousarray(column)) for column in each]) * size
         left = load - self._product(result)

@@ -60,8 +60,8 @@ def march(
             left.append(some[part.lost])
     others = np.concatenate(left)
     if len(others):
-        for part in mesh.tree.cut(starts[others], directions[others], lengths[others]):
-            yield replace(part, paths=others[part.paths])
+        for stretches in mesh.tree.cut(starts[others], directions[others], lengths[others]):
+            yield replace(stretches, paths=others[stretches.paths])
 
 
 def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Marched:
