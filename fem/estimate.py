@@ -32,16 +32,17 @@ deposited, and its square is integrated over the boundary::
     ripple² = RIPPLE² ∮ (h² q / (2A D))²
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -128,17 +129,17 @@ def estimated(
     robin = coefficients.escape
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / size**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
-    duals = solver.solve(loads)
+    duals = solver.roughly(loads)
 
     diffusion, kept = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, kept = fitting.diffusion, fitting.kept[mesh.tetrahedra].min(axis=1) ** 2
-    groups = _groups(mesh)
-    rough = _roughness(mesh, groups, fluence)
+    mean = _averaging(mesh)
+    rough = _roughness(mesh, mean, fluence)
     smooth = fluence[mesh.tetrahedra]
     for patch in patches:
         inside = patch.cells[:, None]
-        rough -= inside[..., None] * _roughness(mesh, groups, patch.at_nodes)
+        rough -= inside[..., None] * _roughness(mesh, mean, patch.at_nodes)
         smooth = smooth - inside * patch.at_nodes[mesh.tetrahedra]
     slope_gap = _size(rough)
     corners = (mesh.tetrahedra[mesh.boundary_cells][:, None, :] == mesh.boundary_faces[:, :, None]).argmax(axis=2)
@@ -146,7 +147,7 @@ def estimated(
     leaving[mesh.boundary_nodes] = exitance - solution.transmitted_irradiance
 
     def shares_by(dual: FloatArray) -> FloatArray:
-        shares = diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, groups, dual))
+        shares = diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, mean, dual))
         shares += kept * coefficients.sigma_a * mesh.volumes * _lumping(smooth, dual[mesh.tetrahedra])
         of_faces = _lumping(np.take_along_axis(smooth[mesh.boundary_cells], corners, axis=1), dual[mesh.boundary_faces])
         shares += np.bincount(mesh.boundary_cells, robin * mesh.boundary_areas * of_faces, minlength=len(shares))
@@ -177,38 +178,37 @@ def _size(rough: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.einsum("mij,mij->m", rough, rough) / 4.0))
 
 
-def _groups(mesh: TetMesh) -> IntArray:
-    """Numbers of the corners of each tetrahedron, (m, 4): at a node between regions, another one for each of these."""
-    if not mesh.regions.any():
-        return mesh.tetrahedra
-    keys = mesh.tetrahedra * (int(mesh.regions.max()) + 1) + mesh.regions[:, None]
-    return np.asarray(np.unique(keys, return_inverse=True)[1].reshape(keys.shape), dtype=np.int64)
+def _averaging(mesh: TetMesh) -> Callable[[FloatArray], FloatArray]:
+    """From vectors of tetrahedra (m, 3) to their means by volume around each of the corners, (m, 4, 3).
+
+    At a node between regions each of these has a mean of its own.
+    """
+    groups = mesh.tetrahedra
+    if mesh.regions.any():
+        keys = groups * (int(mesh.regions.max()) + 1) + mesh.regions[:, None]
+        groups = np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
+    starts = np.arange(0, groups.size + 1, 4)
+    shape = (int(groups.max()) + 1, len(groups))
+    around = csc_array((np.repeat(mesh.volumes, 4), groups.reshape(-1), starts), shape=shape)
+    volumes: FloatArray = np.asarray(around.sum(axis=1))
+    return lambda vectors: np.asarray((np.asarray(around @ vectors) / volumes[:, None])[groups])
 
 
-def _roughness(mesh: TetMesh, groups: IntArray, values: FloatArray) -> FloatArray:
+def _roughness(mesh: TetMesh, mean: Callable[[FloatArray], FloatArray], values: FloatArray) -> FloatArray:
     """What averaging over the nodes takes off a gradient, at the corners of each tetrahedron, (m, 4, 3).
 
     Across an interface, where the gradient jumps, it is not averaged.
     """
     slope = np.einsum("mij,mi->mj", mesh.hat_gradients, values[mesh.tetrahedra])
-
-    def at_corners(shares: FloatArray) -> FloatArray:
-        sums = np.zeros(int(groups.max()) + 1)
-        for corner in groups.T:
-            sums += np.bincount(corner, shares, minlength=len(sums))
-        return sums
-
-    volumes = at_corners(mesh.volumes)
-    mean = np.column_stack([at_corners(mesh.volumes * part) / volumes for part in slope.T])
-    return np.asarray(mean[groups] - slope[:, None])
+    return np.asarray(mean(slope) - slope[:, None])
 
 
 def _lumping(first: FloatArray, second: FloatArray) -> FloatArray:
     """What lumping changes of the mean product of two linear functions, by their values at the corners, (m,)."""
     corners = first.shape[1]
-    lumped = (first * second).sum(axis=1) / corners
-    exact = ((first * second).sum(axis=1) + first.sum(axis=1) * second.sum(axis=1)) / (corners * (corners + 1))
-    return np.asarray(np.abs(lumped - exact))
+    # The one is sum(a b)/n, and the other (sum(a b) + sum(a) sum(b))/(n (n + 1)).
+    sums = np.einsum("mi->m", first) * np.einsum("mi->m", second)
+    return np.asarray(np.abs(corners * np.einsum("mi,mi->m", first, second) - sums) / (corners * (corners + 1)))
 
 
 def _of_layers(

@@ -32,7 +32,11 @@ def lit_points(deposits: list[Deposit], medium: Medium) -> tuple[FloatArray, Flo
         points = np.vstack(rows)
         found.append(points)
         resolutions.append(np.full(len(points), deposit.resolution))
-    return np.vstack(found), np.concatenate(resolutions)
+    places, finest = np.vstack(found), np.concatenate(resolutions)
+    # The same light in several media is at the same places, where the finest has its way.
+    order = np.lexsort((finest, *places.T))
+    new = (np.diff(places[order], axis=0, prepend=np.inf) != 0).any(axis=1)
+    return places[order[new]], finest[order[new]]
 
 
 def graded_towards(

@@ -15,6 +15,8 @@ from tetlux.meshing.errors import RunError
 # The iteration aims here; a true residual above the second is refused.
 AIM = 1e-11
 REFUSED = 1e-8
+# And here where a few digits are enough; a residual ten times as large is not taken for that.
+ROUGH_AIM = 1e-4
 ITERATIONS = 1000
 # Right-hand sides that are iterated on together: each pass over the matrix then serves all of them.
 TOGETHER = 8
@@ -219,6 +221,17 @@ class Solver:
             columns = slice(start, start + TOGETHER)
             result[:, columns] = self._solved(np.ascontiguousarray(loads[:, columns], dtype=np.float64))
         return result.reshape(load.shape)
+
+    def roughly(self, load: FloatArray) -> FloatArray:
+        """Solve to a few digits, for less than half of the iterations: as `solve`, to a residual of 1e-3 at most."""
+        # In units in which the iteration stops there.
+        size = np.sqrt(_dots(load, load)) * ROUGH_AIM / AIM
+        size[size == 0] = 1.0
+        # Two at a time take longer than one by one, for SciPy's products with them.
+        each = np.split(load / size, load.shape[1], axis=1)
+        result = np.column_stack([self._ready[0](np.ascontiguousarray(column)) for column in each]) * size
+        left = load - self._product(result)
+        return result if (np.sqrt(_dots(left, left)) <= 10.0 * AIM * size).all() else self.solve(load)
 
     def _solved(self, loads: FloatArray) -> FloatArray:
         size = np.linalg.norm(loads, axis=0)

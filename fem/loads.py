@@ -10,7 +10,7 @@ from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.paths import cells_of, optical_depths
-from tetlux.meshing.arrays import FloatArray, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.march import march
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -36,7 +36,10 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
         load += line
         # Points go with what is left of the lines.
         points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
-        load += _point_load(mesh, points, powers)
+        homes = np.full(len(points), -1)
+        if deposit.homes is not None:
+            homes[: len(deposit.homes)] = deposit.homes
+        load += _point_load(mesh, points, powers, homes)
     if np.any(deposit.transmitted_irradiance):
         _, c2 = moments(coefficients.outer.eta)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
@@ -45,10 +48,15 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
     return load
 
 
-def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray) -> FloatArray:
+def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, homes: IntArray) -> FloatArray:
+    """Points by their barycentric coordinates, in tetrahedra that are known or have to be found."""
     if len(points) == 0:
         return np.zeros(len(mesh.points))
-    cells, weights = mesh.tree.locate(points)
+    known, lost = np.flatnonzero(homes >= 0), np.flatnonzero(homes < 0)
+    cells, weights = homes.copy(), np.empty((len(points), 4))
+    weights[known] = mesh.barycentric(points[known], homes[known])
+    if len(lost):
+        cells[lost], weights[lost] = mesh.locate(points[lost])
     inside = cells >= 0
     load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
@@ -72,31 +80,29 @@ def _line_load(
         cells = cells_of(mesh, coefficients, part, deposit.starts, deposit.directions)
         extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter
-        x = extinction * step
-        carried = deposit.fluxes[part.paths] * at_cells(coefficients.scattering, cells)
+        phi1, phi2 = _phi(extinction * step)
+        carried = deposit.fluxes[part.paths] * at_cells(coefficients.scattering, cells) * step
         carried *= np.exp(-optical_depths(part, coefficients.extinction, cells))
-        mean = carried * step * _phi1(x)
-        q0 = mean[:, None] * part.weights + (carried * step**2 * _phi2(x))[:, None] * part.slopes
-        forward = at_cells(coefficients.cosine, cells) / at_cells(coefficients.sigma_t_prime, cells)
-        q1 = (forward * mean)[:, None] * part.slopes
-        inside = part.cells >= 0
-        load += summed(mesh.tetrahedra[part.cells[inside]], (q0 + q1)[inside], len(load))
-        outside, middle = part.paths[~inside], 0.5 * (part.enter + part.leave)[~inside]
-        points.append(deposit.starts[outside] + middle[:, None] * deposit.directions[outside])
-        powers.append(mean[~inside])
+        mean = carried * phi1
+        # What goes with the derivatives along the path: the rest of Q0, and Q1.
+        along = carried * step * phi2 + mean * at_cells(coefficients.cosine / coefficients.sigma_t_prime, cells)
+        # Both are 0 outside, whatever the nodes there.
+        for corner, weights, slopes in zip(mesh.tetrahedra[part.cells].T, part.weights.T, part.slopes.T, strict=True):
+            load += np.bincount(corner, mean * weights + along * slopes, len(load))
+        outside = np.flatnonzero(part.cells < 0)
+        paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
+        points.append(deposit.starts[paths] + middle[:, None] * deposit.directions[paths])
+        powers.append(mean[outside])
     return load, np.concatenate(points), np.concatenate(powers)
 
 
-def _phi1(x: FloatArray) -> FloatArray:
-    """``∫0..1 exp(-x u) du``."""
-    small = np.abs(x) < 1e-8
-    safe = np.where(small, 1.0, x)
-    return np.where(small, 1.0 - 0.5 * x, -np.expm1(-safe) / safe)
-
-
-def _phi2(x: FloatArray) -> FloatArray:
-    """``∫0..1 u exp(-x u) du``."""
-    small = np.abs(x) < 1e-2
-    safe = np.where(small, 1.0, x)
-    series = 1 / 2 - x / 3 + x**2 / 8 - x**3 / 30 + x**4 / 144 - x**5 / 840
-    return np.where(small, series, (-np.expm1(-safe) - safe * np.exp(-safe)) / safe**2)
+def _phi(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """``∫0..1 exp(-x u) du`` and ``∫0..1 u exp(-x u) du``."""
+    small = np.flatnonzero(x < 1e-2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first = -np.expm1(-x) / x
+        second = (first - np.exp(-x)) / x
+    x = x[small]
+    first[small] = 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720
+    second[small] = 1 / 2 - x / 3 + x**2 / 8 - x**3 / 30 + x**4 / 144 - x**5 / 840
+    return first, second

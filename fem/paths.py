@@ -17,8 +17,10 @@ from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
-# What a ray still carries when it has faded to this share of the average ray's power stays where it would on average.
+# What a ray still carries when it has faded to this share of the average ray's power stays where the rest of it did.
 FAINTEST = 1e-10
+# What is reflected, or comes in again, with less than this share stays at its facet.
+FAINTEST_AGAIN = 1e-8
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
 
@@ -105,18 +107,19 @@ def cells_of(
     return cells
 
 
-def _fade(mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatArray) -> tuple[FloatArray, float]:
-    """Power at the end of each path, and what is absorbed along all of them, W."""
+def _fade(mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Power at the end of each path, and what is absorbed along it, (r,), W."""
     extinction, sigma_a = coefficients.extinction, coefficients.sigma_a
     if coefficients.uniform:
         ends = rays.powers * np.exp(-extinction * lengths)
-        return ends, float(((rays.powers - ends) * sigma_a / extinction).sum())
-    depth, absorbed = np.zeros(len(lengths)), 0.0
+        return ends, (rays.powers - ends) * sigma_a / extinction
+    depth, absorbed = np.zeros((2, len(lengths)))
     for part in march(mesh, rays.starts, rays.directions, lengths, rays.cells):
         cells = cells_of(mesh, coefficients, part, rays.starts, rays.directions)
         here, step = at_cells(extinction, cells), part.leave - part.enter
         carried = rays.powers[part.paths] * np.exp(-optical_depths(part, extinction, cells))
-        absorbed += float((carried * -np.expm1(-here * step) * at_cells(sigma_a, cells) / here).sum())
+        lost = carried * -np.expm1(-here * step) * at_cells(sigma_a, cells) / here
+        absorbed += np.bincount(part.paths, lost, minlength=len(depth))
         depth += np.bincount(part.paths, here * step, minlength=len(depth))
     return rays.powers * np.exp(-depth), absorbed
 
@@ -136,7 +139,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         Their segments, and what of their power was absorbed, left the body, or was reflected at it from outside.
     """
     rays = _placed(mesh, rays)
-    faintest = FAINTEST * float(rays.powers.sum()) / max(len(rays.powers), 1)
+    average = float(rays.powers.sum()) / max(len(rays.powers), 1)
     # Nothing is left after so long a way.
     longest = -np.log(FAINTEST) / float(np.min(coefficients.extinction))
     segments, lengths_of, stopped, absorbed, ballistic, specular = [], [], [], 0.0, 0.0, 0.0
@@ -150,24 +153,28 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         rays, distances, met = rays[~slipped], distances[~slipped], met[~slipped]
         lengths = np.minimum(distances, longest)
         ends, lost = _fade(mesh, coefficients, rays, lengths)
-        absorbed += lost
-        segments.append(rays)
+        faded = rays.powers - ends
+        stays = (faded > 0) & ((ends <= FAINTEST * average) | (lengths < distances))
+        # Of these all is spread on their way as what faded there is.
+        whole = np.where(stays, rays.powers / np.where(stays, faded, 1.0), 1.0)
+        absorbed += float(lost @ whole)
+        segments.append(replace(rays, powers=whole * rays.powers))
         lengths_of.append(lengths)
         arrived = Rays(rays.starts + lengths[:, None] * rays.directions, rays.directions, ends)
-        going_on = (ends > faintest) & (lengths == distances)
-        stopped.append(arrived[~going_on])
-        rays, gone, reflected = beyond(mesh, coefficients, arrived[going_on], met[going_on])
+        rays, gone, reflected = beyond(mesh, coefficients, arrived[~stays], met[~stays])
         ballistic += gone
         specular += reflected
-        faint = rays.powers <= faintest
+        faint = rays.powers <= FAINTEST_AGAIN * average
         stopped.append(rays[faint])
         rays = rays[~faint]
     every, left = joined(segments), joined([*stopped, rays])
-    scattered = _scattered_share(mesh, coefficients, left.starts) * left.powers
+    # What is stopped at a facet is in the tetrahedron behind it.
+    scattered = at_cells(coefficients.scattering / coefficients.extinction, left.cells) * left.powers
     absorbed += float((left.powers - scattered).sum())
     return Deposit(
         points=left.starts,
         powers=scattered,
+        homes=left.cells,
         specular=specular,
         absorbed=absorbed,
         ballistic=ballistic,
@@ -190,17 +197,6 @@ def _placed(mesh: TetMesh, rays: Rays) -> Rays:
     cells = rays.cells.copy()
     cells[unknown] = np.where(facets >= 0, mesh.boundary_cells[facets], -1)
     return replace(rays, cells=cells)
-
-
-def _scattered_share(mesh: TetMesh, coefficients: Coefficients, points: FloatArray) -> FloatArray | float:
-    """What share of a beam is scattered where it is stopped, (q,)."""
-    share = coefficients.scattering / coefficients.extinction
-    if coefficients.uniform:
-        return share
-    cells, _ = mesh.locate(points)
-    lost = np.flatnonzero(cells < 0)
-    cells[lost] = mesh.boundary_cells[mesh.closest_boundary(points[lost])[1]]
-    return at_cells(share, cells)
 
 
 def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArray) -> tuple[Rays, float, float]:

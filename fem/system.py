@@ -193,7 +193,7 @@ class System:
         ledger = Power(
             incident=deposit.incident + float(outside.sum()) + emitted,
             specular=deposit.specular + float((outside - transmitted).sum()),
-            absorbed=deposit.absorbed + float(self._absorbing @ fluence) + sum(term.absorbed for term in terms),
+            absorbed=deposit.absorbed + float((self._absorbing * fluence).sum()) + sum(term.absorbed for term in terms),
             exited=0.0,
             ballistic=deposit.ballistic,
         )

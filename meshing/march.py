@@ -1,6 +1,6 @@
 """Straight paths through a mesh, all at once from tetrahedron to tetrahedron: many times quicker than `CellTree.cut`.
 
-It has to be known in which tetrahedron each of them begins.
+It has to be known in which tetrahedron each of them begins. Paths that were marched before are not marched again.
 """
 
 from collections.abc import Iterator
@@ -13,6 +13,7 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import SLACK, Stretches
 from tetlux.meshing.corners import cross, dot
+from tetlux.meshing.marched import Marched
 from tetlux.meshing.tetmesh import TetMesh
 
 # How far outside a tetrahedron, in barycentric coordinates, a stretch in it may begin. Where a path passes an edge
@@ -51,25 +52,40 @@ def march(
     left = [np.arange(len(starts))]
     if cells is not None:
         known, left = np.flatnonzero(cells >= 0), [np.flatnonzero(cells < 0)]
-        coordinates = np.ascontiguousarray(mesh.points.T)
-        for first in range(0, len(known), PORTION):
-            some = known[first : first + PORTION]
-            lines = np.vstack([starts[some].T, directions[some].T, lengths[some]])
-            part, lost = _marched(mesh, coordinates, lines, cells[some])
-            yield replace(part, paths=some[part.paths])
-            left.append(some[lost])
+        while len(known):
+            some = known[:PORTION]
+            part = _kept(mesh, np.vstack([starts[some].T, directions[some].T, lengths[some]]), cells[some])
+            some, known = known[: len(part.cells)], known[len(part.cells) :]
+            yield replace(part.stretches, paths=some[part.stretches.paths])
+            left.append(some[part.lost])
     others = np.concatenate(left)
     if len(others):
-        for part in mesh.tree.cut(starts[others], directions[others], lengths[others]):
-            yield replace(part, paths=others[part.paths])
+        for stretches in mesh.tree.cut(starts[others], directions[others], lengths[others]):
+            yield replace(stretches, paths=others[stretches.paths])
 
 
-def _marched(mesh: TetMesh, coordinates: FloatArray, lines: FloatArray, cells: IntArray) -> tuple[Stretches, BoolArray]:
-    """The stretches of lines (7, p), their starts, directions and lengths, and which of them were lost, (p,)."""
-    lost = np.zeros(lines.shape[1], dtype=bool)
+def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Marched:
+    """Lines (7, p), their starts, directions and lengths, marched; only the first of them where these are known."""
+    known = mesh.marched.find(lines, cells)
+    if known is None:
+        part = _marched(mesh, lines, cells, np.zeros(len(cells)))
+        mesh.marched.add(part)
+        return part
+    wanted = lines[6, : len(known.cells)]
+    further = np.flatnonzero((wanted > known.lines[6]) & ~known.lost)
+    if len(further):
+        known = known.on(_marched(mesh, lines[:, further], known.ends[further], known.lines[6, further]), further)
+        mesh.marched.add(known)
+    return known.up_to(wanted)
+
+
+def _marched(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:
+    """March lines (7, p) from where they are, by how far that is along them and the tetrahedron there, (p,) each."""
+    coordinates, whole, ends = np.ascontiguousarray(mesh.points.T), lines, cells.copy()
+    lost = np.zeros(len(cells), dtype=bool)
     # Of each path that is still on its way: its number, how far it has come, and for how many steps it has not.
-    paths, reached, stalls = np.arange(len(lost)), np.zeros(len(lost)), np.zeros(len(lost), dtype=np.int64)
-    parts = [[paths[:0], cells[:0], reached[:0], reached[:0], np.zeros((4, 0)), np.zeros((4, 0))]]
+    paths, stalls = np.arange(len(lost)), np.zeros(len(lost), dtype=np.int64)
+    begin, parts = cells, [[paths[:0], cells[:0], reached[:0], reached[:0], np.zeros((4, 0)), np.zeros((4, 0))]]
     for _ in range(len(mesh.tetrahedra) + MOST_STALLS):
         base, slopes = _coordinates(coordinates, mesh.tetrahedra[cells].T, lines, reached)
         # Nothing leaves through a face that it runs along or away from.
@@ -87,13 +103,15 @@ def _marched(mesh: TetMesh, coordinates: FloatArray, lines: FloatArray, cells: I
         failed |= ~np.isfinite(base[0] + slopes[0])
         parts.append(_some(got_on, paths, cells, reached, leave, base, slopes))
         lost[paths[failed]] = True
+        ends[paths[done]] = cells[done]
         paths, stalls, cells, reached, lines = _some(~(done | failed), paths, stalls, beyond, leave, lines)
         if len(paths) == 0:
             break
     lost[paths] = True
     every = [np.concatenate(column, axis=-1) for column in zip(*parts, strict=True)]
     owners, passed, enter, leave, weights, changes = _some(~lost[every[0]], *every)
-    return Stretches(owners, passed, enter, leave, weights.T, changes.T), lost
+    stretches = Stretches(owners, passed, enter, leave, weights.T, changes.T)
+    return Marched(whole, begin, ends, lost, stretches)
 
 
 def _some(chosen: BoolArray, *arrays: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:

@@ -11,6 +11,7 @@ from tetlux.meshing.blocks import grouped, in_blocks, once
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.marched import Kept
 from tetlux.meshing.proximity import ClosestPoint
 from tetlux.meshing.rays import RayCaster
 from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
@@ -322,6 +323,11 @@ class TetMesh:
     def tree(self) -> CellTree:
         """The tetrahedra in a tree of boxes, which finds those that points lie in and paths pass."""
         return CellTree(self.points, self.tetrahedra)
+
+    @cached_property
+    def marched(self) -> Kept:
+        """Paths that were marched through it, see `tetlux.meshing.march`."""
+        return Kept()
 
     def barycentric(self, queries: FloatArray, cells: IntArray) -> FloatArray:
         """Barycentric coordinates of query i in tetrahedron ``cells[i]``, (q, 4)."""

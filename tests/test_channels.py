@@ -29,6 +29,7 @@ from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
 RED = Medium(sigma_a=0.01, sigma_s=4.0, g=0.75, eta=1.4)
 BLUE = Medium(sigma_a=0.3, sigma_s=6.0, g=0.7, eta=1.4)
 OTHER_INDEX = Medium(sigma_a=0.05, sigma_s_prime=1.2, eta=1.0)
+THIN = Medium(sigma_a=0.005, sigma_s=0.2, g=0.5, eta=1.4)
 SHADED = VaryingMedium(base=RED, sigma_a=lambda p: 0.01 - 0.02 * p[:, 2])
 CUBE = block((6, 6, 6), (6.0, 6.0, 6.0))
 LIGHTS: list[Light] = [
@@ -58,12 +59,13 @@ def same(one: Solution, other: Solution, rel: float = 1e-10) -> None:
         assert getattr(one.power, name) == pytest.approx(expected_power, rel=rel, abs=rel * other.power.incident)
 
 
-@pytest.mark.parametrize("media", [(RED, BLUE), (RED, OTHER_INDEX, RED), (SHADED, BLUE)])
+@pytest.mark.parametrize("media", [(RED, BLUE), (RED, OTHER_INDEX, RED), (SHADED, BLUE), (BLUE, THIN, RED, SHADED)])
 def test_channels_are_solved_as_each_alone(media: Sequence[AnyMedium]) -> None:
     together = solve(CUBE, media, LIGHTS)
     assert len(together) == len(media)
     for medium, channel in zip(media, together, strict=True):
-        alone = solve(CUBE, medium, LIGHTS)
+        # On a mesh that knows no paths yet.
+        alone = solve(TetMesh(CUBE.points, CUBE.tetrahedra), medium, LIGHTS)
         same(channel, alone)
         assert channel.error_estimate == pytest.approx(alone.error_estimate, rel=1e-6)
         assert channel.warnings == alone.warnings
@@ -88,7 +90,7 @@ def test_each_scene_has_its_lights_and_its_medium() -> None:
     media = [RED, BLUE, BLUE]
     together = solve_each(CUBE, media, scenes)
     for lights, medium, solution in zip(scenes, media, together, strict=True):
-        same(solution, solve(CUBE, medium, lights))
+        same(solution, solve(TetMesh(CUBE.points, CUBE.tetrahedra), medium, lights))
 
 
 def test_every_light_has_a_ledger_of_its_own() -> None:

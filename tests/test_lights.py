@@ -63,7 +63,8 @@ def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -
     back = passes * lost * math.exp(-extinction * 0.5)
     assert deposit.specular == pytest.approx(lost)
     assert deposit.ballistic == pytest.approx(passes + back, rel=1e-9)
-    scattered = (1 - lost - deposit.ballistic) * 1.9 / 1.95
+    # What is too faint to go on inside is a point already.
+    scattered = (1 - lost - deposit.ballistic) * 1.9 / 1.95 - float(deposit.powers.sum())
     assert deposit.absorbed == pytest.approx((1 - lost - deposit.ballistic) * 0.05 / 1.95, rel=1e-9)
     assert total(deposit) + scattered == pytest.approx(1.0, rel=1e-12)
     assert load_vector(mesh, coefficients_of(FORWARD), deposit).sum() == pytest.approx(scattered)

@@ -160,3 +160,27 @@ def test_the_solver_goes_by_size(cells: int, loads: int, expected: Callable[[Pro
     assert solver._methods[0] is expected
     load = loads_on(mesh, 1)
     assert np.linalg.norm(load - solver.matrix @ solver.solve(load)) < 2e-11
+
+
+@pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_rough_solution_is_good_to_a_few_digits(
+    method: Callable[[Product], Method], medium: Medium, wide: TetMesh
+) -> None:
+    matrix, loads = system_matrix(wide, medium), loads_on(wide)
+    # Of any size, and one that is nothing.
+    loads = np.column_stack([1e6 * loads[:, :1], 1e-6 * loads[:, 1:], np.zeros(len(loads))])
+    solver = Solver(matrix, [method])
+    found = solver.roughly(loads)
+    assert (np.linalg.norm(loads - matrix @ found, axis=0) <= 1e-3 * np.linalg.norm(loads, axis=0)).all()
+    assert not found[:, -1].any()
+
+
+def test_a_rough_solution_that_is_too_rough_is_solved_in_full(wide: TetMesh) -> None:
+    matrix, loads = system_matrix(wide, TISSUE), loads_on(wide)
+
+    def useless(_: Product) -> Method:
+        return np.zeros_like
+
+    found = Solver(matrix, [useless, direct]).roughly(loads)
+    assert (np.linalg.norm(loads - matrix @ found, axis=0) < 2e-11).all()

@@ -13,11 +13,12 @@ from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
 from tetlux.fem.paths import Rays, follow
-from tetlux.meshing import Surface, TetMesh
+from tetlux.meshing import Surface, TetMesh, marched, refine
 from tetlux.meshing import march as marching
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import CellTree, Stretches
 from tetlux.meshing.march import march
+from tetlux.meshing.marched import Marched
 
 
 class NoTree:
@@ -267,9 +268,104 @@ def test_a_flat_tetrahedron_is_left_to_the_tree() -> None:
     mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
     flat = np.zeros((3, len(mesh.points)))
     lines = np.array([[0.1, 0.1, -0.1, 0.0, 0.0, -1.0, 1.0]]).T
-    part, lost = marching._marched(mesh, flat, lines, np.array([0]))
-    assert lost.all()
-    assert len(part.paths) == 0
+    mesh.__dict__["points"] = flat.T
+    part = marching._marched(mesh, lines, np.array([0]), np.zeros(1))
+    assert part.lost.all()
+    assert len(part.stretches.paths) == 0
+
+
+def same_mesh(mesh: TetMesh) -> TetMesh:
+    """The same, through which nothing was marched."""
+    return TetMesh(mesh.points, mesh.tetrahedra)
+
+
+@pytest.fixture
+def marches(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many paths were marched at each time."""
+    counts: list[int] = []
+    march_anew = marching._marched
+
+    def counting(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:
+        counts.append(len(cells))
+        return march_anew(mesh, lines, cells, reached)
+
+    monkeypatch.setattr(marching, "_marched", counting)
+    return counts
+
+
+@pytest.mark.parametrize("uniform", [True, False])
+def test_paths_are_marched_once_and_then_further(uniform: bool, ball_mesh: TetMesh, marches: list[int]) -> None:
+    """As far, less far, further, and some of both: each as on a mesh through which nothing was marched."""
+    mesh, whole = same_mesh(ball_mesh), from_facets(ball_mesh, 200, 8)
+    shares = np.random.default_rng(9).random(len(whole.starts))
+    coefficients = coefficients_of(FORWARD) if uniform else several(mesh, FORWARD)
+    further = int((shares > 0.5).sum())
+    for share, anew in ((0.5, 200), (0.5, 0), (0.3, 0), (shares, further), (1.0, 200), (0.4, 0)):
+        deposit = replace(whole, lengths=share * whole.lengths)
+        marches.clear()
+        load = load_vector(mesh, coefficients, deposit)
+        assert sum(marches) == anew
+        expected = load_vector(same_mesh(mesh), coefficients, deposit)
+        assert load == pytest.approx(expected, abs=1e-13 * expected.max())
+        check_stretches(mesh, deposit, 1e-7)
+
+
+def test_only_the_same_paths_are_known(ball_mesh: TetMesh, marches: list[int]) -> None:
+    """Others that begin alike are marched: with another direction or tetrahedron, after a gap, or on another mesh."""
+    deposit, other = from_facets(ball_mesh, 100, 8), from_facets(ball_mesh, 100, 10)
+    assert deposit.cells is not None
+    assert other.cells is not None
+    later = np.arange(100) >= 40
+    cases = (
+        (deposit, 0),
+        (replace(deposit, directions=np.where(later[:, None], -deposit.directions, deposit.directions)), 60),
+        (replace(deposit, cells=np.where(later, other.cells, deposit.cells)), 60),
+        (chosen(deposit, ~later), 0),
+        (chosen(deposit, np.arange(100) != 70), 29),
+        (chosen(deposit, later), 60),
+        (together([deposit, other]), 100),
+        (other, 100),
+    )
+    for asked, anew in cases:
+        mesh = same_mesh(ball_mesh)
+        load_vector(mesh, coefficients_of(FORWARD), deposit)
+        marches.clear()
+        load = load_vector(mesh, coefficients_of(FORWARD), asked)
+        assert sum(marches) == anew
+        expected = load_vector(same_mesh(ball_mesh), coefficients_of(FORWARD), asked)
+        assert load == pytest.approx(expected, abs=1e-13 * expected.max())
+    finer = refine(ball_mesh, np.ones(len(ball_mesh.tetrahedra), dtype=bool))
+    asked = located(finer, deposit)
+    marches.clear()
+    load_vector(finer, coefficients_of(FORWARD), asked)
+    assert sum(marches) == (asked.cells >= 0).sum()  # type: ignore[operator]
+
+
+def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    deposits = [from_facets(ball_mesh, 50, seed) for seed in (1, 2, 3)]
+    mesh = same_mesh(ball_mesh)
+    load_vector(mesh, coefficients_of(FORWARD), deposits[0])
+    held = sum(len(part.stretches.paths) for part in mesh.marched.parts.values())
+    # Room for two and a half.
+    monkeypatch.setattr(marched, "MOST_KEPT", int(2.5 * held))
+    for deposit in deposits:
+        load_vector(mesh, coefficients_of(FORWARD), deposit)
+    assert len(mesh.marched.parts) == 2
+    marches.clear()
+    for deposit in deposits:
+        load_vector(mesh, coefficients_of(FORWARD), deposit)
+    assert marches == [len(deposits[2].starts)]
+
+
+def chosen(deposit: Deposit, some: BoolArray) -> Deposit:
+    assert deposit.cells is not None
+    return Deposit(
+        starts=deposit.starts[some],
+        directions=deposit.directions[some],
+        lengths=deposit.lengths[some],
+        fluxes=deposit.fluxes[some],
+        cells=deposit.cells[some],
+    )
 
 
 def several(mesh: TetMesh, medium: Medium) -> Coefficients:

@@ -7,8 +7,9 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System
-from tetlux.fem.coefficients import coefficients_of
+from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.fresnel import reflectance
+from tetlux.fem.loads import load_vector
 from tetlux.fem.paths import Rays, follow
 from tetlux.fem.solution import Power
 from tetlux.meshing import TetMesh
@@ -180,6 +181,26 @@ def test_light_beyond_the_critical_angle_stays_inside_and_leaves_by_the_end() ->
         assert deposit.ballistic == pytest.approx(fade * (1.0 - lost) / (1.0 - lost * fade), rel=1e-4)
         scattered = float(deposit.fluxes @ -np.expm1(-0.05 * deposit.lengths)) * 0.6 + float(deposit.powers.sum())
         assert deposit.absorbed + deposit.ballistic + scattered == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("uniform", [True, False])
+def test_a_beam_that_fades_stays_on_its_way(uniform: bool) -> None:
+    """Through 30 mean free paths and through 21 of them, where less than 1e-10 of it is left, and through 2."""
+    for thick in (7.5, 5.3, 0.5):
+        of = Medium(sigma_a=0.4 * thick, sigma_s=0.6 * thick, g=0.0, eta=1.4)
+        same = coefficients_of(of)
+        cells = np.ones(len(CUBE.tetrahedra))
+        each = Coefficients(of.sigma_a * cells, of.sigma_t_prime * cells, 0.6 * thick * cells, 0.0 * cells, of)
+        coefficients = same if uniform else each
+        starts = np.array([[0.3, 0.2, 0.0], [-0.7, 0.1, 0.0]])
+        deposit = follow(CUBE, coefficients, Rays(starts, np.array([[0.0, 0.0, -1.0]] * 2), np.array([1.0, 2.0])))
+        load = load_vector(CUBE, coefficients, deposit)
+        assert deposit.absorbed + load.sum() + deposit.ballistic == pytest.approx(3.0, rel=1e-14)
+        assert load.sum() == pytest.approx(0.6 * (3.0 - deposit.ballistic), rel=1e-12)
+        # Up to 23 mean free paths light is followed to the far side.
+        through = 3.0 * math.exp(-4.0 * thick) * (1.0 - float(reflectance(1.0, 1.4)))
+        assert deposit.ballistic == pytest.approx(through if thick < 5.7 else 0.0, rel=1e-2)
+        assert (deposit.powers <= 1e-8 * 1.5).all()
 
 
 # Along faces, through edges and corners, at grazing incidence, and where it just touches.

@@ -40,6 +40,8 @@ class Deposit:
         Power that leaves the body without having been scattered, W.
     points, powers : (p, 3), (p,) ndarray
         Isotropic points and their power, W.
+    homes : (p,) ndarray, optional
+        The tetrahedra of a mesh in which they lie, -1 where not known.
     starts, directions, lengths, fluxes : (s, 3), (s, 3), (s,), (s,) ndarray
         Beam segments: start, unit direction, length, and power carried at the start, W. The power fades
         as ``exp(-sigma_t* l)``.
@@ -65,6 +67,7 @@ class Deposit:
     ballistic: float = 0.0
     points: FloatArray = field(default_factory=_no_vectors)
     powers: FloatArray = field(default_factory=_no_values)
+    homes: IntArray | None = None
     starts: FloatArray = field(default_factory=_no_vectors)
     directions: FloatArray = field(default_factory=_no_vectors)
     lengths: FloatArray = field(default_factory=_no_values)
@@ -95,11 +98,12 @@ def together(parts: Sequence[Deposit]) -> Deposit:
         ballistic=sum(p.ballistic for p in parts),
         points=np.vstack([p.points for p in parts]),
         powers=np.concatenate([p.powers for p in parts]),
+        homes=_known([(p.homes, len(p.points)) for p in parts]),
         starts=np.vstack([p.starts for p in parts]),
         directions=np.vstack([p.directions for p in parts]),
         lengths=np.concatenate([p.lengths for p in parts]),
         fluxes=np.concatenate([p.fluxes for p in parts]),
-        cells=_cells_of(parts),
+        cells=_known([(p.cells, len(p.starts)) for p in parts]),
         irradiance=sum((p.irradiance for p in parts), 0.0),
         transmitted_irradiance=sum((p.transmitted_irradiance for p in parts), 0.0),
         emission=sum((p.emission for p in parts), 0.0),
@@ -112,11 +116,11 @@ def together(parts: Sequence[Deposit]) -> Deposit:
     )
 
 
-def _cells_of(parts: Sequence[Deposit]) -> IntArray | None:
-    """Where the segments of all parts begin, (s,)."""
-    if all(part.cells is None for part in parts):
+def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:
+    """Tetrahedra of all parts, by those of each and how many they are."""
+    if all(cells is None for cells, _ in parts):
         return None
-    return np.concatenate([np.full(len(p.starts), -1) if p.cells is None else p.cells for p in parts])
+    return np.concatenate([np.full(count, -1) if cells is None else cells for cells, count in parts])
 
 
 class Light(Protocol):
