@@ -27,6 +27,8 @@ COARSEST = 500
 POWER_STEPS = 8
 # Factors of larger matrices fill gigabytes.
 MOST_FOR_DIRECT = 20_000
+# But where all else fails, they may.
+MOST_TO_FALL_BACK = 100_000
 
 # From residuals (n, k) to corrections of the solution, (n, k).
 Method = Callable[[FloatArray], FloatArray]
@@ -189,6 +191,11 @@ class Solver:
     methods : sequence of callables
         `jacobi`, `multigrid`, `direct`. The first is prepared at once, the next ones only when those before leave
         too large a residual.
+
+    Attributes
+    ----------
+    note : str
+        A sentence for the user where the first method was not enough; else nothing.
     """
 
     def __init__(self, matrix: csr_array, methods: Sequence[Callable[[Product], Method]]) -> None:
@@ -197,6 +204,7 @@ class Solver:
         self._methods = list(methods)
         self._ready = [methods[0](self._product)]
         self._row_sums = np.asarray(matrix.sum(axis=1))[:, None]
+        self.note = ""
 
     def solve(self, load: FloatArray) -> FloatArray:
         """Solve for one right-hand side or for several.
@@ -241,6 +249,11 @@ class Solver:
         for number, method in enumerate(self._methods):
             if residual <= AIM:
                 break
+            if residual > REFUSED and number > 0:
+                self.note = (
+                    f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
+                    "takes longer: coefficients are far apart, or tetrahedra flat."
+                )
             if number == len(self._ready):
                 self._ready.append(method(self._product))
             helps = True
@@ -301,5 +314,5 @@ def solver_for(matrix: csr_array, loads: int = 1) -> Solver:
     if nodes <= MOST_FOR_DIRECT and loads > 1 + (nodes / 1800) ** 2:
         return Solver(matrix, [direct, multigrid])
     if nodes * loads > 15_000:
-        return Solver(matrix, [multigrid, jacobi])
+        return Solver(matrix, [multigrid, jacobi, direct] if nodes <= MOST_TO_FALL_BACK else [multigrid, jacobi])
     return Solver(matrix, [jacobi, multigrid, direct])

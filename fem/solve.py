@@ -347,6 +347,7 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
 def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetrahedra: int | None) -> list[str]:
     """What a user should know of a solution; the limit is None for a mesh that was given."""
     warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *sources.warnings]
+    warnings += solution.warnings
     if solution.error_estimate > tolerance:
         where = "on the mesh given" if most_tetrahedra is None else f"at the limit of {most_tetrahedra:,} tetrahedra"
         warnings.append(

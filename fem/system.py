@@ -127,7 +127,7 @@ class System:
         with watch.stage("surface"):
             sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
         solution, *_ = self._solved(sources, watch, None)
-        return replace(solution, seconds=watch.read(), warnings=sources.warnings)
+        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
@@ -178,7 +178,8 @@ class System:
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
             of_lights.append(self._solution(deposit, fluence, [patches[i] for i in own], [terms[i] for i in own]))
         emission = sum((deposit.emission for deposit in deposits), 0.0)
-        return added(of_lights), tuple(good), np.sum(loads, axis=0), emission
+        solution = replace(added(of_lights), warnings=[solver.note] if solver.note else [])
+        return solution, tuple(good), np.sum(loads, axis=0), emission
 
     def _solution(
         self, deposit: Deposit, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]

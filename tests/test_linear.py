@@ -8,7 +8,7 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Medium, linear
+from tetlux.fem import Medium, PointSource, linear, solve
 from tetlux.fem.assembly import system_matrix
 from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
 from tetlux.meshing import RunError, TetMesh, refine
@@ -114,10 +114,14 @@ def test_what_one_method_leaves_the_next_one_solves(wide: TetMesh) -> None:
         prepared.append(product)
         return direct(product)
 
-    found = Solver(matrix, [helpless, rough, thorough]).solve(load)
+    solver = Solver(matrix, [helpless, rough, thorough])
+    found = solver.solve(load)
+    assert solver.note.startswith("the linear solver had to fall back from helpless to thorough")
     assert np.linalg.norm(load - matrix @ found) < 2e-11
     assert len(prepared) == 1
-    Solver(matrix, [direct, thorough]).solve(load)
+    enough = Solver(matrix, [direct, thorough])
+    enough.solve(load)
+    assert enough.note == ""
     assert len(prepared) == 1, "a method that is not needed is not prepared"
     with pytest.raises(RunError, match="stopped at a relative residual of"):
         Solver(matrix, [helpless, rough]).solve(load)
@@ -184,3 +188,13 @@ def test_a_rough_solution_that_is_too_rough_is_solved_in_full(wide: TetMesh) -> 
 
     found = Solver(matrix, [useless, direct]).roughly(loads)
     assert (np.linalg.norm(loads - matrix @ found, axis=0) < 2e-11).all()
+
+
+def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    def helpless(product: Product) -> Method:
+        return lambda rest: np.zeros_like(rest)
+
+    monkeypatch.setattr("tetlux.fem.system.solver_for", lambda matrix, _: Solver(matrix, [helpless, direct]))
+    solution = solve(wide, TISSUE, [PointSource((0.0, 0.0, -1.0))])
+    assert any("had to fall back from helpless to direct" in warning for warning in solution.warnings)
+    assert abs(solution.power.balance_error) < 1e-12
