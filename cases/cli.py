@@ -2,7 +2,10 @@
 
 import argparse
 import json
+import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -18,21 +21,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if all went well, 1 if some case failed, 2 if the request itself is wrong.
+        0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
-    options = _parser().parse_args(arguments)
+    _be_interrupted_by_signals()
     try:
-        return int(options.command(options))
+        options = _parser().parse_args(arguments)
+        code = int(options.command(options))
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except TetluxError as error:
-        print(f"tetlux: {error}", file=sys.stderr)
-        return 2
+        return _told(str(error), 2)
     except KeyboardInterrupt:
-        print("tetlux: interrupted; finished cases are kept.", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # Whoever read the output has had enough of it.
-        sys.stderr.close()
-        return 1
+        return _told("interrupted; finished cases are kept.", 130)
+    except MemoryError:
+        return _told("memory ran out; finished cases are kept.", 1)
+    except OSError as error:
+        # Most likely what is printed to; Python would try that once more at its end, and fail.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        # Whoever read the output may have had enough of it.
+        return 1 if isinstance(error, BrokenPipeError) else _told(f"stopped: {error}; finished cases are kept.", 1)
+    return code
+
+
+def _told(sentence: str, code: int) -> int:
+    """An exit code, with a sentence that says why."""
+    print(f"tetlux: {sentence}", file=sys.stderr)
+    return code
+
+
+def _be_interrupted_by_signals() -> None:
+    """Let a scheduler's and a closing terminal's signal end a run as Ctrl-C does, with nothing left behind."""
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+            # nohup has one of them ignored.
+            if signal.getsignal(number) is signal.SIG_DFL:
+                signal.signal(number, signal.default_int_handler)
 
 
 def _parser() -> argparse.ArgumentParser:
