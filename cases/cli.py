@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-from tetlux.meshing.errors import TetluxError
+from tetlux.meshing.errors import TetluxError, memory_ran_out
 
 # cases.* is imported where it is used: `tetlux schema` and `--help` need no solver.
 
@@ -33,7 +33,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _told(str(error), 2)
     except KeyboardInterrupt:
         return _told("interrupted; finished cases are kept.", 130)
-    except MemoryError:
+    except (MemoryError, RuntimeError) as error:
+        if not memory_ran_out(error):
+            raise
         return _told("memory ran out; finished cases are kept.", 1)
     except OSError as error:
         # Most likely what is printed to; Python would try that once more at its end, and fail.

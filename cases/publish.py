@@ -58,7 +58,7 @@ def claimed(out: Path, name: str) -> Iterator[Path]:
             folder.mkdir()
             # Now, and not after an hour's work: a file may be in the way, or a folder that is read only.
             if target.exists():
-                os.listdir(target)
+                next(target.iterdir(), None)
                 if not os.access(target, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         except OSError as error:

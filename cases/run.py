@@ -16,7 +16,7 @@ from tetlux.cases.results import Results, results_of, surface_values, volume_val
 from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
 from tetlux.fem.solve import solve_each
-from tetlux.meshing.errors import RunError
+from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files import write_mesh
 
 Report = Callable[[str], None]
@@ -72,7 +72,9 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
                 publish(folder, target, ALL_FILES)
             except OSError as error:
                 raise cannot_write(target, error) from error
-    except MemoryError as error:
+    except (MemoryError, RuntimeError) as error:
+        if not memory_ran_out(error):
+            raise
         raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
     for warning in warnings:
         report(f"note: {warning}")
