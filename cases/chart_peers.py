@@ -17,7 +17,7 @@ from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.mesher import tetrahedralize
-from tetlux.meshing.scratch import scratch
+from tetlux.meshing.scratch import run_child, scratch
 
 # Seconds until a peer is stopped.
 TIME_LIMIT = 300.0
@@ -77,16 +77,7 @@ def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
         # -P: the names of this folder's modules are not to hide those of others.
         command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
         try:
-            done = subprocess.run(
-                command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=TIME_LIMIT,
-                check=False,
-            )
+            done = run_child(command, folder, TIME_LIMIT)
         except subprocess.TimeoutExpired as error:
             raise RunError(f"stopped after {TIME_LIMIT:g} s") from error
         if done.returncode != 0 or not result_path.exists():

@@ -22,7 +22,7 @@ from tetlux.cases.picture_stage import (
     exitance_range,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.scratch import scratch
+from tetlux.meshing.scratch import run_child, scratch
 
 __all__ = ["Ray", "Scene", "draw"]
 
@@ -141,14 +141,7 @@ def _drawn_with_pyvista(stage: Stage) -> Image | None:
                 distance=4.0 * camera.pixel * max(PANEL),
                 half_height=0.5 * camera.pixel * PANEL[1],
             )
-            done = subprocess.run(
-                [*RENDERER, str(job), str(output), str(os.getpid())],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                timeout=TIME_LIMIT,
-                check=False,
-            )
+            done = run_child([*RENDERER, str(job), str(output), str(os.getpid())], folder, TIME_LIMIT)
             if done.returncode != 0 or not output.exists():
                 return None
             image: Image = np.load(output)

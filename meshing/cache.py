@@ -21,20 +21,23 @@ FORMAT = 2
 LIMIT = 1_000_000_000
 
 
-def cache_directory() -> Path:
-    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches."""
+def cache_directory() -> Path | None:
+    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches.
+
+    None if there is no such place: a container's user may have no home.
+    """
     own = os.environ.get("TETLUX_CACHE_DIR")
     if own:
         return Path(own)
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    elif os.name == "nt":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
+    with contextlib.suppress(RuntimeError):
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "tetlux"
+        if os.name == "nt":
+            return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "tetlux"
         # The XDG specification: relative paths are to be ignored.
         given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = given if given.is_absolute() else Path.home() / ".cache"
-    return base / "tetlux"
+        return (given if given.is_absolute() else Path.home() / ".cache") / "tetlux"
+    return None
 
 
 def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: float | str) -> str:

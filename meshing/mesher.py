@@ -22,7 +22,7 @@ from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
 from tetlux.meshing.repair import bodies, compact
-from tetlux.meshing.scratch import scratch
+from tetlux.meshing.scratch import run_child, scratch
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
@@ -316,18 +316,9 @@ def _run_pytetwild(
                 stop_energy=stop_energy,
                 filtered=filtered,
             )
-            done = subprocess.run(
-                [*MESHER, _whereabouts()],
-                cwd=folder,
-                # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=max(seconds, 0.0),
-                check=False,
-            )
+            # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
+            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+            done = run_child([*MESHER, _whereabouts()], folder, seconds, environment)
             result = folder / "output.npz"
             if done.returncode != 0 or not result.exists():
                 raise _failed(name, done)
