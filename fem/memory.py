@@ -8,24 +8,25 @@ from pathlib import Path
 
 from tetlux.meshing.errors import RunError
 
-# Bytes, measured as peaks of processes over what they had before, on cubes of 25k to 1.3 million tetrahedra and on
-# spheres refined to 300,000. On top of what is imported on the way, a tetrahedron needs
+# Bytes, by the peak memory of processes over what they had before, with the error estimated. Beside what is imported on
+# the way, each tetrahedron needed so many kB:
 #
-#   tetrahedra                             48k    413k   1,296k   here
-#   point source, mesh given                      .91      .75   1.02 kB
-#   beam on the whole body                        .98            1.02
-#   eight point sources                           .96            1.16
-#   eight and diffuse light                                .84   1.18
-#   beam, three channels                   3.9            1.06   1.30
-#   eight scenes of a medium each (384k)          1.4            2.00
+#   of a given mesh, by its tetrahedra     48k    413k  1,296k   here
+#   a point source                         .43     .92     .77   1.02
+#   eight                                          .97           1.16
+#   eight, and diffuse light                               .82   1.18
+#   a beam on the whole body                       .97           1.02
+#   the same in three channels                    1.14    1.07   1.30
+#   eight scenes, each of another medium (384k)   1.41           2.00
 #
-#   beam, refined to 154k                         1.6            1.62
-#   the same in three channels, to 291k           1.4            1.90
-#   and with diffuse light, to 197k               1.8            1.96
-#   pencil beam, to 191k                          1.5            1.62
-#   eight point sources, to 238k                  1.5            1.76
+#   of the finest mesh, after refinement
+#   a beam on the whole body, 154k                1.58           1.62
+#   the same in three channels, 291k              1.37           1.90
+#   and with diffuse light, 197k                  1.78           1.96
+#   a pencil beam, 191k                           1.46           1.62
+#   eight point sources, 238k                     1.54           1.76
 #
-# Refinement holds two meshes at a time, and makes a third that may turn out too large.
+# Refinement holds two meshes at a time, and makes another one that may turn out to be too large.
 IMPORTED = 80e6
 GIVEN, REFINED = 1000.0, 1600.0
 # For each further medium, a matrix and its solver; for each light of each scene, its fluence and its patch.

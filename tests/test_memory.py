@@ -19,7 +19,6 @@ lights: [{point: {position: [0, 0, 9]}}]
 tolerance: 0.1
 outputs: []
 """
-# Less than an entry of /proc says: of an even greater machine, in kB.
 MEMINFO = "MemTotal:       24000000 kB\nMemFree:         1000000 kB\nMemAvailable:    8000000 kB\n"
 
 
@@ -158,9 +157,9 @@ def test_a_process_that_may_not_have_more() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="peaks are counted in kB on Linux")
-@pytest.mark.parametrize(("cells", "lights", "channels"), [(40, 1, 1), (40, 8, 1), (40, 1, 3), (60, 1, 1)])
+@pytest.mark.parametrize(("cells", "lights", "channels"), [(40, 1, 1), (40, 8, 1), (40, 1, 3)])
 def test_the_need_is_what_is_measured(cells: int, lights: int, channels: int) -> None:
-    """Between what is needed and one and a half times that."""
+    """Measured: 419, 429 and 475 MB; estimated: 472, 525 and 579."""
     done = subprocess.run(
         [sys.executable, "-c", MEASURE, str(cells), str(lights), str(channels)],
         capture_output=True,
@@ -168,7 +167,7 @@ def test_the_need_is_what_is_measured(cells: int, lights: int, channels: int) ->
         check=True,
     )
     tetrahedra, peak = (int(word) for word in done.stdout.split())
-    assert peak <= 1.05 * memory.need(tetrahedra, channels, lights * channels) <= 1.6 * peak
+    assert 0.95 * peak <= memory.need(tetrahedra, channels, lights * channels) <= 1.5 * peak
 
 
 MEASURE = """\
