@@ -7,12 +7,9 @@ import signal
 import sys
 import threading
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
-from tetlux.meshing.errors import TetluxError, memory_ran_out
-
-# cases.* is imported where it is used: `tetlux schema` and `--help` need no solver.
+# The package is imported where it is used: it takes a second, and Ctrl-C may come at any moment.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,16 +20,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
-    _be_interrupted_by_signals()
     try:
-        options = _parser().parse_args(arguments)
+        _be_interrupted_by_signals()
+        return _main(arguments)
+    except KeyboardInterrupt:
+        return _told("interrupted; finished cases are kept.", 130)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    from tetlux.meshing.errors import TetluxError, memory_ran_out  # noqa: PLC0415
+
+    options = _parser().parse_args(arguments)
+    try:
         code = int(options.command(options))
         if sys.stdout is not None:
             sys.stdout.flush()
     except TetluxError as error:
         return _told(str(error), 2)
-    except KeyboardInterrupt:
-        return _told("interrupted; finished cases are kept.", 130)
     except (MemoryError, RuntimeError) as error:
         if not memory_ran_out(error):
             raise
@@ -61,6 +65,8 @@ def _be_interrupted_by_signals() -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
+    from importlib.metadata import version  # noqa: PLC0415
+
     parser = argparse.ArgumentParser(
         prog="tetlux", description="Light diffusing through any shape, by tetrahedral finite elements."
     )

@@ -19,7 +19,7 @@ from tetlux.cases.cli import main
 from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES
 from tetlux.meshing import RunError, mesher, sphere, tetrahedralize
-from tetlux.meshing.cache import remembered_mesh
+from tetlux.meshing.cache import remember_mesh, remembered_mesh
 from tetlux.meshing.scratch import scratch
 
 CASE = """\
@@ -289,6 +289,11 @@ def test_interrupted_at_any_stage(
     assert processes_in(temporary) == []
 
 
+def test_the_package_is_imported_where_an_interruption_is_caught() -> None:
+    code = "import sys, tetlux.cases.cli; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
 @linux
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_scheduler_may_stop_it(number: signal.Signals, tmp_path: Path) -> None:
@@ -470,7 +475,7 @@ def test_a_cache_whose_writers_are_killed(tmp_path: Path) -> None:
     for path in tmp_path.glob("*.part"):
         os.utime(path, (time.time() - 90_000,) * 2)
     for key in sizes:
-        mesher.remember_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
+        remember_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.npz", "2.npz"]
 
 
