@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import signal
 import sys
 import threading
@@ -42,9 +41,7 @@ def _main(arguments: Sequence[str] | None) -> int:
             raise
         return _told("memory ran out; finished cases are kept.", 1)
     except OSError as error:
-        # Most likely what is printed to; Python would try that once more at its end, and fail.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        # Whoever read the output may have had enough of it.
+        # Most likely of what is printed to; but whoever reads it may have had enough of it.
         return 1 if isinstance(error, BrokenPipeError) else _told(f"stopped: {error}; finished cases are kept.", 1)
     return code
 

@@ -1,5 +1,6 @@
 """Faults: killed, interrupted, two at once, full disks, too little memory. Results are whole or not there."""
 
+import fcntl
 import json
 import os
 import resource
@@ -237,6 +238,26 @@ def test_many_may_want_one_folder(tmp_path: Path) -> None:
         assert racer.returncode == 0
     assert [path.name for path in tmp_path.iterdir()] == ["ball"]
     assert len({(tmp_path / "ball" / name).read_text() for name in ("a", "b", "c")}) == 1
+
+
+def test_the_lock_is_on_the_folder_that_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process that had it before may remove its folder, and another one make it, just before it is locked."""
+    usual, calls = fcntl.flock, []
+
+    def meanwhile(descriptor: int, operation: int) -> None:
+        calls.append(0)
+        (place,) = tmp_path.iterdir()
+        if len(calls) < 3:
+            place.rename(tmp_path.with_name(f"gone-{len(calls)}"))
+        if len(calls) == 1:
+            place.mkdir()
+        usual(descriptor, operation)
+
+    monkeypatch.setattr(fcntl, "flock", meanwhile)
+    with claimed(tmp_path, "ball"), pytest.raises(RunError, match="another run"), claimed(tmp_path, "ball"):
+        pass
+    assert len(calls) == 4
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.fixture
