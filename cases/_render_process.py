@@ -6,12 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetlux.meshing._mesher_process import die_with
+
 if TYPE_CHECKING:
     from pyvista import PolyData
 
 
-def main(job_path: str, image_path: str) -> None:
-    """Draw the stage in ``job_path`` (npz) off-screen with PyVista into ``image_path`` (npy, (h, w, 3) uint8)."""
+def main(job_path: str, image_path: str, parent: str) -> None:
+    """Draw the stage in ``job_path`` (npz) off-screen with PyVista into ``image_path`` (npy, (h, w, 3) uint8).
+
+    `parent` is the number of the process that it works for.
+    """
+    die_with(int(parent))
     import pyvista  # noqa: PLC0415
 
     with np.load(job_path) as data:

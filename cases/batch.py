@@ -1,6 +1,5 @@
 """Several case files, one after the other: all are checked before the first is run."""
 
-import os
 import sys
 import time
 from collections.abc import Sequence
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.cases.case import Case, find_case_file, load_cases
+from tetlux.cases.publish import check_writable
 from tetlux.cases.run import run_case
 from tetlux.meshing.errors import InputError, TetluxError
 
@@ -53,18 +53,6 @@ def check_all(requests: Sequence[str]) -> int:
         for note in (*first.repairs, *surface.warnings, *first.region_warnings):
             print(f"  {note}")
     return 2 if wrong else 0
-
-
-def check_writable(out: Path) -> None:
-    """Refuse a folder that results cannot be written to, before anything is solved for it.
-
-    Raises
-    ------
-    InputError
-    """
-    existing = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK):
-        raise InputError(f"results cannot be written to {out}; choose another folder with --out.")
 
 
 def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:

@@ -5,23 +5,23 @@ import json
 import os
 import platform
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.batch import check_writable, load_all
+from tetlux.cases.batch import load_all
 from tetlux.cases.chart_methods import FINITE_ELEMENTS, Method
 from tetlux.cases.chart_models import MODELS, MONTE_CARLO, monte_carlo_installed
 from tetlux.cases.chart_peers import PEERS
 from tetlux.cases.chart_picture import draw_chart
 from tetlux.cases.chart_runs import Charted, Run, exponents, runs_on
 from tetlux.cases.chart_scene import scene_of, spec_of
+from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
 from tetlux.cases.summary import LIBRARIES
 from tetlux.fem import Medium, PointSource, solve
-from tetlux.meshing.errors import InputError, RunError, TetluxError
+from tetlux.meshing.errors import InputError, TetluxError
 from tetlux.meshing.shapes import sphere
 
 DEFAULT_CASES = ("slab", "sphere", "torus", "hare")
@@ -106,27 +106,22 @@ def _warm_up() -> None:
 
 
 def write_chart(charted: Sequence[Charted], out: Path) -> None:
-    """Write the three files, each whole: into a folder beside them first.
+    """Write the three files, whole: into a folder beside them first.
 
     Raises
     ------
     RunError
         If they cannot be written.
     """
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=out) as name:
-            folder = Path(name)
+    with claimed(out, ".") as folder:
+        try:
             _write_table([run for one in charted for run in one.runs], folder / "chart.csv")
             draw_chart(charted, folder / "chart.png")
             text = json.dumps(as_data(charted), indent=2, allow_nan=False)
             (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
-            for file in FILES:
-                (folder / file).replace(out / file)
-    except OSError as error:
-        raise RunError(
-            f"the chart cannot be written to {out}: {error.strerror or error}; choose another folder with --out."
-        ) from error
+            publish(folder, out, FILES)
+        except OSError as error:
+            raise cannot_write(out, error) from error
 
 
 def _write_table(runs: Sequence[Run], path: Path) -> None:

@@ -3,7 +3,6 @@
 import importlib.util
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +17,7 @@ from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.scratch import run_child, scratch
 
 # Seconds until a peer is stopped.
 TIME_LIMIT = 300.0
@@ -71,22 +71,13 @@ def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
     RunError
         If it fails, crashes, or takes too long.
     """
-    with tempfile.TemporaryDirectory(prefix="tetlux-peer-", ignore_cleanup_errors=True) as folder:
-        job_path, result_path = Path(folder) / "job.npz", Path(folder) / "result.npz"
+    with scratch("peer") as folder:
+        job_path, result_path = folder / "job.npz", folder / "result.npz"
         np.savez(job_path, **job)
         # -P: the names of this folder's modules are not to hide those of others.
         command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
         try:
-            done = subprocess.run(
-                command,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=TIME_LIMIT,
-                check=False,
-            )
+            done = run_child(command, folder, TIME_LIMIT)
         except subprocess.TimeoutExpired as error:
             raise RunError(f"stopped after {TIME_LIMIT:g} s") from error
         if done.returncode != 0 or not result_path.exists():

@@ -2,14 +2,13 @@
 
 import argparse
 import json
+import signal
 import sys
+import threading
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
-from tetlux.meshing.errors import TetluxError
-
-# cases.* is imported where it is used: `tetlux schema` and `--help` need no solver.
+# The package is imported where it is used: it takes a second, and Ctrl-C may come at any moment.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -18,24 +17,53 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 if all went well, 1 if some case failed, 2 if the request itself is wrong.
+        0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
+    try:
+        _be_interrupted_by_signals()
+        return _main(arguments)
+    except KeyboardInterrupt:
+        return _told("interrupted; finished cases are kept.", 130)
+
+
+def _main(arguments: Sequence[str] | None) -> int:
+    from tetlux.meshing.errors import TetluxError, memory_ran_out  # noqa: PLC0415
+
     options = _parser().parse_args(arguments)
     try:
-        return int(options.command(options))
+        code = int(options.command(options))
+        if sys.stdout is not None:
+            sys.stdout.flush()
     except TetluxError as error:
-        print(f"tetlux: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("tetlux: interrupted; finished cases are kept.", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        # Whoever read the output has had enough of it.
-        sys.stderr.close()
-        return 1
+        return _told(str(error), 2)
+    except (MemoryError, RuntimeError) as error:
+        if not memory_ran_out(error):
+            raise
+        return _told("memory ran out; finished cases are kept.", 1)
+    except OSError as error:
+        # Most likely of what is printed to; but whoever reads it may have had enough of it.
+        return 1 if isinstance(error, BrokenPipeError) else _told(f"stopped: {error}; finished cases are kept.", 1)
+    return code
+
+
+def _told(sentence: str, code: int) -> int:
+    """An exit code, with a sentence that says why."""
+    print(f"tetlux: {sentence}", file=sys.stderr)
+    return code
+
+
+def _be_interrupted_by_signals() -> None:
+    """Let a scheduler's and a closing terminal's signal end a run as Ctrl-C does, with nothing left behind."""
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+            # nohup has one of them ignored.
+            if signal.getsignal(number) is signal.SIG_DFL:
+                signal.signal(number, signal.default_int_handler)
 
 
 def _parser() -> argparse.ArgumentParser:
+    from importlib.metadata import version  # noqa: PLC0415
+
     parser = argparse.ArgumentParser(
         prog="tetlux", description="Light diffusing through any shape, by tetrahedral finite elements."
     )

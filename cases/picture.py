@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,12 +22,13 @@ from tetlux.cases.picture_stage import (
     exitance_range,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.scratch import run_child, scratch
 
 __all__ = ["Ray", "Scene", "draw"]
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
-# The command that draws a body with PyVista; the names of two files are added.
+# The command that draws a body with PyVista; the names of two files and the number of this process are added.
 RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process")
 # Seconds; 50,000 triangles take about two without a graphics card.
 TIME_LIMIT = 120.0
@@ -118,42 +118,35 @@ def draw(scene: Scene, path: Path) -> list[str]:
 def _drawn_with_pyvista(stage: Stage) -> Image | None:
     """The body as PyVista draws it in a process of its own, or None where it cannot."""
     camera = stage.camera
-    with tempfile.TemporaryDirectory(prefix="tetlux-picture-", ignore_cleanup_errors=True) as folder:
-        job, output = Path(folder) / "stage.npz", Path(folder) / "image.npy"
-        np.savez(
-            job,
-            size=OVERSAMPLING * np.array(PANEL),
-            background=stage.background,
-            light=LIGHT,
-            shading=(SHADED, FULL),
-            lamp=camera.lamp,
-            corners=stage.corners,
-            normals=stage.normals,
-            shares=stage.shares,
-            colours=np.zeros(0) if stage.colours is None else stage.colours,
-            table=stage.table,
-            arrows=stage.arrows,
-            arrow_normals=stage.arrow_normals,
-            center=camera.center,
-            toward=camera.toward,
-            up=camera.up,
-            distance=4.0 * camera.pixel * max(PANEL),
-            half_height=0.5 * camera.pixel * PANEL[1],
-        )
-        try:
-            done = subprocess.run(
-                [*RENDERER, str(job), str(output)],
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                timeout=TIME_LIMIT,
-                check=False,
+    try:
+        with scratch("picture") as folder:
+            job, output = folder / "stage.npz", folder / "image.npy"
+            np.savez(
+                job,
+                size=OVERSAMPLING * np.array(PANEL),
+                background=stage.background,
+                light=LIGHT,
+                shading=(SHADED, FULL),
+                lamp=camera.lamp,
+                corners=stage.corners,
+                normals=stage.normals,
+                shares=stage.shares,
+                colours=np.zeros(0) if stage.colours is None else stage.colours,
+                table=stage.table,
+                arrows=stage.arrows,
+                arrow_normals=stage.arrow_normals,
+                center=camera.center,
+                toward=camera.toward,
+                up=camera.up,
+                distance=4.0 * camera.pixel * max(PANEL),
+                half_height=0.5 * camera.pixel * PANEL[1],
             )
-        except (subprocess.TimeoutExpired, OSError):
-            return None
-        if done.returncode != 0 or not output.exists():
-            return None
-        image: Image = np.load(output)
+            done = run_child([*RENDERER, str(job), str(output), str(os.getpid())], folder, TIME_LIMIT)
+            if done.returncode != 0 or not output.exists():
+                return None
+            image: Image = np.load(output)
+    except (subprocess.TimeoutExpired, OSError):
+        return None
     expected = (OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3)
     # A broken driver may also return without an error and leave the window empty.
     blank = image.shape != expected or bool((image == image[0, 0]).all())

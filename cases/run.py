@@ -1,7 +1,6 @@
 """One run: solve a case and write what it asks for, whole or not at all."""
 
 import json
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,11 +11,12 @@ from tetlux.cases.compare_picture import draw_comparison
 from tetlux.cases.picture import Scene, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply
+from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.results import Results, results_of, surface_values, volume_values
 from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
 from tetlux.fem.solve import solve_each
-from tetlux.meshing.errors import RunError
+from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files import write_mesh
 
 Report = Callable[[str], None]
@@ -24,13 +24,15 @@ FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.p
 READINGS = "detectors.csv"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
+# The summary last: see `publish`.
+ALL_FILES = (*FILES.values(), READINGS, *COMPARISON, SUMMARY)
 
 
 def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: bool = True) -> Path:
     """Solve a case and write its results.
 
-    Results are written into a folder beside the final one and moved there when all are complete, the
-    summary last: where there is a summary, the run was finished.
+    They are written into a folder beside the final one, which they replace when all are complete: where there is a
+    summary, the run was finished.
 
     Parameters
     ----------
@@ -50,29 +52,30 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
     Raises
     ------
     RunError
-        If the mesher or the solver fails, or the results cannot be written.
+        If the mesher or the solver fails, memory runs out, another run is at work on the same case, or the results
+        cannot be written.
     """
-    started = time.perf_counter()
-    solutions = solve_each(
-        case.surface,
-        [channel.medium for channel in case.channels],
-        [list(channel.lights.values()) for channel in case.channels],
-        regions=case.regions,
-        tolerance=case.tolerance,
-        cache=cache,
-        report=report,
-    )
-    target = out / case.name
+    started, target = time.perf_counter(), out / case.name
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=out) as folder:
-            warnings = _write(results_of(case, solutions), Path(folder), started)
-            target.mkdir(parents=True, exist_ok=True)
-            _move(Path(folder), target)
-    except OSError as error:
-        raise RunError(
-            f"results cannot be written to {target}: {error.strerror or error}; choose another folder with --out."
-        ) from error
+        with claimed(out, case.name) as folder:
+            solutions = solve_each(
+                case.surface,
+                [channel.medium for channel in case.channels],
+                [list(channel.lights.values()) for channel in case.channels],
+                regions=case.regions,
+                tolerance=case.tolerance,
+                cache=cache,
+                report=report,
+            )
+            try:
+                warnings = _write(results_of(case, solutions), folder, started)
+                publish(folder, target, ALL_FILES)
+            except OSError as error:
+                raise cannot_write(target, error) from error
+    except (MemoryError, RuntimeError) as error:
+        if not memory_ran_out(error):
+            raise
+        raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
     for warning in warnings:
         report(f"note: {warning}")
     return target
@@ -138,14 +141,3 @@ def _warnings(results: Results) -> list[str]:
             for warning, whose in told.items()
         ),
     ]
-
-
-def _move(folder: Path, target: Path) -> None:
-    """Replace an earlier run's results by this one's, never leaving a summary beside another run's files."""
-    (target / SUMMARY).unlink(missing_ok=True)
-    for name in (*FILES.values(), READINGS, *COMPARISON):
-        if (folder / name).exists():
-            (folder / name).replace(target / name)
-        else:
-            (target / name).unlink(missing_ok=True)
-    (folder / SUMMARY).replace(target / SUMMARY)

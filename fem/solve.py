@@ -12,6 +12,7 @@ from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
+from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, sources_of
@@ -119,7 +120,7 @@ def solve(
         Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.limiter`.
     most_tetrahedra : int
         Where refinement stops even if the tolerance is not met; the solution then carries a warning. The
-        mesher's own mesh, of some thousands, is the least.
+        mesher's own mesh, of some thousands, is the least. It stops earlier where memory is scarce.
     cache : bool
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
@@ -135,7 +136,7 @@ def solve(
     InputError
         If the tolerance, the body's size or a light is not sensible: see each light.
     RunError
-        If the mesher or the linear solver fails.
+        If the mesher or the linear solver fails, or the mesh needs more memory than there is.
 
     Notes
     -----
@@ -222,20 +223,22 @@ def solve_each(
         ]
     work = _Work(surface, inner, media, sources, mass, limit, watch)
     given = mesh is not None
+    size = len(set(media)), sum(map(len, scenes))
+    most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
     if mesh is None:
         with watch.stage("mesh"):
             mesh = tetrahedralize(surface, inner, cache=cache)
             lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
+    check_memory(len(mesh.tetrahedra), *size)
     steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
-    limit = None if given else most_tetrahedra
     seconds = watch.read()
     return [
         replace(
             step.solution,
             seconds=seconds,
-            warnings=_warnings(step.solution, sources[scene], tolerance, limit)
+            warnings=_warnings(step.solution, sources[scene], tolerance, "on the mesh given" if given else where)
             + warnings_for_regions(media[scene][1:]),
         )
         for scene, step in sorted(steps.items())
@@ -344,12 +347,11 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     return marked
 
 
-def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetrahedra: int | None) -> list[str]:
-    """What a user should know of a solution; the limit is None for a mesh that was given."""
+def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
+    """What a user should know of a solution, and where refinement stopped."""
     warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *sources.warnings]
     warnings += solution.warnings
     if solution.error_estimate > tolerance:
-        where = "on the mesh given" if most_tetrahedra is None else f"at the limit of {most_tetrahedra:,} tetrahedra"
         warnings.append(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
             f"{where}."

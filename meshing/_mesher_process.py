@@ -22,7 +22,7 @@ PR_SET_PDEATHSIG = 1
 def main() -> None:
     """Tetrahedralize ``input.npz`` of the working directory into ``output.npz``."""
     setting = json.loads(sys.argv[1])
-    _die_with(setting["parent"])
+    die_with(setting["parent"])
     # Also without this script's own folder, whose modules have everyday names.
     sys.path[:] = setting["paths"]
     import numpy as np  # noqa: PLC0415
@@ -42,8 +42,8 @@ def main() -> None:
     np.savez(Path("output.npz"), points=points, tetrahedra=tetrahedra)
 
 
-def _die_with(parent: int) -> None:
-    """On Linux, be killed when the parent is: fTetWild would go on for minutes."""
+def die_with(parent: int) -> None:
+    """On Linux, be killed when the parent is: this process would go on for minutes."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:

@@ -6,12 +6,12 @@ import json
 import os
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from tetlux.meshing.scratch import abandoned
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -19,24 +19,25 @@ from tetlux.meshing.tetmesh import TetMesh
 FORMAT = 2
 # Bytes; the entries that were used longest ago go first.
 LIMIT = 1_000_000_000
-# Seconds after which a half-written file was left by a process that died.
-ABANDONED = 86_400.0
 
 
-def cache_directory() -> Path:
-    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches."""
+def cache_directory() -> Path | None:
+    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches.
+
+    None if there is no such place: a container's user may have no home.
+    """
     own = os.environ.get("TETLUX_CACHE_DIR")
     if own:
         return Path(own)
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    elif os.name == "nt":
-        base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    else:
+    with contextlib.suppress(RuntimeError):
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "tetlux"
+        if os.name == "nt":
+            return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "tetlux"
         # The XDG specification: relative paths are to be ignored.
         given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        base = given if given.is_absolute() else Path.home() / ".cache"
-    return base / "tetlux"
+        return (given if given.is_absolute() else Path.home() / ".cache") / "tetlux"
+    return None
 
 
 def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: float | str) -> str:
@@ -70,11 +71,13 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
 
 def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
     """Keep a mesh under that name; do nothing where files cannot be written."""
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, MemoryError):
         directory.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=directory, suffix=".part", delete=False) as file:
-            part = Path(file.name)
-            try:
+        handle, name = tempfile.mkstemp(dir=directory, suffix=".part")
+        part = Path(name)
+        try:
+            # A full disk may show only as the file is closed.
+            with os.fdopen(handle, "wb") as file:
                 np.savez(
                     file,
                     points=mesh.points,
@@ -82,11 +85,11 @@ def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
                     regions=mesh.regions,
                     key=np.array(key),
                 )
-            except BaseException:
-                part.unlink()
-                raise
-        # Other processes see the whole entry or none.
-        part.replace(_entry(key, directory))
+            # Other processes see the whole entry or none.
+            part.replace(_entry(key, directory))
+        except BaseException:
+            part.unlink()
+            raise
         _make_room(directory)
 
 
@@ -102,7 +105,7 @@ def _make_room(directory: Path) -> None:
             status = path.stat()
             if path.suffix == ".npz":
                 found.append((status.st_mtime, status.st_size, path))
-            elif path.suffix == ".part" and status.st_mtime < time.time() - ABANDONED:
+            elif path.suffix == ".part" and abandoned(path):
                 path.unlink()
     total = sum(size for _, size, _ in found)
     for _, size, path in sorted(found, key=lambda entry: entry[0]):

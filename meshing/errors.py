@@ -11,3 +11,8 @@ class InputError(TetluxError, ValueError):
 
 class RunError(TetluxError, RuntimeError):
     """A sound request that could not be carried out: the mesher or the solver failed."""
+
+
+def memory_ran_out(error: BaseException) -> bool:
+    """Whether that is what an error says: Python has another one for a thread that there is no memory for."""
+    return isinstance(error, MemoryError) or str(error) == "can't start new thread"

@@ -6,7 +6,6 @@ import math
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
 from tetlux.meshing.repair import bodies, compact
+from tetlux.meshing.scratch import run_child, scratch
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
@@ -70,6 +70,7 @@ SECOND = 0.3
 INNER_DEVIATION = 0.03
 # A region whose inner ones leave it less than this share of its volume is filled by them.
 LEFT = 1e-6
+MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
 # Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
 DEBRIS = 1e-3
 
@@ -304,44 +305,44 @@ def _run_pytetwild(
     filtered: bool = True,
 ) -> tuple[FloatArray, IntArray]:
     """Points and tetrahedra; if not filtered, also those round the body."""
-    with tempfile.TemporaryDirectory(prefix="tetlux-mesher-", ignore_cleanup_errors=True) as folder:
-        job = Path(folder) / "input.npz"
-        np.savez(
-            job,
-            points=points,
-            faces=faces.astype(np.int32),
-            edge_length=edge_length,
-            epsilon=epsilon,
-            stop_energy=stop_energy,
-            filtered=filtered,
-        )
-        try:
-            done = subprocess.run(
-                [*MESHER, _whereabouts()],
-                cwd=folder,
-                # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
-                env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                timeout=max(seconds, 0.0),
-                check=False,
+    try:
+        with scratch("mesher") as folder:
+            np.savez(
+                folder / "input.npz",
+                points=points,
+                faces=faces.astype(np.int32),
+                edge_length=edge_length,
+                epsilon=epsilon,
+                stop_energy=stop_energy,
+                filtered=filtered,
             )
-        except subprocess.TimeoutExpired as error:
-            raise RunError(
-                f"{name}: the mesher was stopped after {time_limit:g} s; give a surface with fewer triangles, "
-                "a larger deviation, or a longer time limit."
-            ) from error
-        result = Path(folder) / "output.npz"
-        if done.returncode != 0 or not result.exists():
-            last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            cause = f"signal {-done.returncode}" if done.returncode < 0 else last
-            raise RunError(
-                f"{name}: the mesher failed ({cause}); repair or simplify the surface in a mesh editor and try again."
-            )
-        with np.load(result) as data:
-            return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
+            # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
+            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+            done = run_child([*MESHER, _whereabouts()], folder, seconds, environment)
+            result = folder / "output.npz"
+            if done.returncode != 0 or not result.exists():
+                raise _failed(name, done)
+            with np.load(result) as data:
+                return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
+    except subprocess.TimeoutExpired as error:
+        raise RunError(
+            f"{name}: the mesher was stopped after {time_limit:g} s; give a surface with fewer triangles, "
+            "a larger deviation, or a longer time limit."
+        ) from error
+    except OSError as error:
+        raise RunError(f"{name}: the mesher could not be run ({error.strerror or error}); {MAKE_ROOM}") from error
+
+
+def _failed(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
+    """What to say of a mesher that ended without a mesh."""
+    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+    cause = f"signal {-done.returncode}" if done.returncode < 0 else last
+    remedy = "repair or simplify the surface in a mesh editor and try again."
+    if last.startswith("OSError"):
+        remedy = MAKE_ROOM
+    elif done.returncode == -9:
+        remedy = "it was killed, as the system does when memory runs out: free some, or simplify the surface."
+    return RunError(f"{name}: the mesher failed ({cause}); {remedy}")
 
 
 def _whereabouts() -> str:

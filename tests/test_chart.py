@@ -370,7 +370,7 @@ def test_a_chart_that_cannot_be_written_leaves_the_old_one(
     assert [path.name for path in tmp_path.iterdir()] == ["chart.csv"]
     assert (tmp_path / "chart.csv").read_text() == "old"
     assert capsys.readouterr().err == (
-        f"tetlux: sphere failed: the chart cannot be written to {tmp_path}: No space left on device; "
+        f"tetlux: sphere failed: results cannot be written to {tmp_path}: No space left on device; "
         "choose another folder with --out.\n"
     )
 
@@ -408,7 +408,7 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
         (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),
         (
             ["sphere", "--out", "sweep.yaml"],
-            "results cannot be written to sweep.yaml; choose another folder with --out.",
+            "results cannot be written to sweep.yaml: Not a directory; choose another folder with --out.",
         ),
     ],
 )

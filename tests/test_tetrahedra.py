@@ -262,7 +262,7 @@ def test_the_envelope_follows_from_the_deviation_and_the_other_way(monkeypatch: 
 @pytest.mark.skipif(sys.platform != "linux", reason="PR_SET_PDEATHSIG is Linux's")
 def test_the_mesher_dies_with_its_parent() -> None:
     child = (
-        "import os, time; from tetlux.meshing._mesher_process import _die_with; _die_with(os.getppid());"
+        "import os, time; from tetlux.meshing._mesher_process import die_with; die_with(os.getppid());"
         "print(os.getpid(), flush=True); time.sleep(60)"
     )
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
