@@ -76,7 +76,7 @@ class PointSource:
             incident=self.power,
             points=position[None],
             powers=np.array([self.power]),
-            resolution=max(depth, 0.1 * medium.mean_free_path),
+            resolution=max(depth, min(0.1 * medium.mean_free_path, 0.02 * surface.diagonal)),
         )
 
 
