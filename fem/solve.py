@@ -12,6 +12,7 @@ from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, sources_of
@@ -223,16 +224,15 @@ def solve_each(
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
     limit = None if given else most_tetrahedra
+    found = []
+    for scene, step in sorted(steps.items()):
+        made = step.solution
+        validity = Validity(made.mesh, base_of(media[scene][0]), scenes[scene], sources[scene].deposits)
+        warnings = _warnings(made, validity, sources[scene], tolerance, limit)
+        warnings += warnings_for_regions(inner, media[scene])
+        found.append(replace(made, validity=validity, warnings=warnings))
     seconds = watch.read()
-    return [
-        replace(
-            step.solution,
-            seconds=seconds,
-            warnings=_warnings(step.solution, sources[scene], tolerance, limit)
-            + warnings_for_regions(media[scene][1:]),
-        )
-        for scene, step in sorted(steps.items())
-    ]
+    return [replace(solution, seconds=seconds) for solution in found]
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,9 +336,11 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     return marked
 
 
-def _warnings(solution: Solution, sources: Sources, tolerance: float, most_tetrahedra: int | None) -> list[str]:
+def _warnings(
+    solution: Solution, validity: Validity, sources: Sources, tolerance: float, most_tetrahedra: int | None
+) -> list[str]:
     """What a user should know of a solution; the limit is None for a mesh that was given."""
-    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *sources.warnings]
+    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, validity), *sources.warnings]
     if solution.error_estimate > tolerance:
         where = "on the mesh given" if most_tetrahedra is None else f"at the limit of {most_tetrahedra:,} tetrahedra"
         warnings.append(
