@@ -15,6 +15,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.validity_tables import (
     FADED,
     NearRow,
+    Spread,
     far_error,
     near_error,
     near_row,
@@ -80,8 +81,8 @@ class Validity:
     @cached_property
     def thin_errors(self) -> FloatArray:
         """Expected errors that come of the body's thickness under each facet of the boundary, (f,)."""
-        beam = any(entry.places is not None and entry.breadth >= FADED for entry in self._entries)
-        return thin_error(self.medium, self.thickness, beam=beam)
+        errors = [thin_error(self.medium, self.thickness, entry.spread) for entry in self._entries]
+        return np.max(errors, axis=0)
 
     @cached_property
     def middles(self) -> FloatArray:
@@ -124,6 +125,13 @@ class _Entry:
     breadth: float
     near: NearRow
 
+    @property
+    def spread(self) -> Spread:
+        """Over what it spreads."""
+        if self.places is None:
+            return "everywhere"
+        return "wide" if self.breadth >= FADED else "narrow"
+
     def distances(self, points: FloatArray) -> FloatArray:
         """Distances of points (q, 3) from it, (q,), mean free paths."""
         if self.places is None:
@@ -132,7 +140,7 @@ class _Entry:
 
     def errors(self, points: FloatArray) -> FloatArray:
         """Errors at points (q, 3) that come of being near it, (q,)."""
-        if self.breadth >= FADED:
+        if self.spread != "narrow":
             return np.zeros(len(points))
         # Within a wide beam the errors of its thin ones cancel, as they are of either sign. Held against Monte Carlo's
         # pencil on a half-space, spread over discs: within a factor of two up to a radius of 8.

@@ -92,7 +92,7 @@ def warnings_for(surface: Surface, validity: Validity) -> list[str]:
     if (near[close] > WORTH_SAYING).any():
         error = validity.mean(near * close) / validity.mean(close)
         found.append(
-            f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.2g} of the surface, "
+            f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
             f"diffusion itself is off by about {error:.0%}, whatever the mesh."
         )
     dim = far_error(medium, distances) > DIM
@@ -105,22 +105,21 @@ def warnings_for(surface: Surface, validity: Validity) -> list[str]:
 
 
 def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
-    medium, thickness = validity.medium, validity.thickness
     # The mean chord of a body is 4 V/S (Cauchy).
-    mean = 4.0 * surface.volume / surface.area / medium.mean_free_path
-    thin = thickness < THIN
-    if mean >= THIN and validity.mean(thin) <= NEGLIGIBLE_PART:
-        return []
-    error = validity.thin_errors
+    mean = 4.0 * surface.volume / surface.area / validity.medium.mean_free_path
+    errors = validity.thin_errors
     if mean < THIN:
         return [
             f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: expect "
-            f"the exitance off by {validity.mean(error):.0%} on average, transmitted light in particular."
+            f"the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more."
         ]
+    thin = validity.thickness < THIN
+    share = validity.mean(thin)
+    if share <= NEGLIGIBLE_PART or validity.mean(errors * thin) < WORTH_SAYING * share:
+        return []
     return [
-        f"{validity.mean(thin):.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the "
-        f"exitance there off by {validity.mean(error * thin) / validity.mean(thin):.0%}, and by more where it is "
-        "transmitted light."
+        f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there off "
+        f"by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more."
     ]
 
 

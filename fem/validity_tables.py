@@ -5,6 +5,8 @@ them they are interpolated, by the logarithm of ``1 - albedo``; outside of them 
 distances. Lengths are in transport mean free paths 1/sigma_t'.
 """
 
+from typing import Literal
+
 import numpy as np
 
 from tetlux.fem.medium import Medium
@@ -34,10 +36,15 @@ WIDE = ((0.07, 0.03, 0.01), (0.22, 0.07, 0.01))
 # A ball in a wide beam, the mean over its surface: rows by mean cosine, columns by diameter.
 DIAMETERS = (0.5, 1.0, 2.0, 4.0, 10.0, 20.0, 40.0)
 THIN = ((0.03, 0.05, 0.05, 0.05, 0.04, 0.02, 0.02), (0.57, 0.35, 0.14, 0.09, 0.07, 0.06, 0.05))
+# A pencil beam on a plate, the mean of both faces away from its axis: rows by mean cosine, columns by thickness.
+THICKNESSES = (0.5, 1.0, 2.0, 4.0, 8.0)
+PLATE = ((1.78, 0.79, 0.41, 0.20, 0.16), (1.16, 0.36, 0.10, 0.06, 0.06))
 # What is near has faded at the first distance, what is far begins at the second.
 FADED, BEGINS = 8.0, 4.0
 
 NearRow = FloatArray
+# Thin beams and points, beams wider than what is near, and light from everywhere.
+Spread = Literal["narrow", "wide", "everywhere"]
 
 
 def near_row(medium: Medium, cosine: float | None) -> NearRow:
@@ -68,13 +75,14 @@ def wide_error(medium: Medium) -> float:
     return float(_by_albedo(_between(medium.eta, INDICES, rows), medium))
 
 
-def thin_error(medium: Medium, thickness: FloatArray, *, beam: bool) -> FloatArray:
-    """Error where the body is so thick, in a wide beam or in other light.
+def thin_error(medium: Medium, thickness: FloatArray, light: Spread) -> FloatArray:
+    """Error where the body is so thick, beyond that of a thick one.
 
-    A wide beam grazes large bodies too somewhere, which is most of their error; other light does not.
+    Large bodies too are grazed by a wide beam somewhere, which is most of their error in it, and is left in.
     """
-    row = _between(medium.mean_cosine, COSINES, np.array(THIN))
-    return np.interp(thickness, DIAMETERS, row if beam else np.maximum(row - row[-1], 0.0))
+    columns, table = (THICKNESSES, PLATE) if light == "narrow" else (DIAMETERS, THIN)
+    row = _between(medium.mean_cosine, COSINES, np.array(table))
+    return np.interp(thickness, columns, row if light == "wide" else np.maximum(row - row[-1], 0.0))
 
 
 def _middles(rings: tuple[float, ...]) -> FloatArray:

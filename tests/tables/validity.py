@@ -15,10 +15,9 @@ import numpy as np
 
 from tests.tables.diffusion_against_monte_carlo import entered, line_under_a_beam, medium_of
 from tetlux.fem import Medium
-from tetlux.fem.exact import half_space, monte_carlo
-from tetlux.fem.exact.monte_carlo import SlabResult, SphereResult
+from tetlux.fem.exact import half_space, monte_carlo, slab
 from tetlux.fem.exact.quadrature import composite_rule, graded_rule
-from tetlux.fem.validity_tables import ALBEDOS, COSINES, DIAMETERS, FAR_RINGS, INDICES, NEAR_RINGS
+from tetlux.fem.validity_tables import ALBEDOS, COSINES, DIAMETERS, FAR_RINGS, INDICES, NEAR_RINGS, THICKNESSES
 from tetlux.meshing.arrays import FloatArray
 
 # Thicker than any light comes back from.
@@ -38,9 +37,8 @@ def ring_means(exitance: Callable[[FloatArray], FloatArray], edges: FloatArray) 
     return np.array(means)
 
 
-def off(model: FloatArray, run: SlabResult | SphereResult) -> FloatArray:
-    """Errors of a model, nan where Monte Carlo is blurred."""
-    truth, error = (run.front, run.front_error) if isinstance(run, SlabResult) else (run.exitance, run.standard_error)
+def off(model: FloatArray, truth: FloatArray, error: FloatArray) -> FloatArray:
+    """Errors of a model, nan where Monte Carlo, with this standard error, is blurred."""
     return np.where(error < BLURRED * truth, np.abs(model / np.where(truth > 0, truth, 1.0) - 1.0), np.nan)
 
 
@@ -50,7 +48,10 @@ def pencil(medium: Medium, edges: FloatArray, photons: int) -> tuple[FloatArray,
     share = entered(medium)
     point = ring_means(lambda rho: half_space.point_exitance(medium, depth=medium.mean_free_path, rho=rho), edges)
     line = ring_means(lambda rho: half_space.pencil_exitance(medium, rho=rho), edges)
-    return off(share * medium.albedo * point, run), off(share * line, run)
+    return (
+        off(share * medium.albedo * point, run.front, run.front_error),
+        off(share * line, run.front, run.front_error),
+    )
 
 
 def photons_for(albedo: float) -> int:
@@ -74,7 +75,7 @@ def point_sources(albedo: float, eta: float, photons: int) -> tuple[list[float],
             return half_space.point_exitance(medium, depth=depth, rho=rho)
 
         distances += np.hypot(depth, middles).tolist()
-        errors += off(ring_means(exitance, edges), run).tolist()
+        errors += off(ring_means(exitance, edges), run.front, run.front_error).tolist()
     return distances, errors
 
 
@@ -133,9 +134,37 @@ def thin() -> None:
             gamma = bins[:-1, None] + np.diff(bins)[:, None] * nodes
             sine = np.sin(gamma) * rule
             mean = (exitance(gamma.ravel()).reshape(gamma.shape) * sine).sum(axis=1) / sine.sum(axis=1)
-            error = off(mean, run)
+            error = off(mean, run.exitance, run.standard_error)
             known = np.isfinite(error)
             errors.append(float(weights[known] @ error[known] / weights[known].sum()))
+        print(f"    {text(np.array(errors))}  # g {g:g}")
+
+
+def plates() -> None:
+    print("\n## A pencil beam on a plate: mean over rings and faces, 1 to 8 from its axis, by thickness:", THICKNESSES)
+    edges = np.array([1.0, 2.0, 4.0, 8.0])
+    for g in COSINES:
+        errors = []
+        for thickness in THICKNESSES:
+            found = []
+            for eta in INDICES:
+                medium = medium_of(0.99, g, eta)
+                run = monte_carlo.slab(medium, thickness=thickness, light="pencil", edges=edges, photons=200_000)
+                faces: tuple[tuple[slab.Face, FloatArray, FloatArray], ...] = (
+                    ("front", run.front, run.front_error),
+                    ("back", run.back, run.back_error),
+                )
+                for face, truth, error in faces:
+
+                    def exitance(
+                        rho: FloatArray, medium: Medium = medium, length: float = thickness, face: slab.Face = face
+                    ) -> FloatArray:
+                        depth = min(1.0, 0.5 * length)
+                        return slab.point_exitance(medium, thickness=length, depth=depth, rho=rho, face=face)
+
+                    model = entered(medium) * medium.albedo * ring_means(exitance, edges)
+                    found.append(off(model, truth, error))
+            errors.append(np.nanmean(found))
         print(f"    {text(np.array(errors))}  # g {g:g}")
 
 
@@ -145,6 +174,7 @@ def main() -> None:
     print("# Expected errors of diffusion")
     near_and_far()
     thin()
+    plates()
     print(f"\nMade in {time.perf_counter() - started:.0f} s.", file=sys.stderr)
 
 
