@@ -54,24 +54,24 @@ class Validity:
     def at(self, points: FloatArray) -> FloatArray:
         """1 less the expected relative error of the exitance, not below 0, at points (q, 3) of the surface, (q,)."""
         _, facets, _ = self.mesh.closest_boundary(points)
-        return np.maximum(1.0 - self.errors(points, facets), 0.0)
+        return np.asarray(np.maximum(1.0 - self.errors(points, facets), 0.0))
 
     def errors(self, points: FloatArray, facets: IntArray) -> FloatArray:
         """Expected relative errors of the exitance at points (q, 3) of given facets of the boundary (q,), (q,)."""
         causes = [np.full(len(points), wide_error(self.medium)), self.thin_errors[facets]]
         causes += [far_error(self.medium, self.distances(points)), self.near_errors(points)]
-        return np.max(causes, axis=0)
+        return np.asarray(np.max(causes, axis=0))
 
     def distances(self, points: FloatArray) -> FloatArray:
         """How far points (q, 3) are from where light enters, or from a source, (q,), mean free paths.
 
         They are 0 where there is light from everywhere, diffuse or emitted.
         """
-        return np.min([entry.distances(points) for entry in self._entries], axis=0)
+        return np.asarray(np.min([entry.distances(points) for entry in self._entries], axis=0))
 
     def near_errors(self, points: FloatArray) -> FloatArray:
         """Expected errors of the exitance at points (q, 3) that come of being near a light, (q,)."""
-        return np.max([entry.errors(points) for entry in self._entries], axis=0)
+        return np.asarray(np.max([entry.errors(points) for entry in self._entries], axis=0))
 
     @cached_property
     def thickness(self) -> FloatArray:
@@ -82,7 +82,7 @@ class Validity:
     def thin_errors(self) -> FloatArray:
         """Expected errors that come of the body's thickness under each facet of the boundary, (f,)."""
         errors = [thin_error(self.medium, self.thickness, entry.spread) for entry in self._entries]
-        return np.max(errors, axis=0)
+        return np.asarray(np.max(errors, axis=0))
 
     @cached_property
     def middles(self) -> FloatArray:
@@ -142,8 +142,8 @@ class _Entry:
         """Errors at points (q, 3) that come of being near it, (q,)."""
         if self.spread != "narrow":
             return np.zeros(len(points))
-        # Within a wide beam the errors of its thin ones cancel, as they are of either sign. Held against Monte Carlo's
-        # pencil on a half-space, spread over discs: within a factor of two up to a radius of 8.
+        # Within a wide beam the errors of its thin ones cancel more and more, as they are of either sign: see the last
+        # table of `tests.tables.validity`. The rim of a beam wider than that is not seen.
         return near_error(self.near, np.hypot(self.distances(points), self.breadth))
 
 

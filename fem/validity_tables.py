@@ -54,7 +54,7 @@ def near_row(medium: Medium, cosine: float | None) -> NearRow:
 
 def near_error(row: NearRow, distance: FloatArray) -> FloatArray:
     """Errors at distances from a thin beam's entry, or a point source."""
-    return np.interp(distance, [*_middles(NEAR_RINGS), FADED], [*row, 0.0])
+    return np.asarray(np.interp(distance, [*_middles(NEAR_RINGS), FADED], [*row, 0.0]))
 
 
 def far_error(medium: Medium, distance: FloatArray) -> FloatArray:
@@ -82,12 +82,12 @@ def thin_error(medium: Medium, thickness: FloatArray, light: Spread) -> FloatArr
     """
     columns, table = (THICKNESSES, PLATE) if light == "narrow" else (DIAMETERS, THIN)
     row = _between(medium.mean_cosine, COSINES, np.array(table))
-    return np.interp(thickness, columns, row if light == "wide" else np.maximum(row - row[-1], 0.0))
+    return np.asarray(np.interp(thickness, columns, row if light == "wide" else np.maximum(row - row[-1], 0.0)))
 
 
 def _middles(rings: tuple[float, ...]) -> FloatArray:
     edges = np.array(rings)
-    return 0.5 * (edges[1:] + edges[:-1])
+    return np.asarray(0.5 * (edges[1:] + edges[:-1]))
 
 
 def _by_albedo(rows: FloatArray, medium: Medium) -> FloatArray:
@@ -97,6 +97,6 @@ def _by_albedo(rows: FloatArray, medium: Medium) -> FloatArray:
 
 def _between(value: float, knots: tuple[float, ...], rows: FloatArray) -> FloatArray:
     """Rows (k, ...) at ascending knots (k,), interpolated at a value."""
-    place = np.interp(value, knots, np.arange(len(knots)))
+    place = float(np.interp(value, knots, np.arange(len(knots))))
     low = min(int(place), len(knots) - 2)
     return np.asarray(rows[low] + (place - low) * (rows[low + 1] - rows[low]))

@@ -17,7 +17,17 @@ from tests.tables.diffusion_against_monte_carlo import entered, line_under_a_bea
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab
 from tetlux.fem.exact.quadrature import composite_rule, graded_rule
-from tetlux.fem.validity_tables import ALBEDOS, COSINES, DIAMETERS, FAR_RINGS, INDICES, NEAR_RINGS, THICKNESSES
+from tetlux.fem.validity_tables import (
+    ALBEDOS,
+    COSINES,
+    DIAMETERS,
+    FAR_RINGS,
+    INDICES,
+    NEAR_RINGS,
+    THICKNESSES,
+    near_error,
+    near_row,
+)
 from tetlux.meshing.arrays import FloatArray
 
 # Thicker than any light comes back from.
@@ -168,6 +178,30 @@ def plates() -> None:
         print(f"    {text(np.array(errors))}  # g {g:g}")
 
 
+def discs() -> None:
+    print("\n## A round beam (deposit: point; n 1.4, albedo 0.99) on a half-space, in its middle and outside its edge")
+    edges = np.concatenate([np.arange(0.0, 2.0, 0.05), np.arange(2.0, 6.0, 0.2), np.arange(6.0, 20.1, 0.5)])
+    middles, areas = np.sqrt(0.5 * (edges[1:] ** 2 + edges[:-1] ** 2)), np.pi * np.diff(edges**2)
+    turns = np.pi * (np.arange(64) + 0.5) / 64
+    for g in COSINES:
+        medium = medium_of(0.99, g, 1.4)
+        run = monte_carlo.slab(medium, thickness=HALF_SPACE, light="pencil", edges=edges, photons=400_000)
+        point = ring_means(lambda rho, medium=medium: half_space.point_exitance(medium, depth=1.0, rho=rho), edges)
+        point *= entered(medium) * medium.albedo
+        for radius in (0.5, 1.0, 2.0, 4.0, 8.0):
+            found = []
+            for outside in (-radius, 0.5, 1.0, 2.0):
+                away = radius + outside
+                # The share of each ring round this place that lies in the disc.
+                apart = away**2 + middles[:, None] ** 2 - 2.0 * away * middles[:, None] * np.cos(turns)
+                caught = areas * (apart < radius**2).mean(axis=1)
+                measured = abs(caught @ point / (caught @ run.front) - 1.0)
+                distance = np.hypot(max(outside, 0.0), radius)
+                expected = near_error(near_row(medium, g), np.array([distance]))[0]
+                found.append(f"{max(outside, 0.0):g} outside: {measured:.2f}, expected {expected:.2f}")
+            print(f"    g {g:g}, radius {radius:g}:", "; ".join(found).replace("0 outside", "middle", 1))
+
+
 def main() -> None:
     """Print all tables as the code has them."""
     started = time.perf_counter()
@@ -175,6 +209,7 @@ def main() -> None:
     near_and_far()
     thin()
     plates()
+    discs()
     print(f"\nMade in {time.perf_counter() - started:.0f} s.", file=sys.stderr)
 
 
