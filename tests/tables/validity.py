@@ -186,7 +186,11 @@ def discs() -> None:
     for g in COSINES:
         medium = medium_of(0.99, g, 1.4)
         run = monte_carlo.slab(medium, thickness=HALF_SPACE, light="pencil", edges=edges, photons=400_000)
-        point = ring_means(lambda rho, medium=medium: half_space.point_exitance(medium, depth=1.0, rho=rho), edges)
+
+        def exitance(rho: FloatArray, medium: Medium = medium) -> FloatArray:
+            return half_space.point_exitance(medium, depth=medium.mean_free_path, rho=rho)
+
+        point = ring_means(exitance, edges)
         point *= entered(medium) * medium.albedo
         for radius in (0.5, 1.0, 2.0, 4.0, 8.0):
             found = []
