@@ -103,6 +103,8 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
         values |= {
             f"exitance_{one}_{channel}": results.exitance(channel, one) for one in lights for channel in channels
         }
+    # What is to be trusted in every channel.
+    values["valid"] = np.min([solution.valid_on(results.surface.points) for solution in results.solutions], axis=0)
     if case.camera is not None:
         seen = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
         values["radiance"] = np.sum(seen, axis=0)

@@ -5,10 +5,14 @@ import platform
 from importlib.metadata import version
 from typing import Any
 
+import numpy as np
+
 from tetlux.cases.case import Channel
 from tetlux.cases.results import Results, lights_in
 from tetlux.fem.coefficients import base_of
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.solution import Power, Solution
+from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
 
@@ -62,6 +66,7 @@ def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several
         },
         "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
         "error_estimate": estimate if math.isfinite(estimate) else None,
+        **({"validity": _validity(solution.validity)} if solution.validity else {}),
     }
     if several:
         lights = lights_in(list(channel.lights), solution)
@@ -77,4 +82,17 @@ def _power(power: Power) -> dict[str, float]:
         "exited": power.exited,
         "ballistic": power.ballistic,
         "balance_error": power.balance_error,
+    }
+
+
+def _validity(validity: Validity) -> dict[str, float]:
+    """How far diffusion itself is to be trusted; means and shares are of the surface's area."""
+    valid = np.maximum(1.0 - validity.of_facets, 0.0)
+    return {
+        "albedo": validity.medium.albedo,
+        "least_thickness_in_mean_free_paths": float(validity.thickness.min()),
+        "share_thin": validity.mean(validity.thickness < THIN),
+        "share_near_light": validity.mean(validity.distances(validity.middles) < NEAR),
+        "mean_valid": validity.mean(valid),
+        "least_valid": float(valid.min()),
     }

@@ -7,9 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.fresnel import moments
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -71,6 +73,8 @@ class Solution:
         Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.limiter`.
     of_lights : tuple of Solution
         What each light adds, in their order, if there are several.
+    validity : Validity, optional
+        How far the diffusion approximation itself is to be trusted; of all lights together.
     """
 
     mesh: TetMesh
@@ -85,6 +89,7 @@ class Solution:
     warnings: list[str] = field(default_factory=list)
     moved: float = 0.0
     of_lights: "tuple[Solution, ...]" = ()
+    validity: Validity | None = None
 
     @cached_property
     def exitance(self) -> FloatArray:
@@ -125,6 +130,28 @@ class Solution:
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
         return self._exitance_of(self._interpolated(queries, cells, corners, weights), transmitted)
+
+    def valid_at(self, points: FloatArray) -> FloatArray:
+        """How far the diffusion approximation is to be trusted at the points of the surface nearest to given points.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+
+        Returns
+        -------
+        (q,) ndarray
+            1 less the expected relative error of the exitance, not below 0: see `tetlux.fem.local_validity`. It is the
+            error of the model, which no mesh makes smaller; that of the mesh is `error_estimate`.
+        """
+        queries, _ = self.surface.project(np.asarray(points, dtype=float).reshape(-1, 3))
+        return self.valid_on(queries)
+
+    def valid_on(self, queries: FloatArray) -> FloatArray:
+        """`valid_at` points (q, 3) that lie on the surface, (q,)."""
+        if self.validity is None:
+            raise InputError("validity is that of all lights together; ask the whole solution, not one of of_lights.")
+        return self.validity.at(queries)
 
     def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> FloatArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""

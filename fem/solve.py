@@ -12,6 +12,7 @@ from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
@@ -233,16 +234,17 @@ def solve_each(
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     check_memory(len(mesh.tetrahedra), *size)
     steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
+    if given:
+        where = "on the mesh given"
+    found = []
+    for scene, step in sorted(steps.items()):
+        made = step.solution
+        validity = Validity(made.mesh, base_of(media[scene][0]), scenes[scene], sources[scene].deposits)
+        warnings = _warnings(made, validity, sources[scene], tolerance, where)
+        warnings += warnings_for_regions(inner, media[scene])
+        found.append(replace(made, validity=validity, warnings=warnings))
     seconds = watch.read()
-    return [
-        replace(
-            step.solution,
-            seconds=seconds,
-            warnings=_warnings(step.solution, sources[scene], tolerance, "on the mesh given" if given else where)
-            + warnings_for_regions(media[scene][1:]),
-        )
-        for scene, step in sorted(steps.items())
-    ]
+    return [replace(solution, seconds=seconds) for solution in found]
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,9 +349,9 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     return marked
 
 
-def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
+def _warnings(solution: Solution, validity: Validity, sources: Sources, tolerance: float, where: str) -> list[str]:
     """What a user should know of a solution, and where refinement stopped."""
-    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, solution.medium), *sources.warnings]
+    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, validity), *sources.warnings]
     warnings += solution.warnings
     if solution.error_estimate > tolerance:
         warnings.append(

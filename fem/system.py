@@ -7,13 +7,14 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, coefficients_on
+from tetlux.fem.coefficients import AnyMedium, Coefficients, base_of, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
@@ -127,7 +128,9 @@ class System:
         with watch.stage("surface"):
             sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
         solution, *_ = self._solved(sources, watch, None)
-        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
+        warnings = [*solution.warnings, *sources.warnings]
+        validity = Validity(self.mesh, base_of(self.medium), lights, sources.deposits)
+        return replace(solution, seconds=watch.read(), warnings=warnings, validity=validity)
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""

@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
+from tetlux.fem.validity_tables import far_error
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -11,7 +13,12 @@ from tetlux.meshing.surface import Surface
 SMALLEST_BODY = 0.5
 LARGEST_BODY = 2e4
 LOW_ALBEDO = 0.9
-THIN = 4.0
+# Mean free paths: a body thinner than the first is said to be, and so is what is nearer to the light than the second.
+THIN, NEAR = 4.0, 2.0
+# A part of the surface, and errors close to the light and far from it, that are worth a sentence.
+NEGLIGIBLE_PART, WORTH_SAYING, DIM = 0.05, 0.1, 0.25
+# A region that has less than this share of the scattering and absorption around it may be a void.
+VOID = 0.1
 
 
 def check_scattering(medium: Medium) -> None:
@@ -65,34 +72,72 @@ def check_media(surface: Surface, media: Sequence[AnyMedium]) -> None:
     check_size(surface, outer)
 
 
-def warnings_for(surface: Surface, medium: Medium) -> list[str]:
+def warnings_for(surface: Surface, validity: Validity) -> list[str]:
     """Plain sentences on where the diffusion approximation itself is off, with figures.
 
-    The figures are of diffusion against Monte Carlo: slabs under a wide beam, by reduced albedo and index, as
-    ``python -m tests.tables.diffusion_against_monte_carlo`` prints them.
+    The figures are of diffusion against Monte Carlo. Those by reduced albedo and index are of slabs under a wide beam,
+    as ``python -m tests.tables.diffusion_against_monte_carlo`` prints them; all others are those of
+    `tetlux.fem.validity_tables`.
     """
-    found = []
+    medium, found = validity.medium, []
     if medium.albedo < LOW_ALBEDO:
         found.append(
             f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for: expect "
             "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at an "
             "index of 1.4, and by more close to the light."
         )
-    # The mean chord of a body is 4 V/S (Cauchy).
-    thickness = 4.0 * surface.volume / surface.area / medium.mean_free_path
-    if thickness < THIN:
+    found += _of_thin_parts(surface, validity)
+    distances, near = validity.distances(validity.middles), validity.near_errors(validity.middles)
+    close = distances < NEAR
+    if (near[close] > WORTH_SAYING).any():
+        error = validity.mean(near * close) / validity.mean(close)
         found.append(
-            f"the body is {thickness:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: "
-            "transmitted light in particular will be off by tens of per cent."
+            f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
+            f"diffusion itself is off by about {error:.0%}, whatever the mesh."
+        )
+    dim = far_error(medium, distances) > DIM
+    if validity.mean(dim) > NEGLIGIBLE_PART:
+        found.append(
+            f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
+            f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}."
         )
     return found
 
 
-def warnings_for_regions(media: Sequence[AnyMedium]) -> list[str]:
-    """The same of the media of regions, in short."""
+def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
+    # The mean chord of a body is 4 V/S (Cauchy).
+    mean = 4.0 * surface.volume / surface.area / validity.medium.mean_free_path
+    errors = validity.thin_errors
+    if mean < THIN:
+        return [
+            f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: expect "
+            f"the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more."
+        ]
+    thin = validity.thickness < THIN
+    share = validity.mean(thin)
+    if share <= NEGLIGIBLE_PART or validity.mean(errors * thin) < WORTH_SAYING * share:
+        return []
     return [
-        f"region {number}: the reduced albedo is {base_of(medium).albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
-        "is good for; light that is absorbed there is only roughly right."
-        for number, medium in enumerate(media, 1)
-        if base_of(medium).albedo < LOW_ALBEDO
+        f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there off "
+        f"by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more."
     ]
+
+
+def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]) -> list[str]:
+    """The same of the media of regions, the body's own first, in short."""
+    outer, *inner = map(base_of, media)
+    found = []
+    for number, (surface, medium) in enumerate(zip(surfaces, inner, strict=True), 1):
+        across = 4.0 * surface.volume / surface.area / medium.mean_free_path
+        if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
+            found.append(
+                f"region {number}: it is {across:.2g} of its mean free paths thick and scatters much less than what is "
+                "around it; light does not diffuse through such a void, and what comes through or past it is only a "
+                "guess."
+            )
+        elif medium.albedo < LOW_ALBEDO:
+            found.append(
+                f"region {number}: the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
+                "is good for; light that is absorbed there is only roughly right."
+            )
+    return found

@@ -121,6 +121,15 @@ def test_the_surface_has_the_exitance_of_each(finished: Finished) -> None:
     assert values["exitance_beam_red"].max() > 1.5 * values["exitance_beam_green"].max()
 
 
+def test_the_surface_has_what_is_valid_in_all_channels(finished: Finished) -> None:
+    values, points = finished.surface.point_data, finished.surface.points
+    each = [solution.valid_at(points) for solution in finished.solutions]
+    np.testing.assert_allclose(values["valid"], np.min(each, axis=0), rtol=1e-6, atol=1e-6)
+    # Near the beam, that one; far away the channel that absorbs most.
+    assert not np.allclose(values["valid"], each[0])
+    assert [channel["validity"]["least_valid"] < 0.6 for channel in finished.summary["channels"]] == [True, True, False]
+
+
 def test_the_surface_has_radiance_towards_the_camera(finished: Finished) -> None:
     values, points = finished.surface.point_data, finished.surface.points
     eye = finished.case.camera
@@ -197,7 +206,7 @@ def test_one_channel_and_one_light_have_no_names_beside(tmp_path: Path) -> None:
     )
     (case,) = load_cases(tmp_path / "plain.yaml")
     folder = run_case(case, tmp_path / "out")
-    assert sorted(meshio.read(folder / "surface.ply").point_data) == ["exitance", "radiance"]
+    assert sorted(meshio.read(folder / "surface.ply").point_data) == ["exitance", "radiance", "valid"]
     summary = json.loads((folder / "summary.json").read_text())
     assert "lights" not in summary["channels"][0]
     assert "preview_white" not in summary

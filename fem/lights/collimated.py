@@ -73,7 +73,7 @@ class CollimatedBeam:
         apart = surface.diagonal / np.sqrt(LOOKS)
         # What is smaller than its depth in a spot is blurred; the spot itself may be a thin beam.
         narrow = np.inf if self.spot is None else max(0.5 * self.spot.reach, 0.5 * depth)
-        return Deposit(resolution=min(max(depth, apart), narrow), lit=lit, on_mesh=self._on_mesh)
+        return Deposit(resolution=min(max(depth, apart), narrow), lit=lit, entries=lit, on_mesh=self._on_mesh)
 
     def entries(self, surface: Surface) -> FloatArray:
         """Some of the places where the light meets the body first, (q, 3)."""

@@ -56,6 +56,8 @@ class Deposit:
         Length near the deposit that a mesh has to resolve, unit.
     lit : (p, 3) ndarray
         Other places near which it has to.
+    entries : (e, 3) ndarray
+        Some of the places where beams enter the body.
     warnings : tuple of str
     on_mesh : callable, optional
         What comes to it on a mesh.
@@ -78,6 +80,7 @@ class Deposit:
     emission: float | FloatArray = 0.0
     resolution: float = np.inf
     lit: FloatArray = field(default_factory=_no_vectors)
+    entries: FloatArray = field(default_factory=_no_vectors)
     warnings: tuple[str, ...] = ()
     on_mesh: Callable[[TetMesh, Surface, Coefficients], "Deposit"] | None = None
 
@@ -109,6 +112,7 @@ def together(parts: Sequence[Deposit]) -> Deposit:
         emission=sum((p.emission for p in parts), 0.0),
         resolution=min(p.resolution for p in parts),
         lit=np.vstack([p.lit for p in parts]),
+        entries=np.vstack([p.entries for p in parts]),
         warnings=tuple(w for p in parts for w in p.warnings),
         on_mesh=None
         if not on_mesh

@@ -107,6 +107,7 @@ class PencilBeam:
             else _as_line(inside, surface, medium, uniform=uniform),
             incident=float(met.powers.sum()),
             specular=specular,
+            entries=points,
         )
         warnings = list(deposit.warnings)
         if len(points) < count:
