@@ -23,6 +23,7 @@ from tetlux.fem.region import Region
 from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import exists
 from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
@@ -131,11 +132,12 @@ def find_case_file(request: str) -> Path:
     """A path as given, or the shipped case file of that name where there is no such path."""
     path = Path(request)
     shipped = library_folder() / f"{request}.yaml"
-    if not path.exists() and path.name == request and shipped.is_file():
+    known = exists(path)
+    if not known and path.name == request and shipped.is_file():
         return shipped
-    if not path.exists() and path.name == request and not path.suffix:
-        known = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
-        raise InputError(f"{request} is neither a file nor one of the cases that ship: {known}.")
+    if not known and path.name == request and not path.suffix:
+        names = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
+        raise InputError(f"{request} is neither a file nor one of the cases that ship: {names}.")
     if path.suffix.lower() in SUFFIXES:
         raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
     return path

@@ -14,6 +14,7 @@ from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import is_file, is_folder
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 if TYPE_CHECKING:
@@ -102,8 +103,11 @@ def read_image_field(
         If an image is missing, unreadable or not grey, or they differ in size or depth.
     """
     path = Path(path)
-    if path.is_dir():
-        files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=_in_order)
+    if is_folder(path):
+        try:
+            files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES and is_file(f)), key=_in_order)
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror}.") from error
         if not files:
             raise InputError(f"{path} holds no images; give a folder of PNG or TIFF slices.")
     else:
@@ -163,7 +167,7 @@ def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vecto
 
 def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} does not exist or is no file; check its path.")
     if path.suffix.lower() not in suffixes:
         raise InputError(f'{path}: "{path.suffix}" files are not read here; give {" or ".join(suffixes)}.')

@@ -9,6 +9,7 @@ from tetlux.cases.colours import LUMINANCE, to_linear
 from tetlux.cases.schema_parts import Encoding
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import is_file
 
 # White of Pillow's grey images of more than 8 bits.
 DEEP = {"I;16": 65535.0, "I;16B": 65535.0, "I": 65535.0}
@@ -36,7 +37,7 @@ def read_pixels(path: Path, encoding: Encoding) -> FloatArray:
     """
     from PIL import Image  # noqa: PLC0415
 
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} does not exist or is no file; check its path.")
     try:
         # Of what a file cut short lacks, Pillow only warns.

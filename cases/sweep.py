@@ -27,7 +27,7 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
         del data["sweep"]
         keys: dict[Key, int] = {}
         for key, value in zip(spec.sweep, values, strict=True):
-            keys[_assign(document, data, key, value)] = document.lines["sweep", key]
+            keys[_assign(document, data, key, value)] = document.line(("sweep", key)) or 1
         label = ",".join(f"{k}={v}" for k, v in zip(spec.sweep, values, strict=True))
         runs.append((label.replace("/", "_"), data, keys))
     return runs
@@ -35,7 +35,7 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
 
 def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
     """Set a dotted key (list items by their number); it may be new, what holds it may not."""
-    parts: Key = tuple(int(p) if p.isdigit() else p for p in key.split("."))
+    parts: Key = tuple(int(p) if p.isdecimal() else p for p in key.split("."))
     holder: Any = data
     try:
         for part in parts[:-1]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import is_file
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 SUFFIXES = (".vtu", ".msh")
@@ -37,7 +38,7 @@ def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
     import meshio  # noqa: PLC0415
 
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} does not exist; check the path of the mesh file.")
     _check_suffix(path)
     try:

@@ -6,6 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import exists, is_file, is_folder
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.surface import Surface
 
@@ -37,10 +38,11 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0) -> S
     if not np.isfinite(scale) or scale <= 0:
         raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
     try:
-        if path.is_dir():
+        if is_folder(path):
             raise InputError(f"{path} is a folder; give a surface file ({', '.join(SUFFIXES)}).")
-        if not path.exists():
-            raise InputError(f"{path} does not exist; check the path of the surface file.")
+        if not is_file(path):
+            found = "is no file but a device" if exists(path) else "does not exist"
+            raise InputError(f"{path} {found}; check the path of the surface file.")
         if path.suffix.lower() not in SUFFIXES:
             raise InputError(f'{path}: "{path.suffix}" files are not read; give one of {", ".join(SUFFIXES)}.')
         if path.stat().st_size == 0:

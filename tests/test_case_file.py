@@ -91,7 +91,7 @@ def at(line: int) -> str:
             "  sigma_a: lots",
             at(5) + r"medium\.sigma_a: expected a number, but found 'lots'",
         ),
-        ("  sigma_a: 1e-1", "  sigma_a: yes", at(5) + r"medium\.sigma_a: expected a number, but found True"),
+        ("  sigma_a: 1e-1", "  sigma_a: yes", at(5) + r"medium\.sigma_a: expected a number, but found true"),
         ("  sigma_a: 1e-1", "  sigma_a: .nan", at(5) + r"medium\.sigma_a: .*finite"),
         ("  sigma_a: 1e-1\n", "", at(4) + r"medium\.sigma_a: this key is missing"),
         ("  eta: 1.4", "  eta: 1.4\n  sigma_s: 3", at(8) + r"medium\.sigma_s: .*given together"),
