@@ -30,7 +30,8 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event = self.peek_event()
         if getattr(event, "tag", None) is not None:
-            raise ConstructorError(None, None, f'tags such as "{event.tag}" are not read here; write plain values', event.start_mark)
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            raise ConstructorError(None, None, f'tags such as "{tag}" are not read here; write plain values', event.start_mark)
         self._nodes += 1
         if self._nodes > 2 * MOST_KEYS:
             raise ConstructorError(None, None, f"more than {MOST_KEYS:,} keys; a case file is a few lines", None)

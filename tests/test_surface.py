@@ -20,7 +20,7 @@ from tetlux.meshing import (
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.proximity import cross_segments, overlapping_boxes
-from tetlux.meshing.repair import count_self_intersections
+from tetlux.meshing.crossings import count_self_intersections
 
 
 @pytest.fixture
