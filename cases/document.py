@@ -1,7 +1,7 @@
 """A YAML document that knows the line of every key."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,8 +98,14 @@ class Document:
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
 
     @contextmanager
-    def at(self, key: Key, *names: str) -> Iterator[None]:
-        """Within this, an error is one of the value at a key, or of one of `names` in it that its message begins with.
+    def at(self, key: Key, names: Mapping[str, Key] | None = None) -> Iterator[None]:
+        """Within this, an error is one of the value at a key, or at that of the name that its message begins with.
+
+        Parameters
+        ----------
+        key : Key
+        names : mapping of str to Key, optional
+            Of what lies within, where in it that is.
 
         Raises
         ------
@@ -109,8 +115,9 @@ class Document:
         try:
             yield
         except InputError as error:
-            word = str(error).split(maxsplit=1)[0]
-            raise self.error((*key, word) if word in names else key, str(error)) from error
+            text = str(error)
+            found = [within for name, within in (names or {}).items() if text.startswith((f"{name} ", f"{name}:"))]
+            raise self.error((*key, *found[0]) if found else key, text) from error
 
 
 def dotted(key: Key) -> str:

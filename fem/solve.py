@@ -14,7 +14,7 @@ from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
-from tetlux.fem.sources import Sources, Subtract, sources_of
+from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
@@ -192,6 +192,10 @@ def solve_each(
     """
     if not 1e-4 <= tolerance < 1:
         raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+    if not isinstance(scenes, Sequence):
+        raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
+    for lights in scenes:
+        check_list(lights)
     if len(scenes) == 0:
         raise InputError("there is no scene; give the lights of at least one.")
     if isinstance(body, TetMesh):

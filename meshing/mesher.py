@@ -83,7 +83,7 @@ def tetrahedralize(
     epsilon: float | None = None,
     stop_energy: float = STOP_ENERGY,
     time_limit: float = 600.0,
-    cache: bool | Path = True,
+    cache: bool | str | Path = True,
 ) -> TetMesh:
     """Fill a closed surface with tetrahedra that fit the closed surfaces within.
 
@@ -111,7 +111,7 @@ def tetrahedralize(
         fTetWild's AMIPS energy at which a tetrahedron is good enough; 3 is a regular one.
     time_limit : float
         Seconds until the mesher is stopped.
-    cache : bool or Path
+    cache : bool, str or Path
         Whether meshes are looked up and kept in the user's cache directory, or another directory for them.
 
     Returns
@@ -146,7 +146,7 @@ def tetrahedralize(
         by_default = min(DEVIATION * size, DEVIATION_OF_THICKNESS * thickness)
         deviation = by_default if epsilon is None else epsilon * size / ENVELOPE
     envelope = ENVELOPE * deviation if epsilon is None else epsilon * size
-    directory = None if cache is False else cache_directory() if cache is True else cache
+    directory = None if cache is False else cache_directory() if cache is True else Path(cache)
     key = ""
     if directory is not None:
         key = mesh_key(

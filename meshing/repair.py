@@ -113,8 +113,11 @@ def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> t
             f"{name}: {bad} of {len(vertices)} vertices are not finite (NaN or infinity); repair the file."
         )
     largest = float(np.abs(vertices).max())
-    if largest == 0:
-        raise InputError(f"{name}: all vertices are at the origin; give a closed triangle mesh.")
+    if (vertices == vertices[0]).all():
+        raise InputError(
+            f"{name}: all vertices are at one place; give a closed triangle mesh, and if it is of a body far from the "
+            "origin, move it there before it is written."
+        )
     if not 1 / LONGEST <= largest <= LONGEST:
         raise InputError(f"{name}: coordinates reach {largest:g}, absurdly far or near; check the scale and the unit.")
     return vertices, triangles
@@ -125,7 +128,8 @@ def _rounding(points: FloatArray) -> float:
     single = np.asarray(points, dtype=np.float32)
     largest = np.abs(points).max()
     unit = float(np.spacing(np.float32(largest)) if (single == points).all() else np.spacing(largest))
-    return unit / max(float(np.linalg.norm(np.ptp(points, axis=0))), np.finfo(float).tiny)
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return unit / diagonal if diagonal > 0 else 0.0
 
 
 def _merged(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[FloatArray, IntArray]:

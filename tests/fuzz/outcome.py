@@ -17,7 +17,7 @@ from tetlux.cases.cli import main
 LIMIT = 20.0
 # Words that no user should read.
 JARGON = re.compile(
-    r"Traceback|NoneType|Errno|<class|has no attribute|object at 0x|datetime\.|dtype|\bint\b|\bstr\b|pydantic|ndarray"
+    r"Traceback|NoneType|Errno|<class|has no attribute|object at 0x|datetime\.|dtype|(?<!!!)\bint\b|(?<!!!)\bstr\b|pydantic|ndarray"
 )
 LONGEST_SENTENCE = 1_000
 
