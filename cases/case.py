@@ -23,6 +23,7 @@ from tetlux.fem.region import Region
 from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.paths import exists
 from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.regions import check_regions
@@ -178,6 +179,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     reader.seconds = 0.0
     with document.at(("surface",)):
         surface = reader.surface(spec.surface, spec.unit)
+        check_thickness(surface)
     channels = channel_names(document, spec)
     media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
     with document.at(("surface",)):

@@ -31,12 +31,16 @@ class _Loader(yaml.SafeLoader):
         event = self.peek_event()
         if getattr(event, "tag", None) is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
-            raise ConstructorError(None, None, f'tags such as "{tag}" are not read here; write plain values', event.start_mark)
+            raise ConstructorError(
+                None, None, f'tags such as "{tag}" are not read here; write plain values', event.start_mark
+            )
         self._nodes += 1
         if self._nodes > 2 * MOST_KEYS:
             raise ConstructorError(None, None, f"more than {MOST_KEYS:,} keys; a case file is a few lines", None)
         if self._depth > DEEPEST:
-            raise ConstructorError(None, None, f"nested more than {DEEPEST} deep; a case file is flatter", event.start_mark)
+            raise ConstructorError(
+                None, None, f"nested more than {DEEPEST} deep; a case file is flatter", event.start_mark
+            )
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1

@@ -34,7 +34,8 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
         label = _label(dict(zip(spec.sweep, values, strict=True)))
         if len(label.encode()) > LONGEST_NAME:
             raise document.error(
-                ("sweep",), "the keys and values of a run make too long a name for its folder; sweep fewer keys at once."
+                ("sweep",),
+                "the keys and values of a run make too long a name of a folder; sweep fewer keys.",
             )
         if label in labels:
             raise document.error(("sweep",), f'two runs would be written to one folder, "{label}"; change a value.')

@@ -1,8 +1,10 @@
 """From a body, a medium and lights to a `Solution`: mesh, solve, estimate, refine."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from threading import Timer
 from typing import overload
 
 import numpy as np
@@ -20,7 +22,7 @@ from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.refine import refine
 from tetlux.meshing.regions import check_regions, region_at
 from tetlux.meshing.surface import Surface
@@ -38,6 +40,8 @@ SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
 SAFETY, POWER_SAFETY = 0.65, 0.4
 MOST_TETRAHEDRA = 1_000_000
+# Seconds after which a word is said of the mesher.
+SLOW = 8.0
 
 
 @overload
@@ -221,7 +225,8 @@ def solve_each(
     given = mesh is not None
     if mesh is None:
         with watch.stage("mesh"):
-            mesh = tetrahedralize(surface, inner, cache=cache)
+            with _told_if_slow(report):
+                mesh = tetrahedralize(surface, inner, cache=cache)
             lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
@@ -237,6 +242,19 @@ def solve_each(
         )
         for scene, step in sorted(steps.items())
     ]
+
+
+@contextmanager
+def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
+    """Say what takes so long, if the mesher does."""
+    words = f"still tetrahedralizing: thin parts and small regions take long; given up after {TIME_LIMIT:g} s"
+    timer = Timer(SLOW, report, [words])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @dataclass(frozen=True, eq=False)

@@ -107,8 +107,8 @@ def check_list(lights: Sequence[Light]) -> None:
     """
     if not isinstance(lights, Sequence):
         raise InputError(
-            f"lights are given in a list, and those of several scenes in a list of lists, but {lights!r} is none; write "
-            "[light], or [[light], [another]]."
+            f"lights are given in a list, and those of several scenes in a list of lists, but {lights!r} is none; "
+            "write [light], or [[light], [another]]."
         )
     for light in lights:
         if not hasattr(light, "deposit_in"):

@@ -1,4 +1,4 @@
-"""Where does a closed surface cross itself?"""
+"""Where does a closed surface cross itself? Counted, for a warning."""
 
 import numpy as np
 

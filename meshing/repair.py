@@ -21,6 +21,9 @@ LONGEST = 1e30
 MOST_RIMS = (300, 0.25)
 # More separate bodies than these are a surface that fell to pieces.
 MOST_BODIES = 1000
+# A surface that crosses itself at more triangles than these, and at more than this share of them, is a tangle: the
+# mesher would be at it for minutes.
+TANGLE = (100, 0.75)
 # Coordinates that are rounded to more than this share of the diagonal are worth a sentence.
 COARSE = 1e-4
 
@@ -76,6 +79,11 @@ def surface_from_arrays(
             "whether the surface crosses itself was not looked at, since too many of its triangles lie side by side, "
             "like the needles of a fan; evenly shaped triangles are quicker and more accurate."
         )
+    elif crossing > max(TANGLE[0], TANGLE[1] * len(faces)):
+        raise InputError(
+            f"{name}: the surface crosses itself at {crossing:,} of {len(faces):,} triangles, a tangle that bounds no "
+            "body; repair it in a mesh editor."
+        )
     elif crossing:
         warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
     if rounding > COARSE:
@@ -83,7 +91,8 @@ def surface_from_arrays(
             f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its size; "
             "move it to the origin where it was made, and write it again."
         )
-    overlaps = nested or bool(crossing)
+    # Walls between bodies that touch count on both sides.
+    overlaps = nested or bool(crossing) or bool((Edges(faces).triangles > 2).any())
     return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings), overlaps)
 
 
@@ -304,8 +313,8 @@ def _oriented(
     count = int(body.max()) + 1
     if count > MOST_BODIES:
         raise InputError(
-            f"{name}: the surface falls into {count:,} bodies that share no vertex, more than {MOST_BODIES:,}; merge its "
-            "vertices by distance in a mesh editor, or keep the largest bodies."
+            f"{name}: the surface falls into {count:,} bodies that share no vertex, more than {MOST_BODIES:,}; merge "
+            "its vertices by distance in a mesh editor, or keep the largest bodies."
         )
     order = np.argsort(body, kind="stable")
     parts = np.split(faces[order], np.flatnonzero(np.diff(body[order])) + 1)

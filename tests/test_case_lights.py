@@ -155,12 +155,24 @@ WRONG = [
     ("collimated: {direction: [0, 0, -1]}", "", r"lights\[0\]\.collimated: give irradiance or power, not neither"),
     ("collimated: {direction: [0, 0, -1], irradiance: 1, power: 1}", "", "give irradiance or power, not both"),
     ("collimated: {direction: [0, 0, -1], power: 1}", "", "power belongs to a spot"),
-    ("collimated: {direction: [0, 0, 0], irradiance: 1}", "", r"line 4: lights\[0\]\.collimated\.direction: direction is zero"),
-    ("collimated: {direction: [0, 0, -1], irradiance: -1}", "", r"lights\[0\]\.collimated\.irradiance: irradiance is -1"),
+    (
+        "collimated: {direction: [0, 0, 0], irradiance: 1}",
+        "",
+        r"line 4: .*\.collimated\.direction: direction is zero",
+    ),
+    (
+        "collimated: {direction: [0, 0, -1], irradiance: -1}",
+        "",
+        r"\.collimated\.irradiance: irradiance is -1",
+    ),
     (beam("spot: {disc: {center: [9, 0, 0], radius: 1}}"), "", r"lights\[0\]: the collimated light .* misses"),
     (beam("spot: {disc: {center: [0, 0, 0], radius: 0}}"), "", r"spot\.disc\.radius: expected a number greater than 0"),
     (beam("spot: {}"), "", r"lights\[0\]\.collimated\.spot: give exactly one of disc, gaussian, rectangle, image"),
-    (beam(SPOT.replace("FILE", "none.png")), "", r"lights\[0\]\.collimated\.spot\.image\.file: .*none\.png does not exist"),
+    (
+        beam(SPOT.replace("FILE", "none.png")),
+        "",
+        r"spot\.image\.file: .*none\.png does not exist",
+    ),
     (beam(SPOT.replace("FILE", "cube.yaml")), "", r"spot\.image\.file: .*cube\.yaml is not a readable image"),
     (beam(SPOT.replace("FILE", "black.png")), "", r"lights\[0\]: the image is black"),
     (
@@ -168,7 +180,11 @@ WRONG = [
         "",
         "the image is black in a channel that has power",
     ),
-    ("environment: {file: cube.yaml, brightest: 1}", "", r"lights\[0\]\.environment\.file: .*cube\.yaml is not a readable image"),
+    (
+        "environment: {file: cube.yaml, brightest: 1}",
+        "",
+        r"environment\.file: .*cube\.yaml is not a readable",
+    ),
     ("environment: {file: slide.png, brightest: 1, up: [0, 1, 0]}", "", r"lights\[0\]\.environment\.up: up and front"),
     (
         "emission: {density: 1, region: sgone}",
@@ -177,7 +193,11 @@ WRONG = [
     ),
     ("environment: {file: slide.png, brightest: 0}", "", r"lights\[0\]\.environment\.brightest: brightest is 0"),
     ("emission: {density: -1}", "", r"lights\[0\]\.emission\.density: density is -1"),
-    ("point: {position: [0, 0, 0], power: [0, 0]}", "", "lights: all lights are dark in channel 1; give one of them some power there"),
+    (
+        "point: {position: [0, 0, 0], power: [0, 0]}",
+        "",
+        "lights: all lights are dark in channel 1; give",
+    ),
     ("{name: all, " + POINT + "}", "", r'lights\[0\]: "all" is the sum'),
     ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" stands here twice'),
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),

@@ -11,7 +11,6 @@ import yaml
 from hypothesis import strategies as st
 from PIL import Image
 
-
 from tetlux.meshing import TetMesh, box
 from tetlux.meshing.files import write_mesh
 
@@ -90,7 +89,17 @@ WRONG: list[Any] = [
     *(None, True, False, 0, -1, 1, 2, 3, 0.5, -0.5, 1e-320, 1e-30, 1e30, 1e200, 1e308, 2**63, 2**64, 10**30, 10**400),
     *(float("nan"), float("inf"), -float("inf"), "", " ", "nan", "1", "-1e400", "true", "all", "body", "red", "."),
     *("..", "../..", "../../etc/passwd", "/dev/zero", "/dev/null", "/dev/stdin", "~", "cube.stl", "spot.png", "a/b"),
-    *("values.npy", "values.vtu", "x" * 300, "é", "漢字", "\u202e", "a\nb", "a\x00b", "\ud83d\ude00".encode("utf-16", "surrogatepass").decode("utf-16")),
+    *(
+        "values.npy",
+        "values.vtu",
+        "x" * 300,
+        "é",
+        "漢字",
+        "\u202e",
+        "a\nb",
+        "a\x00b",
+        "\ud83d\ude00".encode("utf-16", "surrogatepass").decode("utf-16"),
+    ),
     *([], {}, [[]], [None], [1], [1, 2], [1, 2, 3], [0, 0, 0], [1, 2, 3, 4], ["a"], [[1, 2], [3, 4]], {"a": 1}),
     *({"": ""}, {1: 2}, {None: None}, [{}], {"file": None}, b"\x00\xff", datetime.date(2001, 1, 1), {1, 2}),
     *(datetime.datetime(2001, 1, 1, 1, 1, 1), list(range(100)), [float("nan")] * 3, [1e200] * 3, [10**400] * 3),
@@ -119,7 +128,17 @@ anything = st.recursive(
 )
 wrong_values = st.one_of(st.sampled_from(WRONG), st.sampled_from(WRONG), anything)
 SCRAPS = [
-    *("\t", "\x00", "\ufeff", "&a ", "*a", "!!python/object/apply:os.system ['true'] ", "---\n", "...\n", "%YAML 9.9\n"),
+    *(
+        "\t",
+        "\x00",
+        "\ufeff",
+        "&a ",
+        "*a",
+        "!!python/object/apply:os.system ['true'] ",
+        "---\n",
+        "...\n",
+        "%YAML 9.9\n",
+    ),
     *("<<: *x\n", "!!binary x", "!!set ", "!!omap ", "!!timestamp 1 ", "? ", ": ", "- ", "{", "}", "[", "]", "#", "'"),
     *('"', "|", ">", "\r", "\x85", "\u2028", "`", "@", "0x", "1e", "!!int x ", "!!float y ", "!!null 3 ", "!x ", "= "),
 ]
@@ -170,7 +189,9 @@ def case_files(draw: st.DrawFn) -> bytes:
     data = copy.deepcopy(draw(st.sampled_from(RIGHT)))
     for _ in range(draw(st.integers(1, 3))):
         _mutate(draw, data)
-    text = yaml.safe_dump(data, allow_unicode=True, sort_keys=False, default_flow_style=draw(st.sampled_from([None, False])))
+    text = yaml.safe_dump(
+        data, allow_unicode=True, sort_keys=False, default_flow_style=draw(st.sampled_from([None, False]))
+    )
     if kind < 8:
         lines = text.splitlines(keepends=True)
         change, at = draw(st.integers(0, 4)), draw(st.integers(0, len(text)))
@@ -248,16 +269,70 @@ def traps() -> Iterator[tuple[str, bytes]]:
         *("!!python/object/new:os.system [x]", "!include /etc/passwd", "!!binary '&&&'", "!!timestamp 9", "!!int x"),
         *("!!float x", "!!bool x", "!!null x", "!!set {a, b}", "!!omap [a: 1]", "!!pairs [a: 1]", "!!str 3", "!<x> 3"),
         *("2001-99-99", "2001-01-01", "2001-01-01 99:99:99", "2001-01-01T00:00:00+99:99", "0x10", "0o17", "0b2"),
-        *("0x" + "f" * 5000, "0x" + "f" * 400, "0b" + "1" * 20_000, "9" * 4000, "9" * 5000, "1:30:00", "1e400", "-1e400"),
-        *("1:" * 5000 + "1", "yes", "off", "~", "=", "<<", "1_000", "0x_", "_1", "+.inf", ".NaN", "1e-400", "1.e+999999999999"),
+        *(
+            "0x" + "f" * 5000,
+            "0x" + "f" * 400,
+            "0b" + "1" * 20_000,
+            "9" * 4000,
+            "9" * 5000,
+            "1:30:00",
+            "1e400",
+            "-1e400",
+        ),
+        *(
+            "1:" * 5000 + "1",
+            "yes",
+            "off",
+            "~",
+            "=",
+            "<<",
+            "1_000",
+            "0x_",
+            "_1",
+            "+.inf",
+            ".NaN",
+            "1e-400",
+            "1.e+999999999999",
+        ),
         *("'\\ud800'", '"\\ud800"', '"\\0"', '"\\u202e"', '"\\x07"', '"a\\nb"', '"\\U0010ffff"', '"\\e[31m"', "[a, b"),
     ):
         for key in (b"tolerance", b"name", b"unit", b"surface", b"camera", b"sweep"):
             kept = b"".join(part for part in right.splitlines(keepends=True) if not part.startswith(key))
             yield f"{key.decode()}: {tag[:40]}", kept + b"\n" + key + b": " + tag.encode() + b"\n"
     for name in (
-        *("..", ".", "../up", "/tmp/x", "a/b", "a\\b", "~", "~root", "-rf", " x", "x ", "x.", "CON", "é" * 120, "漢" * 120),
-        *("a" * 120, "a" * 121, "$HOME", "`id`", "a;b", "a|b", "*", "?", "a:b", "%00", "%2e%2e", "😀", ".partial-x", "³"),
+        *(
+            "..",
+            ".",
+            "../up",
+            "/tmp/x",
+            "a/b",
+            "a\\b",
+            "~",
+            "~root",
+            "-rf",
+            " x",
+            "x ",
+            "x.",
+            "CON",
+            "é" * 120,
+            "漢" * 120,
+        ),
+        *(
+            "a" * 120,
+            "a" * 121,
+            "$HOME",
+            "`id`",
+            "a;b",
+            "a|b",
+            "*",
+            "?",
+            "a:b",
+            "%00",
+            "%2e%2e",
+            "😀",
+            ".partial-x",
+            "³",
+        ),
     ):
         yield f"name {name[:20]}", yaml.safe_dump({**RIGHT[0], "name": name}, allow_unicode=True).encode()
         yield f"swept name {name[:20]}", yaml.safe_dump({**RIGHT[0], "sweep": {"name": [name, "b"]}}).encode()
@@ -272,9 +347,28 @@ def traps() -> Iterator[tuple[str, bytes]]:
     yield "a label of more than 255 characters", yaml.safe_dump(lengthy).encode()
     for file in (
         *("/dev/zero", "/dev/null", "/dev/random", "/dev/stdin", "/dev/tty", "/proc/self/mem", "/proc/self/environ"),
-        *("/", ".", "..", "../../../../etc/passwd", "file:///etc/passwd", "http://localhost/x.stl", "x" * 5000, "a\x00b"),
+        *(
+            "/",
+            ".",
+            "..",
+            "../../../../etc/passwd",
+            "file:///etc/passwd",
+            "http://localhost/x.stl",
+            "x" * 5000,
+            "a\x00b",
+        ),
         *("loop.stl", "zero.stl", "zero.png", "zero.npy", "zero.vtu", "pipe.stl", "pipe.png", "pipe.npy", "pipe.vtu"),
-        *("folder.stl", "folder.png", "folder", "none.stl", "cube.STL", "CUBE.stl", "cube.stl/", "cube.stl/x", "~/x.stl"),
+        *(
+            "folder.stl",
+            "folder.png",
+            "folder",
+            "none.stl",
+            "cube.STL",
+            "CUBE.stl",
+            "cube.stl/",
+            "cube.stl/x",
+            "~/x.stl",
+        ),
     ):
         for place in ("surface", "spot", "environment", "array", "volume", "images"):
             data = copy.deepcopy(RIGHT[{"surface": 1, "spot": 1, "environment": 1, "images": 4}.get(place, 3)])

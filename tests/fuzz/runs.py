@@ -20,13 +20,19 @@ from tetlux.cases.case import load_cases
 LONGEST_NAME = 255
 
 
-def check_case_files(folder: Path, count: int, number: int = 0) -> Iterator[Outcome]:
-    """Check the traps, and as many case files more as hypothesis makes from a seed, no content twice."""
+def check_case_files(folder: Path, count: int) -> Iterator[Outcome]:
+    """Check the traps, and so many case files that hypothesis makes."""
     companions(folder)
     path = folder / "case.yaml"
     for name, content in traps():
         path.write_bytes(content)
         yield _within_the_folder(outcome_of(f"trap: {name}", ["check", str(path)]), path)
+    yield from check_made(folder, count)
+
+
+def check_made(folder: Path, count: int, number: int = 0) -> Iterator[Outcome]:
+    """Check so many case files that hypothesis makes from a seed, no content twice."""
+    path = folder / "case.yaml"
     for content in made(count, number):
         path.write_bytes(content)
         yield _within_the_folder(outcome_of(f"made: {content!r}", ["check", str(path)]), path)

@@ -61,7 +61,9 @@ def arrays_of(surface: Surface) -> Arrays:
     return surface.points, surface.faces
 
 
-def grid(rows: int, columns: int, place: Callable[[FloatArray, FloatArray], FloatArray], *, twist: bool = False) -> Arrays:
+def grid(
+    rows: int, columns: int, place: Callable[[FloatArray, FloatArray], FloatArray], *, twist: bool = False
+) -> Arrays:
     """A band of two triangles a cell, whose columns close on themselves, turned over if it is twisted."""
     u, v = np.meshgrid(np.arange(columns) / columns, np.linspace(0.0, 1.0, rows + 1))
     i, j = (x.ravel() for x in np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij"))
@@ -155,8 +157,9 @@ def bodies() -> Iterator[tuple[str, Arrays]]:
     yield "two cubes on a side", together(arrays_of(cube), (cube.points + [14.0, 0.0, 0.0], cube.faces))
     yield "two cubes on half a side", together(arrays_of(cube), (cube.points + [14.0, 7.0, 0.0], cube.faces))
     yield "two cubes a hair apart", together(arrays_of(cube), (cube.points + [14.0 + 1e-9, 0.0, 0.0], cube.faces))
-    yield "two cubes a hair into each other", together(
-        arrays_of(cube), (cube.points + [14.0 - 1e-6, 3.0, 2.0], cube.faces)
+    yield (
+        "two cubes a hair into each other",
+        together(arrays_of(cube), (cube.points + [14.0 - 1e-6, 3.0, 2.0], cube.faces)),
     )
     pinched = p.copy()
     pinched[np.abs(p[:, 2]) < 1.0] *= [1e-12, 1e-12, 1.0]
@@ -168,8 +171,17 @@ def bodies() -> Iterator[tuple[str, Arrays]]:
         yield f"noise of {roughness:g}", (p + random.normal(scale=roughness, size=p.shape), f)
     yield "vertices in any order", (random.permutation(p), f)
     yield "triangles at random", (p, random.integers(0, len(p), (300, 3)))
-    yield "a cloud of tetrahedra", together(
-        *((random.normal(size=(4, 3)) + random.normal(scale=8, size=3), np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])) for _ in range(40))
+    yield (
+        "a cloud of tetrahedra",
+        together(
+            *(
+                (
+                    random.normal(size=(4, 3)) + random.normal(scale=8, size=3),
+                    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+                )
+                for _ in range(40)
+            )
+        ),
     )
     for step in (0.0, 0.01, 5.0, 19.0, 19.99, 20.0, 20.01):
         yield f"two balls {step:g} apart", together((p, f), (p + [step, 0.0, 0.0], f))
@@ -218,16 +230,22 @@ def bodies() -> Iterator[tuple[str, Arrays]]:
         rim = np.column_stack([10 * np.cos(angle), 10 * np.sin(angle), np.zeros(sides)])
         i = np.arange(sides)
         j = (i + 1) % sides
-        yield f"{sides} needles in two fans", (
-            np.vstack([rim, [[0, 0, 10], [0, 0, -10]]]),
-            np.vstack([np.column_stack([i, j, np.full(sides, sides)]), np.column_stack([j, i, np.full(sides, sides + 1)])]),
+        yield (
+            f"{sides} needles in two fans",
+            (
+                np.vstack([rim, [[0, 0, 10], [0, 0, -10]]]),
+                np.vstack(
+                    [np.column_stack([i, j, np.full(sides, sides)]), np.column_stack([j, i, np.full(sides, sides + 1)])]
+                ),
+            ),
         )
     for inner in (0.5, 0.99, 0.999999, 1.0 - 1e-12, 0.01, 1e-6):
         yield f"a ball of {inner:.7g} within", together((p, f), (inner * p, f))
         yield f"a cavity of {inner:.7g} within", together((p, f), (inner * p, f[:, ::-1]))
     yield "five nested balls", together(*((s * p, f) for s in (1.0, 0.8, 0.6, 0.4, 0.2)))
-    yield "five nested balls, every other one inside out", together(
-        *((s * p, f if i % 2 == 0 else f[:, ::-1]) for i, s in enumerate((1.0, 0.8, 0.6, 0.4, 0.2)))
+    yield (
+        "five nested balls, every other one inside out",
+        together(*((s * p, f if i % 2 == 0 else f[:, ::-1]) for i, s in enumerate((1.0, 0.8, 0.6, 0.4, 0.2)))),
     )
     yield "a ball within that touches", together((p, f), (0.5 * p + 0.5 * p[0], f))
     yield "a cube within that touches a side", together(arrays_of(cube), (0.5 * cube.points + [3.5, 0, 0], cube.faces))
@@ -237,7 +255,10 @@ def bodies() -> Iterator[tuple[str, Arrays]]:
     )
     places = 5.0 * np.stack(np.meshgrid(*[np.arange(4)] * 3), axis=-1).reshape(-1, 3)
     yield "64 bodies", together(*((octahedron[0] + at, octahedron[1]) for at in places))
-    yield "a ball and 30 crumbs", together((p, f), *((1e-3 * octahedron[0] + 3.0 * p[i], octahedron[1]) for i in range(30)))
+    yield (
+        "a ball and 30 crumbs",
+        together((p, f), *((1e-3 * octahedron[0] + 3.0 * p[i], octahedron[1]) for i in range(30))),
+    )
     yield "a sheet", _sheet()
     yield "a sheet with two sides", (_sheet()[0], np.vstack([_sheet()[1], _sheet()[1][:, ::-1]]))
     for thickness in (0.0, 1e-12, 1e-9, 1e-6, 1e-3, 0.1, -0.1, -1.0):
@@ -246,7 +267,9 @@ def bodies() -> Iterator[tuple[str, Arrays]]:
     yield "a strip torn where it is twisted", grid(4, 60, _moebius)
     yield "a pipe without ends", grid(10, 24, _pipe)
     yield "a Klein bottle", _klein()
-    projective = np.array([[0, 1, 4], [0, 4, 3], [0, 3, 5], [0, 5, 2], [0, 2, 1], [1, 2, 3], [1, 3, 5], [1, 5, 4], [2, 5, 4], [2, 4, 3]])
+    projective = np.array(
+        [[0, 1, 4], [0, 4, 3], [0, 3, 5], [0, 5, 2], [0, 2, 1], [1, 2, 3], [1, 3, 5], [1, 5, 4], [2, 5, 4], [2, 4, 3]]
+    )
     yield "a projective plane", (10.0 * random.normal(size=(6, 3)), projective)
     corners = 10.0 * np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     four = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
@@ -333,7 +356,12 @@ def files() -> Iterator[Malformed]:  # noqa: PLR0915 - one trap a line
     square = b"".join(b"v %d %d %d\n" % (x, y, z) for x in (0, 9) for y in (0, 9) for z in (0, 9))
     quads = b"f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n"
     yield Malformed("OBJ of quads", "obj", square + quads, 15.0)
-    yield Malformed("OBJ that counts backwards", "obj", square + quads.translate(bytes.maketrans(b"", b"")).replace(b"f 1 2 4 3", b"f -8 -7 -5 -6"), 15.0)
+    yield Malformed(
+        "OBJ that counts backwards",
+        "obj",
+        square + quads.translate(bytes.maketrans(b"", b"")).replace(b"f 1 2 4 3", b"f -8 -7 -5 -6"),
+        15.0,
+    )
     yield Malformed("OBJ that counts from nought", "obj", square + b"f 0 1 3\nf 4 6 7\n")
     yield Malformed("OBJ with a far number", "obj", square + quads + b"f 1 2 99\n")
     yield Malformed("OBJ with a huge number", "obj", square + quads + b"f 1 2 99999999999999999999999\n")
@@ -356,12 +384,36 @@ def files() -> Iterator[Malformed]:  # noqa: PLR0915 - one trap a line
             content = head.format(form, vertices, faces, "uchar").encode()
             body = b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n" if form == "ascii" else bytes(36) + b"\x03" + bytes(12)
             yield Malformed(f"PLY, {form or 'no form'}, of {vertices} vertices, {faces} faces", "ply", content + body)
-    yield Malformed("PLY of a long list", "ply", head.format("binary_little_endian", 3, 1, "uint").encode() + bytes(36) + b"\xff" * 40)
-    yield Malformed("PLY without an end to its head", "ply", head.format("ascii", 3, 1, "uchar").encode()[:-11] + b"0 0 0\n" * 9)
-    yield Malformed("PLY of lists of floats", "ply", head.format("ascii", 3, 1, "float").encode() + b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    yield Malformed(
+        "PLY of a long list",
+        "ply",
+        head.format("binary_little_endian", 3, 1, "uint").encode() + bytes(36) + b"\xff" * 40,
+    )
+    yield Malformed(
+        "PLY without an end to its head", "ply", head.format("ascii", 3, 1, "uchar").encode()[:-11] + b"0 0 0\n" * 9
+    )
+    yield Malformed(
+        "PLY of lists of floats",
+        "ply",
+        head.format("ascii", 3, 1, "float").encode() + b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    )
     yield Malformed("PLY of unknown properties", "ply", right["ply"].replace(b"float x", b"quark x", 1))
-    yield Malformed("PLY whose picture is a device", "ply", right["ply"].replace(b"element vertex", b"comment TextureFile /dev/zero\nelement vertex", 1))
-    for counts in ("0 0 0", "8 0 0", "0 12 0", "1000000000000 3 0", "3 1000000000000 0", "-1 -1 0", "x y z", "3", "3.5 1 0"):
+    yield Malformed(
+        "PLY whose picture is a device",
+        "ply",
+        right["ply"].replace(b"element vertex", b"comment TextureFile /dev/zero\nelement vertex", 1),
+    )
+    for counts in (
+        "0 0 0",
+        "8 0 0",
+        "0 12 0",
+        "1000000000000 3 0",
+        "3 1000000000000 0",
+        "-1 -1 0",
+        "x y z",
+        "3",
+        "3.5 1 0",
+    ):
         yield Malformed(f"OFF of {counts}", "off", f"OFF\n{counts}\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n".encode())
     yield Malformed("OFF of polygons", "off", b"OFF\n5 1 0\n0 0 0\n4 0 0\n4 4 0\n2 1 0\n0 4 0\n5 0 1 2 3 4\n")
     yield Malformed("OFF of lines", "off", b"OFF\n2 1 0\n0 0 0\n4 0 0\n2 0 1\n")

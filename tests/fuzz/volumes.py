@@ -88,7 +88,16 @@ def arrays() -> Iterator[tuple[str, bytes]]:
     yield "objects that do something", _npy(trap, allow_pickle=True)
     yield "a pickle", pickle.dumps(_Trap())
     yield "fortran order", _npy(np.asfortranarray(right))
-    for shape in ("(1000000000000,)", "(10000, 10000, 10000)", "(-1, 4, 4)", "(4, 4)", "('a',)", "4", "(1e3,)", "(99999999999999999999, 1, 1)"):
+    for shape in (
+        "(1000000000000,)",
+        "(10000, 10000, 10000)",
+        "(-1, 4, 4)",
+        "(4, 4)",
+        "('a',)",
+        "4",
+        "(1e3,)",
+        "(99999999999999999999, 1, 1)",
+    ):
         yield f"head with shape {shape}", _head(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}")
     for kind in ("'|O'", "'<f99'", "'x'", "None", "[('a', '<f8')]", "'<f8', 'x': 1", "__import__('os')"):
         yield f"head with type {kind}", _head(f"{{'descr': {kind}, 'fortran_order': False, 'shape': (4, 1, 1), }}")
@@ -184,7 +193,10 @@ def meshes() -> Iterator[tuple[str, bytes]]:
     yield "points", vtu(cells=[("vertex", four.T)])
     yield "hexahedra", vtu(points=np.vstack([corners, corners + 1]), cells=[("hexahedron", np.arange(8)[None])])
     yield "tetrahedra and triangles", vtu(cells=[("tetra", four), ("triangle", four[:, :3])])
-    yield "curved tetrahedra", vtu(points=np.random.default_rng(0).normal(size=(10, 3)), cells=[("tetra10", np.arange(10)[None])])
+    yield (
+        "curved tetrahedra",
+        vtu(points=np.random.default_rng(0).normal(size=(10, 3)), cells=[("tetra10", np.arange(10)[None])]),
+    )
     yield "an inverted one", vtu(cells=[("tetra", four[:, [1, 0, 2, 3]])])
     yield "a flat one", vtu(points=corners * [1, 1, 0])
     yield "one given twice", vtu(cells=[("tetra", np.vstack([four, four]))])
