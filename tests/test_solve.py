@@ -261,17 +261,17 @@ def test_exitance_at_no_place_is_no_number(ball_solution: Solution) -> None:
 
 
 def test_a_body_far_from_the_origin_is_solved_as_well() -> None:
-    """A million radii away: all that is left of the place are the last digits, and the mesher's own spread of 1e-3."""
+    """A million radii away: all that is left of the place are the last digits, and the mesher's own spread."""
     ball, far = sphere(10.0, subdivisions=3), np.array([1e7, -1e7, 5e6])
     moved = surface_from_arrays(ball.points + far, ball.faces)
-    x, y, z = (far + [0.0, 0.0, 20.0]).tolist()
+    x, y, z = (far + np.array([0.0, 0.0, 20.0])).tolist()
     here, there = (
         solve(surface, TISSUE, [PencilBeam(origin, (0, 0, -1)), DiffuseLight(0.01)], tolerance=0.05)
         for surface, origin in ((ball, (0.0, 0.0, 20.0)), (moved, (x, y, z)))
     )
     places = 10.0 * np.array([[0.0, 0, 1], [1, 0, 0], [0, -1, 0], [-0.6, 0, 0.8]])
-    # Within 3e-4 of each other in each of six runs.
-    np.testing.assert_allclose(there.exitance_at(places + far), here.exitance_at(places), rtol=0.005)
+    # Seven runs each: the second place, far from the beam, has a spread of 0.9 %, the others of 0.1 %; means agree to 0.2 %.
+    np.testing.assert_allclose(there.exitance_at(places + far), here.exitance_at(places), rtol=0.02)
     assert there.power.exited == pytest.approx(here.power.exited, rel=0.002)
     assert abs(there.power.balance_error) < 1e-9
 

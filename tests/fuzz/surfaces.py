@@ -314,7 +314,7 @@ def placed() -> Iterator[Malformed]:
         yield Malformed(f"a ball in a unit {20 / size:g} off", "stl", exported(ball, "stl"), size)
 
 
-def files() -> Iterator[Malformed]:  # noqa: PLR0915 - one trap a line
+def files() -> Iterator[Malformed]:
     """Files that are cut short, full of nonsense, wrongly named, or that lie about what they hold."""
     random = np.random.default_rng(7)
     ball = sphere(10.0, subdivisions=2)
@@ -378,24 +378,24 @@ def files() -> Iterator[Malformed]:  # noqa: PLR0915 - one trap a line
     yield Malformed("OBJ with carriage returns", "obj", right["obj"].replace(b"\n", b"\r"))
     yield Malformed("OBJ on one line", "obj", right["obj"].replace(b"\n", b" "))
     yield Malformed("OBJ of ten million blanks", "obj", b" " * 10_000_000)
-    head = "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nelement face {}\nproperty list {} int vertex_indices\nend_header\n"
+    ply_head = "ply\nformat {} 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nelement face {}\nproperty list {} int vertex_indices\nend_header\n"
     for form in ("ascii", "binary_little_endian", "binary_big_endian", "binary_middle_endian", ""):
         for vertices, faces in ((0, 0), (10**12, 0), (3, 10**12), (-1, 1), (10**30, 1), (3, 1)):
-            content = head.format(form, vertices, faces, "uchar").encode()
+            content = ply_head.format(form, vertices, faces, "uchar").encode()
             body = b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n" if form == "ascii" else bytes(36) + b"\x03" + bytes(12)
             yield Malformed(f"PLY, {form or 'no form'}, of {vertices} vertices, {faces} faces", "ply", content + body)
     yield Malformed(
         "PLY of a long list",
         "ply",
-        head.format("binary_little_endian", 3, 1, "uint").encode() + bytes(36) + b"\xff" * 40,
+        ply_head.format("binary_little_endian", 3, 1, "uint").encode() + bytes(36) + b"\xff" * 40,
     )
     yield Malformed(
-        "PLY without an end to its head", "ply", head.format("ascii", 3, 1, "uchar").encode()[:-11] + b"0 0 0\n" * 9
+        "PLY without an end to its head", "ply", ply_head.format("ascii", 3, 1, "uchar").encode()[:-11] + b"0 0 0\n" * 9
     )
     yield Malformed(
         "PLY of lists of floats",
         "ply",
-        head.format("ascii", 3, 1, "float").encode() + b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+        ply_head.format("ascii", 3, 1, "float").encode() + b"0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
     )
     yield Malformed("PLY of unknown properties", "ply", right["ply"].replace(b"float x", b"quark x", 1))
     yield Malformed(

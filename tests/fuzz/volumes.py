@@ -88,7 +88,7 @@ def arrays() -> Iterator[tuple[str, bytes]]:
     yield "objects that do something", _npy(trap, allow_pickle=True)
     yield "a pickle", pickle.dumps(_Trap())
     yield "fortran order", _npy(np.asfortranarray(right))
-    for shape in (
+    for claimed in (
         "(1000000000000,)",
         "(10000, 10000, 10000)",
         "(-1, 4, 4)",
@@ -98,7 +98,7 @@ def arrays() -> Iterator[tuple[str, bytes]]:
         "(1e3,)",
         "(99999999999999999999, 1, 1)",
     ):
-        yield f"head with shape {shape}", _head(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}")
+        yield f"head with shape {claimed}", _head(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {claimed}, }}")
     for kind in ("'|O'", "'<f99'", "'x'", "None", "[('a', '<f8')]", "'<f8', 'x': 1", "__import__('os')"):
         yield f"head with type {kind}", _head(f"{{'descr': {kind}, 'fortran_order': False, 'shape': (4, 1, 1), }}")
     yield "head of brackets", _head("[" * 100)
