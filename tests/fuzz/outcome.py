@@ -94,14 +94,14 @@ def outcome_of(name: str, arguments: Sequence[str], limit: float = LIMIT, allowe
             violation = f"{type(error).__name__}: {str(error)[:200]} at {place}"
     seconds = time.perf_counter() - started
     words = err.getvalue() if code else out.getvalue()
-    violation = violation or _complaint(code, out.getvalue(), err.getvalue(), allowed)
+    violation = violation or complaint(code, out.getvalue(), err.getvalue(), allowed)
     if caught and not violation:
         first = caught[0]
         violation = f"{first.category.__name__}: {first.message} at {first.filename}:{first.lineno}"
     return Outcome(name, code, words.strip(), violation, seconds)
 
 
-def _complaint(code: int | None, out: str, err: str, allowed: tuple[int, ...]) -> str:
+def complaint(code: int | None, out: str, err: str, allowed: tuple[int, ...]) -> str:
     """What is wrong with what was printed, or nothing."""
     if code not in allowed:
         return f"exit code {code}: {err}"

@@ -1,17 +1,18 @@
 """All malformed inputs, each put through the command line."""
 
-import multiprocessing
 import os
+import subprocess
+import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from multiprocessing.connection import Connection
+import time
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import yaml
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from tests.fuzz.case_files import case_files, companions, traps
-from tests.fuzz.outcome import Outcome, outcome_of
+from tests.fuzz.outcome import Outcome, complaint, outcome_of
 from tests.fuzz.surfaces import Malformed, surfaces
 from tests.fuzz.volumes import case_of, volumes
 from tetlux.cases.case import load_cases
@@ -97,7 +98,7 @@ def check_surfaces(folder: Path) -> Iterator[Outcome]:
         yield outcome_of(f"surface: {malformed.name}", ["check", str(path)])
 
 
-def run_surfaces(folder: Path, limit: float, chosen: Callable[[int], bool] = lambda _: True) -> Iterator[Outcome]:
+def run_surfaces(folder: Path, limit: float, names: Collection[str] = ()) -> Iterator[Outcome]:
     """Solve what a check lets pass, each in a process of its own, so that signals and hangs are seen.
 
     Parameters
@@ -105,37 +106,26 @@ def run_surfaces(folder: Path, limit: float, chosen: Callable[[int], bool] = lam
     folder : Path
     limit : float
         Seconds that one may take.
-    chosen : callable
-        Which of them are run, by their number.
+    names : collection of str
+        Of those that are run; all if none are given.
     """
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["tests.fuzz.runs", "tetlux.cases.run"])
-    number = 0
     for malformed in surfaces():
+        if names and malformed.name not in names:
+            continue
         path = write_surface(folder, malformed, tolerance=0.5)
         if outcome_of("", ["check", str(path)]).code != 0:
             continue
-        number += 1
-        if not chosen(number):
+        name = f"run: {malformed.name}"
+        started = time.perf_counter()
+        command = [sys.executable, "-m", "tetlux.cases", "run", str(path), "--out", str(folder / "out"), "--no-cache"]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired:
+            yield Outcome(name, None, "", f"took more than {limit:g} s", limit)
             continue
-        receiving, sending = context.Pipe(duplex=False)
-        arguments = ["run", str(path), "--out", str(folder / "out"), "--no-cache"]
-        child = context.Process(target=_run, args=(f"run: {malformed.name}", arguments, sending))
-        child.start()
-        sending.close()
-        child.join(limit)
-        if child.is_alive():
-            child.kill()
-            child.join()
-            yield Outcome(f"run: {malformed.name}", None, "", f"took more than {limit:g} s")
-        elif child.exitcode != 0 or not receiving.poll():
-            yield Outcome(f"run: {malformed.name}", None, "", f"died with {child.exitcode}")
-        else:
-            yield receiving.recv()
-
-
-def _run(name: str, arguments: list[str], to: Connection) -> None:
-    to.send(outcome_of(name, arguments, limit=1e6, allowed=(0, 1)))
+        violation = complaint(done.returncode, done.stdout, done.stderr, (0, 1))
+        words = done.stderr if done.returncode else done.stdout
+        yield Outcome(name, done.returncode, words.strip(), violation, time.perf_counter() - started)
 
 
 def check_volumes(folder: Path) -> Iterator[Outcome]:
