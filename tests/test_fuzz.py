@@ -38,7 +38,7 @@ SOLVED = (
     "one of two bodies inside out",
     "a half turned over",
     "a slit filled by a triangle of no area",
-    "a ball of 0.5000000 within",
+    "a ball of 0.5 within",
     "a tetrahedron inside out",
     "ten triangles",
     "a ball 1e6 away, all digits",
