@@ -9,12 +9,12 @@ import numpy as np
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
-from tetlux.cases.lighting import BODY, light_names, light_of
+from tetlux.cases.lighting import BODY, keys_of, light_names, light_of
 from tetlux.cases.media import media_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
-from tetlux.cases.sweep import swept
+from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
 from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights import Deposit, Light
@@ -23,6 +23,8 @@ from tetlux.fem.region import Region
 from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.mesher import check_thickness
+from tetlux.meshing.paths import exists
 from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
@@ -102,6 +104,12 @@ class Case:
         """What a user should know of the surfaces of regions; that of the body is among a solution's warnings."""
         return self._of_surfaces("warnings")[len(self.surface.warnings) :]
 
+    def named(self, warning: str) -> str:
+        """A warning with the name of the region that it numbers."""
+        number, colon, rest = warning.partition(":")
+        names = {f"region {i}": region.surface.name for i, region in enumerate(self.regions, 1)}
+        return f"{names.get(number, number)}{colon}{rest}"
+
     def _of_surfaces(self, name: str) -> tuple[str, ...]:
         inner = [f"{region.surface.name}: {note}" for region in self.regions for note in getattr(region.surface, name)]
         return (*getattr(self.surface, name), *inner)
@@ -131,11 +139,12 @@ def find_case_file(request: str) -> Path:
     """A path as given, or the shipped case file of that name where there is no such path."""
     path = Path(request)
     shipped = library_folder() / f"{request}.yaml"
-    if not path.exists() and path.name == request and shipped.is_file():
+    known = exists(path)
+    if not known and path.name == request and shipped.is_file():
         return shipped
-    if not path.exists() and path.name == request and not path.suffix:
-        known = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
-        raise InputError(f"{request} is neither a file nor one of the cases that ship: {known}.")
+    if not known and path.name == request and not path.suffix:
+        names = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
+        raise InputError(f"{request} is neither a file nor one of the cases that ship: {names}.")
     if path.suffix.lower() in SUFFIXES:
         raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
     return path
@@ -160,6 +169,8 @@ def load_cases(path: Path) -> list[Case]:
         single = document if label is None else Document(path, data, {**document.lines, **keys})
         one = spec if label is None else validated(single, data)
         name = one.name or path.stem
+        if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
+            raise single.error(("name",), "this makes no name of a folder, or too long a one; give a short name.")
         cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
     return cases
 
@@ -168,6 +179,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     reader.seconds = 0.0
     with document.at(("surface",)):
         surface = reader.surface(spec.surface, spec.unit)
+        check_thickness(surface)
     channels = channel_names(document, spec)
     media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
     with document.at(("surface",)):
@@ -177,7 +189,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     names = light_names(spec)
     check_different(document, "lights", names)
     _check_value_names(document, channels, names)
-    lights, deposits = _lights(document, spec, names, surface, media, region_names, reader)
+    lights, deposits = _lights(document, spec, names, surface, media, region_names, channels, reader)
     with document.at(("compare",)):
         comparison = None
         if spec.compare:
@@ -238,13 +250,14 @@ def _lights(
     surface: Surface,
     media: tuple[AnyMedium, ...],
     regions: tuple[str, ...],
+    channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
     """The lights of each channel by name, and what those of the first leave in the body."""
     lights: list[dict[str, Light]] = [{} for _ in media]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
-        with document.at(("lights", i)):
+        with document.at(("lights", i), keys_of(light_spec, reader)):
             for channel, medium in enumerate(media):
                 light = light_of(light_spec, channel, len(media), regions, reader)
                 if light is None:
@@ -255,7 +268,10 @@ def _lights(
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):
-        raise document.error(("lights",), "all lights are dark in one channel; give each channel some.")
+        dark = channels[[bool(those) for those in lights].index(False)]
+        raise document.error(
+            ("lights",), f"all lights are dark in channel {dark}; give one of them some power there, or leave it out."
+        )
     return lights, deposits
 
 

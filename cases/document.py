@@ -1,24 +1,70 @@
 """A YAML document that knows the line of every key."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
+from yaml.constructor import ConstructorError
 
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import exists, is_file
 
 Key = tuple[str | int, ...]
 LARGEST_FILE = 1_000_000
+# Keys and items of lists, those of aliases counted as often as they are used; and how deep they may lie.
+MOST_KEYS, DEEPEST = 10_000, 50
+LARGEST_NUMBER = 10**308
 
 
 class _Loader(yaml.SafeLoader):
-    """Plain data only; and 1e-3 is a number, which YAML 1.1 takes for text."""
+    """Plain data only, of a size to be read at once; and 1e-3 is a number, which YAML 1.1 takes for text."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._nodes = self._depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if getattr(event, "tag", None) is not None:
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            raise ConstructorError(
+                None, None, f'tags such as "{tag}" are not read here; write plain values', event.start_mark
+            )
+        self._nodes += 1
+        if self._nodes > 2 * MOST_KEYS:
+            raise ConstructorError(None, None, f"more than {MOST_KEYS:,} keys; a case file is a few lines", None)
+        if self._depth > DEEPEST:
+            raise ConstructorError(
+                None, None, f"nested more than {DEEPEST} deep; a case file is flatter", event.start_mark
+            )
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+    def construct_number(self, node: yaml.ScalarNode) -> float:
+        """A number that a float can hold, or infinity."""
+        make = self.construct_yaml_int if node.tag.endswith(":int") else self.construct_yaml_float
+        try:
+            value = make(node)
+        except ValueError:
+            value = LARGEST_NUMBER + 1
+        if isinstance(value, int) and abs(value) > LARGEST_NUMBER:
+            raise ConstructorError(None, None, "this is no number, or one that is too large", node.start_mark)
+        return float(value) if isinstance(value, float) else int(value)
 
 
+# A date is text, as everything is that is no number, truth value or nothing.
+_Loader.yaml_implicit_resolvers = {
+    first: [(tag, form) for tag, form in forms if not tag.endswith(":timestamp")]
+    for first, forms in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _kind in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
 _Loader.add_implicit_resolver(
     "tag:yaml.org,2002:float",
     re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"),
@@ -42,18 +88,28 @@ class Document:
     data: dict[str, Any]
     lines: dict[Key, int]
 
+    def line(self, key: Key) -> int | None:
+        """The line of a key, or of what holds it: a key that is merged into another (`<<`) has none of its own."""
+        while key and key not in self.lines:
+            key = key[:-1]
+        return self.lines[key] if key else None
+
     def error(self, key: Key, message: str) -> InputError:
         """An error that names this file, the line of a key (or of what holds it), and the key."""
-        known = key
-        while known and known not in self.lines:
-            known = known[:-1]
-        where = f"{self.path}, line {self.lines[known]}" if known else f"{self.path}"
+        line = self.line(key)
+        where = f"{self.path}, line {line}" if line else f"{self.path}"
         name = dotted(key)
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
 
     @contextmanager
-    def at(self, key: Key, *names: str) -> Iterator[None]:
-        """Within this, an error is one of the value at a key, or of one of `names` in it that its message begins with.
+    def at(self, key: Key, names: Mapping[str, Key] | None = None) -> Iterator[None]:
+        """Within this, an error is one of the value at a key, or at that of the name that its message begins with.
+
+        Parameters
+        ----------
+        key : Key
+        names : mapping of str to Key, optional
+            Of what lies within, where in it that is.
 
         Raises
         ------
@@ -63,8 +119,9 @@ class Document:
         try:
             yield
         except InputError as error:
-            word = str(error).split(maxsplit=1)[0]
-            raise self.error((*key, word) if word in names else key, str(error)) from error
+            text = str(error)
+            found = [within for name, within in (names or {}).items() if text.startswith((f"{name} ", f"{name}:"))]
+            raise self.error((*key, *found[0]) if found else key, text) from error
 
 
 def dotted(key: Key) -> str:
@@ -84,10 +141,9 @@ def read_document(path: Path) -> Document:
         If it is missing, unreadable, no YAML, or something else than a mapping.
     """
     try:
-        if not path.exists():
-            raise InputError(f"{path} does not exist; check the path of the case file.")
-        if not path.is_file():
-            raise InputError(f"{path} is not a file; give a YAML case file.")
+        if not is_file(path):
+            found = "is not a file; give a YAML case file" if exists(path) else "does not exist; check its path"
+            raise InputError(f"{path} {found}.")
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise InputError(f"{path} is {size / 1e6:.0f} MB; a case file is a few lines of YAML.")
@@ -108,17 +164,17 @@ def read_document(path: Path) -> Document:
         mark = error.problem_mark
         line = f", line {mark.line + 1}" if mark else ""
         raise InputError(f"{path}{line}: not valid YAML: {error.problem}.") from error
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
+    except RecursionError as error:
+        raise InputError(f"{path}: not valid YAML: an alias stands within what it stands for.") from error
+    except yaml.YAMLError as error:
         first = (str(error).splitlines() or ["no reason given"])[0]
         raise InputError(f"{path}: not valid YAML: {first}.") from error
     return Document(path, data, lines)
 
 
 def _note_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int]) -> None:
-    if len(lines) > 10_000:
-        raise InputError(f"{path} holds more than 10,000 keys; a case file is a few lines of YAML.")
+    if len(lines) > MOST_KEYS:
+        raise InputError(f"{path} holds more than {MOST_KEYS:,} keys; a case file is a few lines of YAML.")
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             part: Key = (*key, str(name.value))

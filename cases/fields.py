@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from tetlux.cases.images import unreadable
 from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.files import oriented
+from tetlux.meshing.paths import is_file, is_folder
 
 if TYPE_CHECKING:
     import meshio
@@ -56,14 +58,9 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
     if name not in data.point_data and name not in data.cell_data:
         known = ", ".join(dict.fromkeys([*data.point_data, *data.cell_data])) or "none"
         raise InputError(f'{path} holds no array "{name}"; the arrays there are: {known}.')
-    points = scale * np.asarray(data.points, dtype=np.float64)
-    tetrahedra = np.vstack([data.cells[block].data for block in blocks]).astype(np.int64)
-    negative = tetrahedron_volumes(points, tetrahedra) < 0
-    tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
-    # Nodes of other cells, whose values may be anything, are left out.
-    used, compact = np.unique(tetrahedra, return_inverse=True)
     try:
-        mesh = TetMesh(points[used], compact.reshape(tetrahedra.shape))
+        # Nodes of other cells, whose values may be anything, are left out.
+        mesh, used = oriented(scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks]))
         if name in data.point_data:
             return mesh_field(mesh, data.point_data[name][used], at="nodes")
         values = np.concatenate([data.cell_data[name][block] for block in blocks])
@@ -102,8 +99,11 @@ def read_image_field(
         If an image is missing, unreadable or not grey, or they differ in size or depth.
     """
     path = Path(path)
-    if path.is_dir():
-        files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES), key=_in_order)
+    if is_folder(path):
+        try:
+            files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES and is_file(f)), key=_in_order)
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {error.strerror}.") from error
         if not files:
             raise InputError(f"{path} holds no images; give a folder of PNG or TIFF slices.")
     else:
@@ -163,7 +163,7 @@ def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vecto
 
 def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} does not exist or is no file; check its path.")
     if path.suffix.lower() not in suffixes:
         raise InputError(f'{path}: "{path.suffix}" files are not read here; give {" or ".join(suffixes)}.')
@@ -189,10 +189,11 @@ def _pages(file: Path) -> list[tuple[str, npt.NDArray[np.generic]]]:
         # Of pages that a file cut short lacks, Pillow only warns.
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(file) as image:
                 pages = [(page.mode, np.asarray(page)) for page in ImageSequence.Iterator(image)]
     except Exception as error:  # Pillow raises whatever its decoders ran into
-        raise InputError(f"{file} is not a readable image; export it again as PNG or TIFF.") from error
+        raise unreadable(file, error) from error
     for mode, _ in pages:
         if mode not in WHITE:
             raise InputError(f"{file} is not a grey image of 8 or 16 bits (its mode is {mode}); convert it.")

@@ -3,7 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
+from pydantic import BaseModel
+
 from tetlux.cases.channels import of_channel
+from tetlux.cases.document import Key
 from tetlux.cases.images import of_channel as colour_of_channel
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
@@ -43,6 +46,19 @@ def light_names(spec: CaseSpec) -> tuple[str, ...]:
     return tuple(
         light.name or f"{light.kind}_{kinds[: i + 1].count(light.kind)}" for i, light in enumerate(spec.lights)
     )
+
+
+def keys_of(spec: BaseModel, reader: Reader) -> dict[str, Key]:
+    """Where in the section of a light its values stand, by their names and by the paths of files."""
+    found: dict[str, Key] = {}
+    for name, value in spec:
+        if isinstance(value, BaseModel):
+            found |= {word: (name, *key) for word, key in keys_of(value, reader).items()}
+        elif name == "file":
+            found[str(reader.folder / value)] = (name,)
+        else:
+            found[name] = (name,)
+    return found
 
 
 def light_of(spec: LightSpec, channel: int, count: int, regions: tuple[str, ...], reader: Reader) -> Light | None:

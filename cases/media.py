@@ -58,7 +58,7 @@ def _medium(
             numbers[name] = of_channel(value, channel)
     with document.at((*key, "phase")):
         phase = _phase(spec.phase) if spec.phase else None
-    with document.at(key, *MediumSpec.model_fields):
+    with document.at(key, {name: (name,) for name in MediumSpec.model_fields}):
         medium = Medium(**numbers, phase=phase, boundary=spec.boundary)
         check_scattering(medium)
         if not fields:

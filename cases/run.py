@@ -133,7 +133,7 @@ def _warnings(results: Results) -> list[str]:
     told: dict[str, list[str]] = {}
     for name, solution in zip(names, solutions, strict=True):
         for warning in solution.warnings:
-            told.setdefault(warning, []).append(name)
+            told.setdefault(results.case.named(warning), []).append(name)
     return [
         *results.case.region_warnings,
         *(

@@ -2,12 +2,12 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from tetlux.cases.schema_lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.schema_media import Media
-from tetlux.cases.schema_parts import Choice, Label, Length, Number, Section, Vector3
+from tetlux.cases.schema_parts import TAG, Choice, Label, Length, Number, Section, Vector3
 
 
 class SphereSpec(Section):
@@ -78,7 +78,17 @@ class RegionSpec(Section):
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture"]
-SweepValue = Annotated[int, Field(strict=True)] | Number | Annotated[str, Field(strict=True)]
+
+
+def _word_or_number(value: object) -> str:
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    return TAG + ("word" if isinstance(value, str) else "whole" if whole else "number")
+
+
+SweepValue = Annotated[
+    Annotated[str, Tag(TAG + "word")] | Annotated[int, Tag(TAG + "whole")] | Annotated[Number, Tag(TAG + "number")],
+    Discriminator(_word_or_number),
+]
 
 
 class CaseSpec(Section):

@@ -9,6 +9,8 @@ from tetlux.cases.document import Document, Key
 from tetlux.cases.schema import CaseSpec
 
 MOST_RUNS = 20_000
+# Of folders, in bytes: what file systems hold.
+LONGEST_NAME = 255
 
 
 def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str, Any], dict[Key, int]]]:
@@ -22,20 +24,35 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
     count = math.prod(len(listed) for listed in spec.sweep.values())
     if count > MOST_RUNS:
         raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
+    labels: set[str] = set()
     for values in itertools.product(*spec.sweep.values()):
         data = copy.deepcopy(document.data)
         del data["sweep"]
         keys: dict[Key, int] = {}
         for key, value in zip(spec.sweep, values, strict=True):
-            keys[_assign(document, data, key, value)] = document.lines["sweep", key]
-        label = ",".join(f"{k}={v}" for k, v in zip(spec.sweep, values, strict=True))
-        runs.append((label.replace("/", "_"), data, keys))
+            keys[_assign(document, data, key, value)] = document.line(("sweep", key)) or 1
+        label = _label(dict(zip(spec.sweep, values, strict=True)))
+        if len(label.encode()) > LONGEST_NAME:
+            raise document.error(
+                ("sweep",),
+                "the keys and values of a run make too long a name of a folder; sweep fewer keys.",
+            )
+        if label in labels:
+            raise document.error(("sweep",), f'two runs would be written to one folder, "{label}"; change a value.')
+        labels.add(label)
+        runs.append((label, data, keys))
     return runs
+
+
+def _label(values: dict[str, Any]) -> str:
+    """A name for the folder of a run."""
+    label = ",".join(f"{key}={value}" for key, value in values.items())
+    return "".join("_" if c in "/\\" or not c.isprintable() else c for c in label)
 
 
 def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
     """Set a dotted key (list items by their number); it may be new, what holds it may not."""
-    parts: Key = tuple(int(p) if p.isdigit() else p for p in key.split("."))
+    parts: Key = tuple(int(p) if p.isdecimal() else p for p in key.split("."))
     holder: Any = data
     try:
         for part in parts[:-1]:

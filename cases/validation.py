@@ -20,6 +20,8 @@ PLAIN = {
     "too_long": "",
     "float_type": "expected a number",
 }
+# Values that YAML writes in another way than Python.
+PYTHONS = {None: "nothing", True: "true", False: "false"}
 # Lists of numbers that are not of three.
 COUNTS: dict[str | int, str] = {"values": "two"}
 
@@ -59,5 +61,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
         text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
     if kind in ("unknown_key", "one_of", "scale"):
         return f"{text}."
-    shown = repr(given)
+    if key[:1] == ("sweep",) and kind == "float_type":
+        text = "expected a number or a word"
+    shown = PYTHONS[given] if given is None or isinstance(given, bool) else repr(given)
     return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}."

@@ -117,10 +117,13 @@ class Solution:
         Returns
         -------
         (q,) ndarray
-            W/unit².
+            W/unit²; nan at points that are not finite.
         """
-        queries, _ = self.surface.project(np.asarray(points, dtype=float).reshape(-1, 3))
-        return self.exitance_on(queries)
+        places = np.asarray(points, dtype=float).reshape(-1, 3)
+        finite = np.isfinite(places).all(axis=1)
+        exitance = np.full(len(places), np.nan)
+        exitance[finite] = self.exitance_on(self.surface.project(places[finite])[0])
+        return exitance
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""

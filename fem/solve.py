@@ -1,8 +1,10 @@
 """From a body, a medium and lights to a `Solution`: mesh, solve, estimate, refine."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from threading import Timer
 from typing import overload
 
 import numpy as np
@@ -16,13 +18,13 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
-from tetlux.fem.sources import Sources, Subtract, sources_of
+from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.refine import refine
 from tetlux.meshing.regions import check_regions, region_at
 from tetlux.meshing.surface import Surface
@@ -40,6 +42,8 @@ SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
 SAFETY, POWER_SAFETY = 0.65, 0.4
 MOST_TETRAHEDRA = 1_000_000
+# Seconds after which a word is said of the mesher.
+SLOW = 8.0
 
 
 @overload
@@ -201,6 +205,10 @@ def solve_each(
     """
     if not 1e-4 <= tolerance < 1:
         raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+    if not isinstance(scenes, Sequence):
+        raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
+    for lights in scenes:
+        check_list(lights)
     if len(scenes) == 0:
         raise InputError("there is no scene; give the lights of at least one.")
     if isinstance(body, TetMesh):
@@ -228,7 +236,8 @@ def solve_each(
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
     if mesh is None:
         with watch.stage("mesh"):
-            mesh = tetrahedralize(surface, inner, cache=cache)
+            with _told_if_slow(report):
+                mesh = tetrahedralize(surface, inner, cache=cache)
             lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
@@ -245,6 +254,19 @@ def solve_each(
         found.append(replace(made, validity=validity, warnings=warnings))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
+
+
+@contextmanager
+def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
+    """Say what takes so long, if the mesher does."""
+    words = f"still tetrahedralizing: thin parts and small regions take long; given up after {TIME_LIMIT:g} s"
+    timer = Timer(SLOW, report, [words])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,6 +76,7 @@ def sources_of(
     """
     if subtract not in ("half-space", "free-space", "nothing"):
         raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
+    check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     uniform = len(media) == 1 and isinstance(media[0], Medium)
@@ -95,6 +96,23 @@ def sources_of(
         deposits.append(known)
         on_mesh.append(rest)
     return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+
+
+def check_list(lights: Sequence[Light]) -> None:
+    """Refuse what is no list of lights.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(lights, Sequence):
+        raise InputError(
+            f"lights are given in a list, and those of several scenes in a list of lists, but {lights!r} is none; "
+            "write [light], or [[light], [another]]."
+        )
+    for light in lights:
+        if not hasattr(light, "deposit_in"):
+            raise InputError(f"{light!r} is no light; give lights such as PencilBeam or DiffuseLight.")
 
 
 _RegionOf = Callable[[FloatArray], IntArray] | None

@@ -1,8 +1,18 @@
 """What can go wrong, in two kinds: the request is wrong, or the run failed."""
 
+# What is longer is cut in its middle: a sentence may quote a name of a megabyte.
+LONGEST = 900
+
 
 class TetluxError(Exception):
-    """Base of every error that tetlux raises on purpose; its text is one plain sentence."""
+    """Base of every error that tetlux raises on purpose; its text is one plain sentence, on one printable line."""
+
+    def __init__(self, sentence: str) -> None:
+        if len(sentence) > LONGEST:
+            sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
+        super().__init__(
+            "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in sentence)
+        )
 
 
 class InputError(TetluxError, ValueError):

@@ -5,12 +5,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.paths import is_file
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 SUFFIXES = (".vtu", ".msh")
+# In whatever unit.
+LONGEST = 1e30
 # What the regions of tetrahedra are called in files.
 REGION = "region"
 
@@ -37,7 +41,7 @@ def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
     import meshio  # noqa: PLC0415
 
     path = Path(path)
-    if not path.is_file():
+    if not is_file(path):
         raise InputError(f"{path} does not exist; check the path of the mesh file.")
     _check_suffix(path)
     try:
@@ -49,13 +53,45 @@ def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
         raise InputError(f"{path} is not a readable {path.suffix} mesh; export it again.") from error
     if not cells:
         raise InputError(f"{path} holds no tetrahedra; give a tetrahedral mesh.")
-    points = np.asarray(data.points, dtype=np.float64)
-    tetrahedra = np.vstack(cells).astype(np.int64)
-    negative = tetrahedron_volumes(points, tetrahedra) < 0
-    tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
-    used, compact = np.unique(tetrahedra, return_inverse=True)
-    mesh = TetMesh(points[used], compact.reshape(tetrahedra.shape), unit)
+    try:
+        mesh, _ = oriented(data.points, np.vstack(cells), unit)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     return replace(mesh, regions=np.concatenate(tags).reshape(-1).astype(np.int64)) if tags else mesh
+
+
+def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
+    """Tetrahedra of a file, whichever way round they are, as a mesh without the nodes that none of them uses.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+    cells : (m, 4) array_like
+    unit : str
+
+    Returns
+    -------
+    mesh : TetMesh
+    used : (k,) ndarray
+        The numbers that its nodes have in the file.
+
+    Raises
+    ------
+    InputError
+        If a corner does not exist or lies nowhere, or a tetrahedron is flat.
+    """
+    vertices, tetrahedra = np.asarray(points, dtype=np.float64), np.array(cells, dtype=np.int64)
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise InputError(f"its nodes are an array of shape {vertices.shape}; give three coordinates for each.")
+    used, compact = np.unique(tetrahedra, return_inverse=True)
+    if used[0] < 0 or used[-1] >= len(vertices):
+        raise InputError("a tetrahedron names a node that does not exist; the file is damaged.")
+    if not (np.abs(vertices[used]) < LONGEST).all():
+        raise InputError("a node's coordinate is no number, or absurdly large; export the file again.")
+    vertices, tetrahedra = vertices[used], compact.reshape(tetrahedra.shape)
+    negative = tetrahedron_volumes(vertices, tetrahedra) < 0
+    tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
+    return TetMesh(vertices, tetrahedra, unit), used
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:

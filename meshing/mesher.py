@@ -60,6 +60,8 @@ STOP_ENERGY = 9.5
 LOST = 2.5
 # Places at which that is looked for: a lost part is larger than a triangle.
 LOOKS = 3_000
+# Seconds after which the mesher is stopped, if nothing else is said: ten times what slow ones take.
+TIME_LIMIT = 300.0
 # How much finer the second attempt is, if the first one's mesh is not the body of the surface.
 SECOND = 0.3
 # Default deviation of an inner surface: this share of its own diagonal, or of its region's mean thickness as above.
@@ -68,6 +70,10 @@ SECOND = 0.3
 # 2.3, 2.2, 1.7 and 3.8, 4.9, 7.5 %. The proxy of each surface has its own deviation, without which the first would take
 # two to four times as long; the envelope is one for all.
 INNER_DEVIATION = 0.03
+# Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. Seconds of the mesher and tetrahedra
+# at .011, .0058 and .0029 (a plate 60 wide; 1, .5 and .25 thick): 2 and 2k, 5 and 8k, over 60 s; a needle of 100 widths
+# (.005) takes 2 s, one of 1000 (.0005) over 60.
+THINNEST = 0.002
 # A region whose inner ones leave it less than this share of its volume is filled by them.
 LEFT = 1e-6
 MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
@@ -83,8 +89,8 @@ def tetrahedralize(
     deviation: float | None = None,
     epsilon: float | None = None,
     stop_energy: float = STOP_ENERGY,
-    time_limit: float = 600.0,
-    cache: bool | Path = True,
+    time_limit: float = TIME_LIMIT,
+    cache: bool | str | Path = True,
 ) -> TetMesh:
     """Fill a closed surface with tetrahedra that fit the closed surfaces within.
 
@@ -111,8 +117,8 @@ def tetrahedralize(
     stop_energy : float
         fTetWild's AMIPS energy at which a tetrahedron is good enough; 3 is a regular one.
     time_limit : float
-        Seconds until the mesher is stopped.
-    cache : bool or Path
+        Seconds until the mesher is stopped; 300 if not given.
+    cache : bool, str or Path
         Whether meshes are looked up and kept in the user's cache directory, or another directory for them.
 
     Returns
@@ -140,14 +146,17 @@ def tetrahedralize(
     ):
         if value is not None and not 0 < value < math.inf:
             raise InputError(f"{name} is {value:g}; give a number greater than 0.")
+    if deviation is None and epsilon is None:
+        check_thickness(surface)
     size = surface.diagonal
     wanted = EDGE_LENGTH * size if edge_length is None else edge_length
     if deviation is None:
-        thickness = 2.0 * surface.volume / surface.area
+        # What a surface that crosses itself holds, and so how thick it is, nobody knows before it is meshed.
+        thickness = math.inf if surface.overlaps else 2.0 * surface.volume / surface.area
         by_default = min(DEVIATION * size, DEVIATION_OF_THICKNESS * thickness)
         deviation = by_default if epsilon is None else epsilon * size / ENVELOPE
     envelope = ENVELOPE * deviation if epsilon is None else epsilon * size
-    directory = None if cache is False else cache_directory() if cache is True else cache
+    directory = None if cache is False else cache_directory() if cache is True else Path(cache)
     key = ""
     if directory is not None:
         key = mesh_key(
@@ -167,6 +176,22 @@ def tetrahedralize(
     if directory is not None:
         remember_mesh(key, directory, mesh)
     return mesh
+
+
+def check_thickness(surface: Surface) -> None:
+    """Refuse a body that is too thin for the mesher to be done with it in minutes.
+
+    Raises
+    ------
+    InputError
+    """
+    thickness = 2.0 * surface.volume / surface.area
+    if not surface.overlaps and thickness < THINNEST * surface.diagonal:
+        raise InputError(
+            f"{surface.name} is {thickness:.3g} {surface.unit} thick on average, {thickness / surface.diagonal:.1g} of "
+            f"its size, and below {THINNEST:g} tetrahedra that fit into it are too many; make it thicker, or take a "
+            "smaller piece of it."
+        )
 
 
 @dataclass(frozen=True)

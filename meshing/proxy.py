@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.repair import Edges, bodies, compact, count_self_intersections
+from tetlux.meshing.repair import Edges, bodies, compact
 from tetlux.meshing.surface import Surface, signed_volume
 
 # Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a

@@ -4,8 +4,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.proximity import cross_segments, overlapping_boxes, winding_number
+from tetlux.meshing.proximity import winding_number
 from tetlux.meshing.surface import UNITS, Surface, signed_volume, triangle_areas
 
 # Vertices nearer than this share of the diagonal are one: text formats round at about 1e-7.
@@ -16,8 +17,15 @@ LARGEST_HOLE = 0.05
 FLAT = 1e-7
 # In whatever unit.
 LONGEST = 1e30
-# An edge whose end is this share of its length from a triangle touches it and does not pierce it.
-TOUCH = 1e-6
+# Triangles do not join if more edges than these belong to one triangle only: so many, and so many a triangle.
+MOST_RIMS = (300, 0.25)
+# More separate bodies than these are a surface that fell to pieces.
+MOST_BODIES = 1000
+# A surface that crosses itself at more triangles than these, and at more than this share of them, is a tangle: the
+# mesher would be at it for minutes.
+TANGLE = (100, 0.75)
+# Coordinates that are rounded to more than this share of the diagonal are worth a sentence.
+COARSE = 1e-4
 
 
 def surface_from_arrays(
@@ -49,7 +57,13 @@ def surface_from_arrays(
     points, faces = _checked_arrays(points, faces, name)
     repairs: list[str] = []
     warnings: list[str] = []
+    rounding = _rounding(points)
     points, faces = _merged(points, faces, repairs)
+    if len(faces) < 4 and rounding > MERGE_TOLERANCE:
+        raise InputError(
+            f"{name}: the surface lies so far from the origin that its vertices are not told apart; move it to the "
+            "origin where it was made, and write it again."
+        )
     if len(faces) < 4:
         raise InputError(f"{name}: the mesh has {len(faces)} usable triangles; a body needs at least four.")
     if np.ptp(points, axis=0).min() == 0:
@@ -60,9 +74,25 @@ def surface_from_arrays(
     if 2.0 * signed_volume(points, faces) <= FLAT * diagonal * float(triangle_areas(points, faces)[1].sum()):
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     crossing = count_self_intersections(points, faces)
-    if crossing:
+    if crossing is None:
+        warnings.append(
+            "whether the surface crosses itself was not looked at, since too many of its triangles lie side by side, "
+            "like the needles of a fan; evenly shaped triangles are quicker and more accurate."
+        )
+    elif crossing > max(TANGLE[0], TANGLE[1] * len(faces)):
+        raise InputError(
+            f"{name}: the surface crosses itself at {crossing:,} of {len(faces):,} triangles, a tangle that bounds no "
+            "body; repair it in a mesh editor."
+        )
+    elif crossing:
         warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
-    overlaps = nested or crossing > 0
+    if rounding > COARSE:
+        warnings.append(
+            f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its size; "
+            "move it to the origin where it was made, and write it again."
+        )
+    # Walls between bodies that touch count on both sides.
+    overlaps = nested or bool(crossing) or bool((Edges(faces).triangles > 2).any())
     return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings), overlaps)
 
 
@@ -92,9 +122,23 @@ def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> t
             f"{name}: {bad} of {len(vertices)} vertices are not finite (NaN or infinity); repair the file."
         )
     largest = float(np.abs(vertices).max())
+    if (vertices == vertices[0]).all():
+        raise InputError(
+            f"{name}: all vertices are at one place; give a closed triangle mesh, and if it is of a body far from the "
+            "origin, move it there before it is written."
+        )
     if not 1 / LONGEST <= largest <= LONGEST:
         raise InputError(f"{name}: coordinates reach {largest:g}, absurdly far or near; check the scale and the unit.")
     return vertices, triangles
+
+
+def _rounding(points: FloatArray) -> float:
+    """To what share of the diagonal coordinates are rounded, by how far from the origin they are."""
+    single = np.asarray(points, dtype=np.float32)
+    largest = np.abs(points).max()
+    unit = float(np.spacing(np.float32(largest)) if (single == points).all() else np.spacing(largest))
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    return unit / diagonal if diagonal > 0 else 0.0
 
 
 def _merged(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[FloatArray, IntArray]:
@@ -156,9 +200,16 @@ def _closed(
 ) -> tuple[FloatArray, IntArray]:
     """Small holes closed by a fan about their middle."""
     edges = Edges(faces)
+    rims = int((edges.triangles == 1).sum())
+    if rims > max(MOST_RIMS[0], MOST_RIMS[1] * len(faces)):
+        raise InputError(
+            f"{name}: the surface is open: {rims:,} of {len(edges.triangles):,} edges belong to one triangle only, as "
+            "if its triangles did not join; merge its vertices by distance in a mesh editor."
+        )
     loops = boundary_loops(edges)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    for loop in loops:
+    centres, fans = [points], [faces]
+    for centre, loop in enumerate(loops, len(points)):
         width = float(np.linalg.norm(np.ptp(points[loop], axis=0)))
         if width > LARGEST_HOLE * diagonal:
             at = ", ".join(f"{x:.4g}" for x in points[loop].mean(axis=0))
@@ -166,11 +217,10 @@ def _closed(
                 f"{name}: the surface is open: a hole {width:.4g} wide around ({at}), of {len(loops)} in all; "
                 "close it in a mesh editor (holes up to 5 % of the body's size are closed here)."
             )
-        centre = len(points)
-        points = np.vstack([points, points[loop].mean(axis=0)])
-        fan = [[b, a, centre] for a, b in zip(loop, np.roll(loop, -1), strict=True)]
-        faces = np.vstack([faces, np.array(fan, dtype=np.int64)])
+        centres.append(points[loop].mean(axis=0, keepdims=True))
+        fans.append(np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), centre)]))
     if loops:
+        points, faces = np.concatenate(centres), np.concatenate(fans)
         repairs.append(f"closed {len(loops)} small {'hole' if len(loops) == 1 else 'holes'}.")
         edges = Edges(faces)
     odd, crowded = int((edges.triangles % 2).sum()), int((edges.triangles > 2).sum())
@@ -222,22 +272,25 @@ def boundary_loops(edges: Edges) -> list[IntArray]:
     directed = set(rim)
     loops = []
     for start in neighbours:
-        path = [start]
+        path, place = [start], {start: 0}
         while path:
             here = path[-1]
             if not neighbours[here]:
-                path.pop()
+                del place[path.pop()]
                 continue
             following = neighbours[here].pop()
             neighbours[following].remove(here)
-            if following in path:
+            if following in place:
                 # Holes that touch at a vertex come apart here: each return to a vertex ends a loop.
-                first = path.index(following)
+                first = place[following]
                 loop = path[first:]
+                for vertex in path[first + 1 :]:
+                    del place[vertex]
                 del path[first + 1 :]
                 forward = (loop[0], loop[1]) in directed
                 loops.append(np.array(loop if forward else loop[::-1], dtype=np.int64))
             else:
+                place[following] = len(path)
                 path.append(following)
     return loops
 
@@ -249,48 +302,76 @@ def _oriented(
 
     Cavities are refused.
     """
-    if not Edges(faces).consistent:
-        import trimesh  # noqa: PLC0415
-
-        mesh = trimesh.Trimesh(points, faces, process=False)
-        trimesh.repair.fix_winding(mesh)
-        faces = np.asarray(mesh.faces, dtype=np.int64)
-        if not Edges(faces).consistent:
+    edges = Edges(faces)
+    if not edges.consistent:
+        turned = _to_turn(edges, len(faces))
+        if turned is None:
             raise InputError(f"{name}: the surface has no inside and outside (like a Klein bottle); repair it.")
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
         repairs.append("made the winding of the triangles consistent.")
     body = bodies(len(points), faces)
-    parts = [faces[body == i] for i in range(int(body.max()) + 1)]
-    inward = [signed_volume(points, part) < 0 for part in parts]
-    result = faces.copy()
-    outer = len(parts)
+    count = int(body.max()) + 1
+    if count > MOST_BODIES:
+        raise InputError(
+            f"{name}: the surface falls into {count:,} bodies that share no vertex, more than {MOST_BODIES:,}; merge "
+            "its vertices by distance in a mesh editor, or keep the largest bodies."
+        )
+    order = np.argsort(body, kind="stable")
+    parts = np.split(faces[order], np.flatnonzero(np.diff(body[order])) + 1)
+    inward = np.array([_volume_of(points[part]) < 0 for part in parts])
+    low = np.array([points[part].min(axis=(0, 1)) for part in parts])
+    high = np.array([points[part].max(axis=(0, 1)) for part in parts])
+    inner = []
     for i, part in enumerate(parts):
-        around = [
-            j
-            for j, other in enumerate(parts)
-            if j != i
-            and _box_within(points[part], points[other])
-            and abs(winding_number(points, other, points[part[0, :1]])[0]) > 0.5
-        ]
-        if any(inward[i] != inward[j] for j in around):
+        boxes = ((low <= low[i]) & (high >= high[i])).all(axis=1)
+        boxes[i] = False
+        start = points[part[0, :1]]
+        around = [j for j in np.flatnonzero(boxes) if abs(winding_number(points, parts[j], start)[0]) > 0.5]
+        if (inward[around] != inward[i]).any():
             raise InputError(
                 f"{name}: there is a cavity inside the body, and cavities are not supported; remove the inner surface."
             )
         if around:
-            outer -= 1
-            warnings.append(f"body {i + 1} of {len(parts)} lies inside another and changes nothing.")
-        if inward[i]:
-            result[body == i] = part[:, ::-1]
-            repairs.append("turned an inside-out surface outward.")
+            inner.append(i + 1)
+    if inner:
+        which = f"body {inner[0]} of {count} lies" if len(inner) == 1 else f"{len(inner)} bodies of {count} lie"
+        warnings.append(f"{which} inside another and {'changes' if len(inner) == 1 else 'change'} nothing.")
+    if inward.any():
+        several = int(inward.sum())
+        repairs.append(
+            "turned an inside-out surface outward."
+            if several == 1
+            else f"turned {several} inside-out surfaces outward."
+        )
+    outer = count - len(inner)
     if outer > 1:
         warnings.append(f"the surface consists of {outer} bodies; light does not pass between those that are apart.")
-    return result, outer < len(parts)
+    return np.where(inward[body][:, None], faces[:, ::-1], faces), bool(inner)
 
 
-def _box_within(inner: FloatArray, outer: FloatArray) -> bool:
-    return bool(
-        (inner.min(axis=(0, 1)) >= outer.min(axis=(0, 1))).all()
-        and (inner.max(axis=(0, 1)) <= outer.max(axis=(0, 1))).all()
-    )
+def _to_turn(edges: Edges, count: int) -> BoolArray | None:
+    """Which triangles to turn over, (m,), for each edge between two to be walked once each way; None if nothing helps.
+
+    Each triangle stands in a graph twice, as it is and turned over, and is joined to its neighbours as they would go
+    with it. Where both are in one part there is a way round from one side of the surface to the other.
+    """
+    from scipy.sparse import coo_matrix  # noqa: PLC0415
+    from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
+
+    between_two = np.flatnonzero(edges.triangles[edges.edge] == 2)
+    pairs = between_two[np.argsort(edges.edge[between_two], kind="stable")].reshape(-1, 2)
+    against = count * (edges.balance[edges.edge[pairs[:, 0]]] != 0)
+    one, other = (pairs % count).T
+    rows, columns = np.concatenate([one, one + count]), np.concatenate([other + against, other + count - against])
+    graph = coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(2 * count, 2 * count))
+    part = connected_components(graph, directed=False)[1]
+    as_is, turned = part[:count], part[count:]
+    return None if (as_is == turned).any() else np.asarray(as_is > turned)
+
+
+def _volume_of(corners: FloatArray) -> float:
+    """Signed volume within triangles (f, 3, 3)."""
+    return signed_volume(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
 def bodies(point_count: int, cells: IntArray) -> IntArray:
@@ -304,64 +385,3 @@ def bodies(point_count: int, cells: IntArray) -> IntArray:
     labels = connected_components(graph, directed=False)[1][cells[:, 0]]
     _, compact = np.unique(labels, return_inverse=True)
     return np.asarray(compact.reshape(-1), dtype=np.int64)
-
-
-def count_self_intersections(points: FloatArray, faces: IntArray) -> int:
-    """How many triangles are pierced by an edge of a triangle that shares no vertex with that edge.
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray
-    faces : (m, 3) ndarray
-        A closed surface, consistently oriented.
-    """
-    corners = points[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    heights = np.einsum("ij,ij->i", normals, corners[:, 0])
-    folded: BoolArray = np.asarray((~_flat_fans(points, faces, normals)[faces]).any(axis=1))
-    pierced = np.zeros(len(faces), dtype=bool)
-    for i, j in overlapping_boxes(corners.min(axis=1), corners.max(axis=1)):
-        shared = np.zeros(len(i), dtype=np.int8)
-        for a in faces.T:
-            for b in faces.T:
-                shared += a[i] == b[j]
-        # Neighbours overlap as boxes, and round a flat fan they meet at their vertex only.
-        suspect = (shared == 0) | ((shared == 1) & folded[i] & folded[j])
-        first, second = i[suspect], j[suspect]
-        for face, other in ((first, second), (second, first)):
-            side = np.einsum("ij,ikj->ik", normals[face], corners[other]) - heights[face][:, None]
-            for a, b in ((0, 1), (1, 2), (2, 0)):
-                start, end = faces[other, a], faces[other, b]
-                # Of the two triangles at an edge one walks it up the vertex numbers: once is enough.
-                crosses = (start < end) & (side[:, a] * side[:, b] < 0)
-                target, start, end = face[crosses], start[crosses], end[crosses]
-                apart = (faces[target] != start[:, None]).all(axis=1) & (faces[target] != end[:, None]).all(axis=1)
-                target, start, end = target[apart], points[start[apart]], points[end[apart]]
-                t, _ = cross_segments(start, end - start, corners[target], slack=1e-9)
-                # An edge that ends on a triangle touches it; one that passes through its rim crosses the surface.
-                pierced[target[(t > TOUCH) & (t < 1.0 - TOUCH)]] = True
-    return int(pierced.sum())
-
-
-def _flat_fans(points: FloatArray, faces: IntArray, normals: FloatArray) -> BoolArray:
-    """Whether the triangles round each vertex project onto its tangent plane without overlap, (n,).
-
-    Then no two of them meet elsewhere (Volino & Magnenat-Thalmann 1994). They do if all face the same side of
-    the plane and go round the vertex once; `normals` need no length.
-    """
-    axis = np.empty_like(points)
-    for k in range(3):
-        axis[:, k] = np.bincount(faces.ravel(), np.repeat(normals[:, k], 3), minlength=len(points))
-    length = np.linalg.norm(axis, axis=1)
-    axis /= np.where(length > 0, length, 1.0)[:, None]
-    turn = np.zeros(len(points))
-    flat = length > 0
-    for k in range(3):
-        vertex = faces[:, k]
-        up = axis[vertex]
-        u, v = (points[faces[:, (k + i) % 3]] - points[vertex] for i in (1, 2))
-        facing = np.einsum("ij,ij->i", normals, up)
-        flat[vertex[facing <= 0]] = False
-        along = np.einsum("ij,ij->i", u, v) - np.einsum("ij,ij->i", u, up) * np.einsum("ij,ij->i", v, up)
-        turn += np.bincount(vertex, np.arctan2(facing, along), minlength=len(points))
-    return np.asarray(flat & (np.abs(turn - 2.0 * np.pi) < 1e-6))

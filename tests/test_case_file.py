@@ -91,7 +91,7 @@ def at(line: int) -> str:
             "  sigma_a: lots",
             at(5) + r"medium\.sigma_a: expected a number, but found 'lots'",
         ),
-        ("  sigma_a: 1e-1", "  sigma_a: yes", at(5) + r"medium\.sigma_a: expected a number, but found True"),
+        ("  sigma_a: 1e-1", "  sigma_a: yes", at(5) + r"medium\.sigma_a: expected a number, but found true"),
         ("  sigma_a: 1e-1", "  sigma_a: .nan", at(5) + r"medium\.sigma_a: .*finite"),
         ("  sigma_a: 1e-1\n", "", at(4) + r"medium\.sigma_a: this key is missing"),
         ("  eta: 1.4", "  eta: 1.4\n  sigma_s: 3", at(8) + r"medium\.sigma_s: .*given together"),
@@ -117,7 +117,7 @@ def at(line: int) -> str:
             "position: [0, 0, 7]",
             at(10) + r"lights\[1\]: the point source .* outside",
         ),
-        ("power: 0.5", "power: 0", at(9) + r"lights\[0\]: power is 0"),
+        ("power: 0.5", "power: 0", at(9) + r"lights\[0\]\.pencil\.power: power is 0"),
         ("depth: 1}", "depth: 1}, scale: 3", at(3) + "surface: scale belongs to a file"),
         ("width: 6, depth: 1", "width: 0.02, depth: 0.01", "absurdly small for diffusion; check the unit"),
         ("width: 6, depth: 1", "width: 6e6, depth: 1e6", "absurdly large for diffusion; check the unit"),
@@ -239,3 +239,47 @@ def test_a_crease_angle_of_nought_takes_triangles_as_they_are(tmp_path: Path) ->
     (flat,) = load(tmp_path, GOOD.replace("depth: 1}}", "depth: 1}, crease_angle: 0}"))
     assert round_.surface.crease_angle == 30
     assert flat.surface.crease_angle == 0
+
+
+@pytest.mark.parametrize("name", ["..yaml", "...yaml", "a\nb.yaml"])
+def test_a_file_whose_name_makes_no_folder_needs_another(name: str, tmp_path: Path) -> None:
+    """`...yaml` would be a case named `..`, and its results beside those of all others."""
+    text = GOOD.replace("name: plate\n", "")
+    assert load(tmp_path, GOOD, name)[0].name == "plate"
+    with pytest.raises(InputError, match="name: this makes no name of a folder"):
+        load(tmp_path, text, name)
+
+
+def test_a_sweep_makes_folders_below_the_case_only(tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    for file in (tmp_path / "b.off", tmp_path / "a" / "b.off"):
+        cube = box((6.0, 6.0, 1.0))
+        lines = ["OFF", "8 12 0", *(" ".join(map(str, p)) for p in cube.points)]
+        file.write_text("\n".join([*lines, *("3 " + " ".join(map(str, f)) for f in cube.faces)]) + "\n")
+    text = GOOD.replace("slab: {width: 6, depth: 1}", "file: b.off").replace("[0, 0, -0.5]", "[0, 0, 0]")
+    cases = load(tmp_path, text + "sweep: {surface.file: [./b.off, ../" + tmp_path.name + "/b.off]}\n")
+    assert [case.name for case in cases] == [
+        "plate/surface.file=._b.off",
+        f"plate/surface.file=.._{tmp_path.name}_b.off",
+    ]
+    with pytest.raises(InputError, match="two runs would be written to one folder"):
+        load(tmp_path, text + "sweep: {surface.file: [a/b.off, a//b.off, a_/b.off]}\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("sweep: {lights.²: [1]}", r'sweep\.lights\.²: "lights\.²" is no key of this case'),
+        ("sweep: {<<: {medium.eta: [1.4, -1]}}", r"line 13: medium\.eta: eta is -1"),
+        ("sweep: {medium.eta: [[1]]}", r"sweep\.medium\.eta\[0\]: expected a number or a word, but found \[1\]"),
+        ("outputs: !!set {surface}", r'line 13: not valid YAML: tags such as "!!set" are not read here'),
+        ("camera: 2001-01-01", r"camera: expected keys and values, but found '2001-01-01'"),
+        ("camera: 0x" + "f" * 5000, "line 13: not valid YAML: this is no number, or one that is too large"),
+        ("camera: " + "[" * 60 + "]" * 60, "nested more than 50 deep"),
+        ("camera: &a {position: *a}", "an alias stands within what it stands for"),
+        ("? " + "x" * 2000 + "\n: 1", r"^.{,910}$"),
+    ],
+)
+def test_odd_values_are_told_in_plain_words(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, GOOD.replace("outputs: [surface]\n", "") + text + "\n")

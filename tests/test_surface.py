@@ -1,5 +1,6 @@
 """Reading, checking and mending surfaces."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from tetlux.meshing import (
     InputError,
     Surface,
     box,
+    crossings,
     cylinder,
     proximity,
     read_surface,
@@ -19,8 +21,8 @@ from tetlux.meshing import (
     torus,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.proximity import cross_segments, overlapping_boxes
-from tetlux.meshing.repair import count_self_intersections
 
 
 @pytest.fixture
@@ -320,3 +322,65 @@ def test_boxes_that_overlap_are_found_once(portion: int, monkeypatch: pytest.Mon
 
 def test_one_box_overlaps_nothing() -> None:
     assert [len(i) for i, _ in overlapping_boxes(np.zeros((1, 3)), np.ones((1, 3)))] == [0]
+
+
+def test_a_tangle_is_refused() -> None:
+    ball = sphere(1.0, subdivisions=2)
+    shuffled = np.random.default_rng(0).permutation(ball.points)
+    with pytest.raises(InputError, match=r"crosses itself at 3\d\d of 320 triangles, a tangle"):
+        surface_from_arrays(shuffled, ball.faces)
+
+
+def test_triangles_that_do_not_join_are_told_at_once() -> None:
+    ball = sphere(10.0, subdivisions=5)
+    soup = ball.points[ball.faces].reshape(-1, 3) + np.random.default_rng(0).normal(scale=1e-3, size=(61440, 3))
+    with pytest.raises(InputError, match="61,440 of 61,440 edges belong to one triangle only"):
+        surface_from_arrays(soup, np.arange(61440).reshape(-1, 3))
+
+
+def test_a_surface_in_thousands_of_bodies_is_refused() -> None:
+    grain = sphere(0.1, subdivisions=1)
+    places = np.stack(np.meshgrid(*[np.arange(11.0)] * 3), axis=-1).reshape(-1, 3)
+    points = (places[:, None] + grain.points).reshape(-1, 3)
+    faces = (len(grain.points) * np.arange(len(places))[:, None, None] + grain.faces).reshape(-1, 3)
+    with pytest.raises(InputError, match=r"falls into 1,331 bodies .* more than 1,000"):
+        surface_from_arrays(points, faces)
+    few = surface_from_arrays(points[: 40 * len(grain.points)], faces[: 40 * len(grain.faces), ::-1])
+    assert few.repairs == ("turned 40 inside-out surfaces outward.",)
+
+
+def test_needles_side_by_side_are_looked_at_so_far_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their number squared pairs overlap: 10,000 in a fan took a minute, 100,000 would hours."""
+    monkeypatch.setattr(crossings, "PAIRS", (30, 0))
+    tin = cylinder(10.0, 0.1, segments=600)
+    assert any("was not looked at" in warning for warning in tin.warnings)
+
+
+def test_a_body_far_away_is_as_exact_as_its_digits() -> None:
+    ball = sphere(10.0, subdivisions=2)
+    assert surface_from_arrays(ball.points + 1e6, ball.faces).warnings == ()
+    rounded = surface_from_arrays((ball.points + 1e6).astype(np.float32), ball.faces)
+    assert any("rounded to 0.2% of its size" in warning for warning in rounded.warnings)
+    with pytest.raises(InputError, match="far from the origin"):
+        surface_from_arrays((ball.points + 1e9).astype(np.float32), ball.faces)
+
+
+def test_winding_is_mended_in_each_of_many_parts() -> None:
+    ball = sphere(10.0, subdivisions=3)
+    random = np.random.default_rng(0)
+    turned = np.where((random.random(len(ball.faces)) < 0.3)[:, None], ball.faces[:, ::-1], ball.faces)
+    two = np.vstack([turned, turned[:, ::-1] + len(ball.points)])
+    surface = surface_from_arrays(np.vstack([ball.points, ball.points + 30.0]), two)
+    assert surface.volume == pytest.approx(2 * ball.volume)
+    assert surface.repairs[0] == "made the winding of the triangles consistent."
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs pipes and devices")
+def test_pipes_and_devices_are_no_surfaces(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "zero.ply").symlink_to("/dev/zero")
+    for name in ("pipe.stl", "zero.ply"):
+        with pytest.raises(InputError, match="is no file but a device"):
+            read_surface(tmp_path / name)
+    with pytest.raises(InputError, match="does not exist"):
+        read_surface(tmp_path / ("x" * 5000 + ".stl"))

@@ -11,6 +11,9 @@ from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
+# A point nearer to the surface than this share of the body's diagonal is on it.
+ON_SURFACE = 1e-9
+
 
 def as_vector(value: Vector, name: str) -> FloatArray:
     """Three finite coordinates as an array, or an InputError that names them."""
@@ -72,6 +75,8 @@ class PointSource:
             )
         nearest, _ = surface.closest(position[None])
         depth = float(np.linalg.norm(nearest[0] - position))
+        if depth <= ON_SURFACE * surface.diagonal:
+            raise InputError(f"the point source at {_text(position)} lies on the surface; move it inside.")
         return Deposit(
             incident=self.power,
             points=position[None],
