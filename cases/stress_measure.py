@@ -1,7 +1,7 @@
 """What is measured of one scene of the stress map and one method."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -105,7 +105,10 @@ def measured(scene: Scene, method: Method) -> Figures:
     error = scaling = None
     if scene.truth is not None:
         samples, exitance = scene.truth
-        error = relative_error(solution.exitance_at(samples.points), exitance, samples.weights)
+        # In units of its own, for the squares of what is left of light in an opaque body.
+        largest = float(exitance.max())
+        values = solution.exitance_at(samples.points)
+        error = relative_error(values / largest, exitance / largest, samples.weights)
     if scene.alike is not None:
         here, there = _free_of_scale(solution), _free_of_scale(_solved(scene.alike, method))
         scaling = float(np.abs(here - there).max() / np.abs(there).max())

@@ -143,5 +143,5 @@ def _answered(make: Callable[..., object], x: Value, y: Value, method: Method) -
         return "ran", "", measured(scene, method)  # type: ignore[arg-type]
     except TetluxError as error:
         return "refused", str(error), None
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is a row of the table
+    except Exception as error:  # whatever it is, it is a row of the table
         return "failed", f"{type(error).__name__}: {error}", None

@@ -21,8 +21,8 @@ TOLERANCE = 0.05
 # The ball of all panels where a mesh is given, by its radius in mean edges of that mesh.
 SUBDIVISIONS, LAYERS, CORE_LAYERS = 2, 5, 3
 INDEX = 1.4
-# Depth of a point by the radius, on a given mesh: not that of a node.
-OFF_NODES = 0.53
+# Depth of a point on a mesh of unit edges: not that of a node.
+OFF_NODES = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +109,7 @@ def point_by_decay_and_albedo(decay: float, albedo: float) -> Scene:
     """A point in a ball on a given mesh, by its reduced albedo and the sigma_tr h of that mesh, of mean edge h = 1."""
     mesh = mesh_of_unit_edges()
     radius = float(np.linalg.norm(mesh.points, axis=1).max())
-    # Not at a node, nor on an edge.
-    return point_in_ball(decaying(albedo, decay), radius, OFF_NODES * radius, mesh)
+    return point_in_ball(decaying(albedo, decay), radius, OFF_NODES, mesh)
 
 
 def diffuse_by_decay_and_albedo(decay: float, albedo: float) -> Scene:
@@ -124,7 +123,7 @@ def by_decay_and_quality(decay: float, quality: float) -> Scene:
     """A ball with slivers and needles in its mesh, by the worst one's quality and the sigma_tr h of that mesh."""
     mesh = mesh_of_unit_edges()
     radius = float(np.linalg.norm(mesh.points, axis=1).max())
-    return point_in_ball(decaying(0.9, decay), radius, OFF_NODES * radius, spoiled(mesh, quality))
+    return point_in_ball(decaying(0.9, decay), radius, OFF_NODES, spoiled(mesh, quality))
 
 
 def mesh_of_unit_edges(core: int = 0) -> TetMesh:
@@ -192,9 +191,7 @@ def two_balls(
 ) -> Scene:
     """A ball with a core of .6 of its radius, whose coefficients are so many times the ball's."""
     assert shell.sigma_s_prime is not None
-    core = Medium(
-        sigma_a=absorption * shell.sigma_a, sigma_s_prime=scattering * shell.sigma_s_prime, eta=shell.eta
-    )
+    core = Medium(sigma_a=absorption * shell.sigma_a, sigma_s_prime=scattering * shell.sigma_s_prime, eta=shell.eta)
     inner = CORE_LAYERS / LAYERS * radius
     light = DiffuseLight(1.0) if of == "diffuse" else Emission(1.0, region=1)
     surface = shapes.sphere(radius)

@@ -71,7 +71,7 @@ def _growth(k: float, r: float) -> float:
 
 
 def _carried(k: float, length: float, value: float, slope: float) -> tuple[float, float]:
-    """f and f' a length on, by those at its start, both times ``e^{-k length}``."""
+    """Carry f and f' a length on, by those at its start, both times ``e^{-k length}``."""
     x = k * length
     fall = math.exp(-2.0 * x)
     cosh, sinh = 0.5 * (1.0 + fall), 0.5 * (1.0 - fall)
