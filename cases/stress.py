@@ -1,7 +1,6 @@
 """`tetlux stress`: scenes to the edges and beyond, and a map of what breaks there."""
 
 import csv
-import os
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
@@ -14,9 +13,11 @@ from tetlux.cases.stress_picture import draw_map
 from tetlux.cases.stress_rules import broken, violations
 from tetlux.cases.stress_runs import TIME_LIMIT, Run, runs_of
 from tetlux.cases.stress_scenes import TOLERANCE
-from tetlux.cases.stress_words import in_words, place_of
+from tetlux.cases.stress_words import in_words
 from tetlux.meshing.errors import RunError
 
+# Runs between two lines that say how far it is.
+PROGRESS = 50
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (
     *("panel", "x_name", "x", "y_name", "y", "method", "outcome", "message", "broken", "violation"),
@@ -45,7 +46,7 @@ def stress(
     time_limit : float
         Seconds after which a scene counts as hung.
     report : callable
-        Called with a line of text for each run that breaks a rule, and with the map in words.
+        Called with lines of text on the way, and with the map in words.
 
     Returns
     -------
@@ -64,20 +65,12 @@ def stress(
     total = sum(len(panel.places()) * len(panel.methods) for panel in panels)
     report(f"{total} runs on {len(panels)} pairs of axes")
     runs: list[Run] = []
-    # Methods are compared on the same mesh, and one made earlier by another version says nothing.
-    with tempfile.TemporaryDirectory(prefix="tetlux-stress-") as folder:
-        before = os.environ.get("TETLUX_CACHE_DIR")
-        os.environ["TETLUX_CACHE_DIR"] = folder
-        try:
-            for run in runs_of(panels, time_limit=time_limit):
-                runs.append(run)
-                for rule, figure in violations(run).items():
-                    report(f"{len(runs)}/{total} {place_of(run)}: {rule}, {figure}")
-        finally:
-            if before is None:
-                del os.environ["TETLUX_CACHE_DIR"]
-            else:
-                os.environ["TETLUX_CACHE_DIR"] = before
+    # None of an earlier version.
+    with tempfile.TemporaryDirectory(prefix="tetlux-stress-") as meshes:
+        for run in runs_of(panels, meshes=Path(meshes), time_limit=time_limit):
+            runs.append(run)
+            if len(runs) % PROGRESS == 0:
+                report(f"{len(runs)} of {total}, {sum(map(bool, map(violations, runs)))} of them violations")
     runs = _in_order(runs, panels)
     words = in_words(runs)
     _write(runs, words, out)

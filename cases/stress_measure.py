@@ -47,6 +47,8 @@ PLAIN = Method("default, not refined", adaptive=False, counts=True)
 CONSISTENT = Method("consistent mass", {"mass": "consistent"})
 FREE_SPACE = Method("free space subtracted", {"subtract": "free-space"})
 NOTHING = Method("nothing subtracted", {"subtract": "nothing"})
+# What bears on the sign of the fluence, one beside the other.
+OF_SIGN = (DEFAULT, CONSISTENT)
 
 
 @dataclass(frozen=True)
@@ -108,7 +110,8 @@ def measured(scene: Scene, method: Method) -> Figures:
         # In units of its own, for the squares of what is left of light in an opaque body.
         largest = float(exitance.max())
         values = solution.exitance_at(samples.points)
-        error = relative_error(values / largest, exitance / largest, samples.weights)
+        with np.errstate(over="ignore"):
+            error = relative_error(values / largest, exitance / largest, samples.weights)
     if scene.alike is not None:
         here, there = _free_of_scale(solution), _free_of_scale(_solved(scene.alike, method))
         scaling = float(np.abs(here - there).max() / np.abs(there).max())

@@ -8,7 +8,7 @@ from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
 # No node is moved next to one that was, so that each makes a bad tetrahedron of its own; these are so many at most.
 MOST_SPOILED = 60
-HALVINGS = 60
+HALVINGS = 40
 
 
 def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0) -> TetMesh:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from tetlux.cases import stress_scenes as scenes
-from tetlux.cases.stress_measure import CONSISTENT, DEFAULT, FREE_SPACE, NOTHING, PLAIN, Method
+from tetlux.cases.stress_measure import DEFAULT, FREE_SPACE, NOTHING, OF_SIGN, PLAIN, Method
 from tetlux.cases.stress_scenes import Scene
 from tetlux.cases.stress_shapes import SHAPES
 
@@ -67,14 +67,14 @@ class Panel:
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.5, 0.99, 1.0))
 BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
 DECAY = Axis("σ_tr h", (0.01, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0), (0.01, 1.0, 10.0, 1000.0))
-INDEX = Axis("refractive index n", (0.5, 0.75, 1.0, 1.4, 2.0, 3.0, 4.0), (0.5, 1.0, 4.0))
-PEAK = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.99))
-DEPTH = Axis("source depth (mean free paths)", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 1.0, 10.0))
-RADIUS = Axis("radius (mean free paths)", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0), (0.1, 1.0, 100.0))
+INDEX = Axis("refractive index n", (0.5, 0.75, 1.0, 1.4, 2.0, 3.0, 4.0), (0.5, 1.0, 1.4, 4.0))
+PEAK = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.8, 0.99))
+DEPTH = Axis("depth (mean free paths)", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 1.0, 10.0))
+RADIUS = Axis("radius (mean free paths)", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0), (0.1, 1.0, 10.0, 100.0))
 THICKNESS = replace(RADIUS, name="thickness (mean free paths)")
 CONTRAST = Axis("contrast, core to shell", (1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6), (1e-6, 1.0, 1e6))
 LENGTH = Axis("radius (units)", (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9), (1e-9, 1.0, 1e9))
-QUALITY = Axis("quality of the worst tetrahedra", (1e-4, 1e-3, 1e-2, 1e-1), (1e-4, 1e-1))
+QUALITY = Axis("worst quality", (1e-4, 1e-3, 1e-2, 1e-1), (1e-4, 1e-2))
 
 PANELS = (
     Panel(
@@ -83,7 +83,7 @@ PANELS = (
         DECAY,
         BELOW_ONE,
         scenes.point_by_decay_and_albedo,
-        (DEFAULT, CONSISTENT, FREE_SPACE, NOTHING),
+        (*OF_SIGN, FREE_SPACE, NOTHING),
     ),
     Panel(
         "albedo and mesh, diffuse light",
@@ -91,23 +91,23 @@ PANELS = (
         DECAY,
         BELOW_ONE,
         scenes.diffuse_by_decay_and_albedo,
-        (DEFAULT, CONSISTENT),
+        OF_SIGN,
     ),
     Panel(
         "bad tetrahedra",
-        "a point in a ball, reduced albedo 0.9, slivers and needles among the tetrahedra",
+        "a point in a ball on a given mesh of edges h, slivers and needles among its tetrahedra",
         DECAY,
         QUALITY,
         scenes.by_decay_and_quality,
-        (DEFAULT, CONSISTENT, NOTHING),
+        (*OF_SIGN, NOTHING),
     ),
     Panel(
         "contrast and mesh",
-        "concentric balls in diffuse light, on a given mesh; σ_tr h of the shell, reduced albedo 0.9",
+        "concentric balls in diffuse light, on a given mesh; σ_tr h of the shell",
         CONTRAST,
         DECAY,
         scenes.by_contrast_and_decay,
-        (DEFAULT, CONSISTENT),
+        OF_SIGN,
     ),
     Panel(
         "contrasts",
@@ -123,7 +123,7 @@ PANELS = (
         INDEX,
         ALBEDO,
         scenes.by_index_and_albedo,
-        (DEFAULT, PLAIN, CONSISTENT, NOTHING),
+        (*OF_SIGN, PLAIN, NOTHING),
     ),
     Panel(
         "depth and curvature",
@@ -144,7 +144,7 @@ PANELS = (
     ),
     Panel(
         "forward peak and index",
-        "a beam across a ball of radius 5 mean free paths, compared a mean free path off",
+        "a beam through a ball of radius 5, compared 1 mean free path off",
         PEAK,
         INDEX,
         scenes.by_peak_and_index,

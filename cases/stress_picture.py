@@ -1,6 +1,7 @@
 """The stress map as a picture: for each panel a map of each method, coloured by error, with what breaks marked."""
 
 import math
+import re
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,7 +23,7 @@ from tetlux.cases.stress_scenes import TOLERANCE
 # Inches: the picture's width, a map, the gap between two, what is left and right of a panel's maps, above and below
 # them, more of it where an axis has words for values, and what the legend needs.
 WIDTH, MAP, GAP, LEFT, RIGHT, ABOVE, BELOW = 17.0, (2.2, 1.75), 0.12, 0.85, 0.25, 0.85, 0.75
-WORDS_LEFT, WORDS_BELOW, LEGEND = 0.75, 0.45, 1.5
+WORDS_LEFT, WORDS_BELOW, WORDS_MAP, LEGEND = 0.75, 0.45, 3.8, 1.5
 # The tolerance is where the colours change: as many decades either way.
 DECADES = 1.5
 COLOURS = colormaps["BrBG_r"]
@@ -67,7 +68,11 @@ def _in_words(axis: Axis) -> bool:
 
 def _width(panel: Panel) -> float:
     left = LEFT + WORDS_LEFT * _in_words(panel.y)
-    return left + len(panel.methods) * (MAP[0] + GAP) + RIGHT
+    return left + len(panel.methods) * (_map_width(panel) + GAP) + RIGHT
+
+
+def _map_width(panel: Panel) -> float:
+    return WORDS_MAP if _in_words(panel.x) else MAP[0]
 
 
 def _height(panel: Panel) -> float:
@@ -93,18 +98,12 @@ def _draw_panel(figure: Figure, panel: Panel, runs: list[Run], left: float, top:
     figure.text(
         (left + 0.2) / WIDTH, (top - 0.32) / height, panel.name, fontsize=15, fontweight="bold", color=INK, va="bottom"
     )
-    room = int(13.0 * (_width(panel) - 0.3))
-    figure.text(
-        (left + 0.2) / WIDTH,
-        (top - 0.35) / height,
-        textwrap.shorten(panel.told, room),
-        fontsize=10.5,
-        color=INK,
-        va="top",
-    )
+    told = textwrap.shorten(_symbols(panel.told), int(14.5 * (_width(panel) - 0.3)))
+    figure.text((left + 0.2) / WIDTH, (top - 0.35) / height, told, fontsize=10.5, color=INK, va="top")
     for number, method in enumerate(panel.methods):
-        x = start + number * (MAP[0] + GAP)
-        axes = figure.add_axes((x / WIDTH, (top - ABOVE - MAP[1]) / height, MAP[0] / WIDTH, MAP[1] / height))
+        wide = _map_width(panel)
+        x = start + number * (wide + GAP)
+        axes = figure.add_axes((x / WIDTH, (top - ABOVE - MAP[1]) / height, wide / WIDTH, MAP[1] / height))
         axes.set_title(method.name, fontsize=11, color=INK, pad=4, fontweight="bold" if method.counts else None)
         axes.set(xlim=(0, len(panel.x.values)), ylim=(0, len(panel.y.values)))
         for run in runs:
@@ -118,10 +117,14 @@ def _label(axes: Axes, panel: Panel, *, first: bool) -> None:
     turned = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if _in_words(x) else {}
     axes.set_xticks([i + 0.5 for i in range(len(x.values))], [_text(value) for value in x.values], **turned)
     axes.set_yticks([i + 0.5 for i in range(len(y.values))], [_text(value) for value in y.values] if first else [])
-    axes.set_xlabel(x.name, fontsize=11, color=INK)
-    axes.set_ylabel(y.name if first else "", fontsize=11, color=INK)
+    axes.set_xlabel(_symbols(x.name), fontsize=11, color=INK)
+    axes.set_ylabel(_symbols(y.name) if first else "", fontsize=11, color=INK)
     axes.tick_params(length=0, labelsize=9.5, colors=INK)
     axes.spines[:].set_color("#9aa0aa")
+
+
+def _symbols(name: str) -> str:
+    return re.sub(r"σ_(\w+)('?)", r"$\\sigma_{\1}\2$", name)
 
 
 def _text(value: Value) -> str:
@@ -142,7 +145,7 @@ def _draw_cell(axes: Axes, run: Run) -> None:
         _fill(axes, x, y, face, "" if run.outcome == "failed" else "/////", "#a4a8b0")
     else:
         value = figures.estimate if figures.error is None else figures.error
-        face = COLOURS(_norm()(value)) if math.isfinite(value) else FAILED
+        face = FAILED if math.isnan(value) else COLOURS(_norm()(value))
         _fill(axes, x, y, face, "...." if figures.error is None else "", "#ffffff")
         if is_warned(figures):
             axes.plot(x + 0.84, y + 0.8, "o", markersize=3.2, color="white", markeredgecolor=INK, markeredgewidth=0.7)

@@ -1,12 +1,14 @@
 """Scenes run in processes of their own, so that a crash or a hang of one ends none of the others."""
 
 import contextlib
+import os
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 
 from tetlux.cases.stress_measure import Figures, Method, measured
 from tetlux.cases.stress_panels import Panel, Value
@@ -14,7 +16,7 @@ from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import TetluxError
 
 # Seconds that a scene may take.
-TIME_LIMIT = 300.0
+TIME_LIMIT = 120.0
 _spawning = get_context("spawn")
 
 
@@ -57,10 +59,20 @@ class _Job:
 _Answer = tuple[str, str, Figures | None]
 
 
-def runs_of(panels: Sequence[Panel], *, time_limit: float = TIME_LIMIT) -> Iterator[Run]:
-    """Run all methods on all scenes, some at a time, and yield them as they end."""
-    jobs = deque(_Job(panel, x, y, method) for panel in panels for x, y in panel.places() for method in panel.methods)
-    workers = [_Worker() for _ in range(min(THREADS, len(jobs)))]
+def runs_of(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIME_LIMIT) -> Iterator[Run]:
+    """Run all methods on all scenes, some at a time, and yield them as they end.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+    meshes : Path
+        Folder where the mesher's meshes are kept: methods are compared on the same ones.
+    time_limit : float
+        Seconds that a scene may take.
+    """
+    # One method after the other: scenes of the same body at the same time would both have it meshed.
+    jobs = deque(_Job(panel, x, y, method) for panel in panels for method in panel.methods for x, y in panel.places())
+    workers = [_Worker(meshes) for _ in range(min(THREADS, len(jobs)))]
     try:
         for worker in workers:
             worker.start(jobs.popleft(), time_limit)
@@ -85,23 +97,27 @@ def runs_of(panels: Sequence[Panel], *, time_limit: float = TIME_LIMIT) -> Itera
 class _Worker:
     """A process that solves one scene after the other; a new one takes the place of one that died."""
 
-    def __init__(self) -> None:
+    def __init__(self, meshes: Path) -> None:
+        self._meshes = meshes
         self.job: _Job | None = None
         self.deadline = 0.0
         self._begin()
 
     def _begin(self) -> None:
         self.connection, theirs = _spawning.Pipe()
-        self._process = _spawning.Process(target=_work, args=(theirs,))
+        self._process = _spawning.Process(target=_work, args=(theirs, self._meshes), daemon=True)
         self._process.start()
         theirs.close()
+        self._ready = False
 
     def start(self, job: _Job, time_limit: float) -> None:
-        """Have a job done."""
-        self.job, self.deadline = job, time.monotonic() + time_limit
+        """Have a job done; the time that the process takes to start does not count."""
         # If it died meanwhile, its answer will be that.
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, EOFError):
+            if not self._ready:
+                self._ready = self.connection.recv()
             self.connection.send((job.panel.make, job.x, job.y, job.method))
+        self.job, self.deadline = job, time.monotonic() + time_limit
 
     def answer(self, time_limit: float) -> _Answer | None:
         """What came of its job; None if it is still at it."""
@@ -130,9 +146,11 @@ class _Worker:
         self.connection.close()
 
 
-def _work(connection: Connection) -> None:
+def _work(connection: Connection, meshes: Path) -> None:
     """Solve what comes in, until there is no one left to answer."""
+    os.environ["TETLUX_CACHE_DIR"] = str(meshes)
     with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
+        connection.send(True)
         while True:
             connection.send(_answered(*connection.recv()))
 

@@ -68,6 +68,11 @@ def decaying(albedo: float, sigma_tr: float) -> Medium:
     return turbid(albedo, free_path=float(np.sqrt(3.0 * (1.0 - albedo))) / sigma_tr)
 
 
+def in_range(decay: float) -> Medium:
+    """A medium by the sigma_tr h of a mesh of unit edges, whose ball is neither too small nor too large."""
+    return decaying(0.97 if decay < 1.0 else 0.5, decay)
+
+
 def _samples(surface: Surface, medium: Medium, light: Light) -> Samples:
     deposit = light.deposit_in(surface, medium)
     return Samples(*surface_samples(surface, *lit_points([deposit], medium)))
@@ -123,7 +128,7 @@ def by_decay_and_quality(decay: float, quality: float) -> Scene:
     """A ball with slivers and needles in its mesh, by the worst one's quality and the sigma_tr h of that mesh."""
     mesh = mesh_of_unit_edges()
     radius = float(np.linalg.norm(mesh.points, axis=1).max())
-    return point_in_ball(decaying(0.9, decay), radius, OFF_NODES, spoiled(mesh, quality))
+    return point_in_ball(in_range(decay), radius, OFF_NODES, spoiled(mesh, quality))
 
 
 def mesh_of_unit_edges(core: int = 0) -> TetMesh:
@@ -178,7 +183,7 @@ def by_contrast_and_decay(contrast: float, decay: float) -> Scene:
     """Concentric balls on a given mesh in diffuse light: sigma_a and sigma_s' of the core are `contrast` times."""
     mesh = mesh_of_unit_edges(CORE_LAYERS)
     radius = float(np.linalg.norm(mesh.points, axis=1).max())
-    return two_balls("diffuse", decaying(0.9, decay), contrast, contrast, radius, mesh)
+    return two_balls("diffuse", in_range(decay), contrast, contrast, radius, mesh)
 
 
 def by_contrasts(scattering: float, absorption: float) -> Scene:

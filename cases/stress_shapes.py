@@ -61,7 +61,7 @@ def _spike() -> Surface:
 
 
 def _needle() -> Surface:
-    return stretched(shapes.sphere(1.0, subdivisions=3), np.array([0.5, 0.5, 10.0]), "needle")
+    return stretched(shapes.sphere(1.0, subdivisions=2), np.array([0.5, 0.5, 10.0]), "needle")
 
 
 def _touching_balls() -> Surface:
@@ -81,7 +81,7 @@ SHAPES: dict[str, tuple[Callable[[], Surface], Vector]] = {
     "thin plate": (lambda: shapes.box((20.0, 20.0, 0.4)), (1.0, 2.0, 0.1)),
     "spike": (_spike, (0.1, 0.0, 15.0)),
     "thin neck": (_neck, (0.1, 0.0, 5.0)),
-    "thin ring": (lambda: shapes.torus(8.0, 0.5), (8.1, 0.0, 0.0)),
+    "thin ring": (lambda: shapes.torus(8.0, 0.5, segments=48), (8.1, 0.0, 0.0)),
     "touching balls": (_touching_balls, (0.1, 0.2, 1.0)),
     "touching boxes": (_touching_boxes, (0.3, 0.2, 0.5)),
     "cavity": (lambda: hollow(8.0, 5.0, "cavity"), (0.1, 0.2, 7.0)),

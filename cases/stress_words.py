@@ -40,7 +40,7 @@ def in_words(runs: Sequence[Run]) -> str:
         "## Violations",
         "",
     ]
-    found = [f"* {place_of(run)}: {rule}, {figure}." for run in runs for rule, figure in violations(run).items()]
+    found = [f"* {_place(run)}: {rule}, {figure}." for run in runs for rule, figure in violations(run).items()]
     lines += found or ["None."]
     lines += ["", "## What breaks where", ""]
     breaking = [line for group in groups for line in _ranges(group)]
@@ -110,7 +110,7 @@ def _range(axis: Axis, values: list[Value]) -> str:
     return f"{axis.name} {low:g}" if low == high else f"{axis.name} {low:g} to {high:g}"
 
 
-def place_of(run: Run) -> str:
+def _place(run: Run) -> str:
     """Where on the map a run is."""
     values = ((run.panel.x, run.x), (run.panel.y, run.y))
     where = ", ".join(_range(axis, [value]) for axis, value in values)
