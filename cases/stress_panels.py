@@ -64,13 +64,13 @@ class Panel:
         return [(x, y) for y in self.y.values for x in self.x.values if self.fits(x, y)]
 
 
-ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.5, 0.99, 1.0))
+ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
 BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
 DECAY = Axis("σ_tr h", (0.01, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0), (0.01, 1.0, 10.0, 1000.0))
-INDEX = Axis("refractive index n", (0.5, 0.75, 1.0, 1.4, 2.0, 3.0, 4.0), (0.5, 1.0, 1.4, 4.0))
-PEAK = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.8, 0.99))
+INDEX = Axis("refractive index n", (0.5, 0.75, 1.0, 1.4, 2.0, 3.0, 4.0), (0.5, 1.0, 4.0))
+PEAK = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.99))
 DEPTH = Axis("depth (mean free paths)", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 1.0, 10.0))
-RADIUS = Axis("radius (mean free paths)", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0), (0.1, 1.0, 10.0, 100.0))
+RADIUS = Axis("radius (mean free paths)", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0), (0.1, 1.0, 100.0))
 THICKNESS = replace(RADIUS, name="thickness (mean free paths)")
 CONTRAST = Axis("contrast, core to shell", (1e-6, 1e-4, 1e-2, 1.0, 1e2, 1e4, 1e6), (1e-6, 1.0, 1e6))
 LENGTH = Axis("radius (units)", (1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9), (1e-9, 1.0, 1e9))

@@ -23,10 +23,11 @@ from tetlux.cases.stress_scenes import TOLERANCE
 # Inches: the picture's width, a map, the gap between two, what is left and right of a panel's maps, above and below
 # them, more of it where an axis has words for values, and what the legend needs.
 WIDTH, MAP, GAP, LEFT, RIGHT, ABOVE, BELOW = 17.0, (2.2, 1.75), 0.12, 0.85, 0.25, 0.85, 0.75
-WORDS_LEFT, WORDS_BELOW, WORDS_MAP, LEGEND = 0.75, 0.45, 3.8, 1.5
+WORDS_LEFT, WORDS_BELOW, WORDS_MAP, LEGEND = 0.75, 0.45, 3.8, 1.8
 # The tolerance is where the colours change: as many decades either way.
 DECADES = 1.5
 COLOURS = colormaps["BrBG_r"]
+Colour = str | tuple[float, float, float, float]
 REFUSED, FAILED, VIOLATION = "#d5d7db", "#22252c", "#e6004c"
 NOTE = (
     "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted where there is none: "
@@ -98,7 +99,7 @@ def _draw_panel(figure: Figure, panel: Panel, runs: list[Run], left: float, top:
     figure.text(
         (left + 0.2) / WIDTH, (top - 0.32) / height, panel.name, fontsize=15, fontweight="bold", color=INK, va="bottom"
     )
-    told = textwrap.shorten(_symbols(panel.told), int(14.5 * (_width(panel) - 0.3)))
+    told = _symbols(textwrap.shorten(panel.told, int(14.5 * (_width(panel) - 0.3))))
     figure.text((left + 0.2) / WIDTH, (top - 0.35) / height, told, fontsize=10.5, color=INK, va="top")
     for number, method in enumerate(panel.methods):
         wide = _map_width(panel)
@@ -114,13 +115,15 @@ def _draw_panel(figure: Figure, panel: Panel, runs: list[Run], left: float, top:
 
 def _label(axes: Axes, panel: Panel, *, first: bool) -> None:
     x, y = panel.x, panel.y
-    turned = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"} if _in_words(x) else {}
-    axes.set_xticks([i + 0.5 for i in range(len(x.values))], [_text(value) for value in x.values], **turned)
+    axes.set_xticks([i + 0.5 for i in range(len(x.values))], [_text(value) for value in x.values])
     axes.set_yticks([i + 0.5 for i in range(len(y.values))], [_text(value) for value in y.values] if first else [])
     axes.set_xlabel(_symbols(x.name), fontsize=11, color=INK)
     axes.set_ylabel(_symbols(y.name) if first else "", fontsize=11, color=INK)
     axes.tick_params(length=0, labelsize=9.5, colors=INK)
     axes.spines[:].set_color("#9aa0aa")
+    if _in_words(x):
+        for label in axes.get_xticklabels():
+            label.set(rotation=40, horizontalalignment="right", rotation_mode="anchor")
 
 
 def _symbols(name: str) -> str:
@@ -141,12 +144,18 @@ def _draw_cell(axes: Axes, run: Run) -> None:
     x, y = run.panel.x.values.index(run.x), run.panel.y.values.index(run.y)
     figures = run.figures
     if figures is None:
-        face = FAILED if run.outcome == "failed" else REFUSED
-        _fill(axes, x, y, face, "" if run.outcome == "failed" else "/////", "#a4a8b0")
+        failed = run.outcome == "failed"
+        _fill(axes, x, y, FAILED if failed else REFUSED, "" if failed else "/////", "#a4a8b0")
     else:
         value = figures.estimate if figures.error is None else figures.error
-        face = FAILED if math.isnan(value) else COLOURS(_norm()(value))
-        _fill(axes, x, y, face, "...." if figures.error is None else "", "#ffffff")
+        _fill(
+            axes,
+            x,
+            y,
+            FAILED if math.isnan(value) else COLOURS(_norm()(value)),
+            "...." if figures.error is None else "",
+            "#ffffff",
+        )
         if is_warned(figures):
             axes.plot(x + 0.84, y + 0.8, "o", markersize=3.2, color="white", markeredgecolor=INK, markeredgewidth=0.7)
     if violations(run):
@@ -156,8 +165,8 @@ def _draw_cell(axes: Axes, run: Run) -> None:
         _cross(axes, x, y, INK, 1.2)
 
 
-def _fill(axes: Axes, x: float, y: float, face: object, hatch: str, lines: str) -> None:
-    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=face, hatch=hatch, edgecolor=lines, linewidth=0))  # type: ignore[arg-type]
+def _fill(axes: Axes, x: float, y: float, face: Colour, hatch: str, lines: str) -> None:
+    axes.add_patch(Rectangle((x, y), 1, 1, facecolor=face, hatch=hatch, edgecolor=lines, linewidth=0))
     axes.add_patch(Rectangle((x, y), 1, 1, fill=False, edgecolor="white", linewidth=0.8))
 
 
@@ -174,14 +183,14 @@ def _draw_legend(figure: Figure, height: float) -> None:
     """The colours and the marks, and what they mean."""
     from matplotlib.cm import ScalarMappable  # noqa: PLC0415
 
-    bar = figure.add_axes((0.8 / WIDTH, 0.95 / height, 4.2 / WIDTH, 0.22 / height))
+    bar = figure.add_axes((0.8 / WIDTH, 1.28 / height, 4.2 / WIDTH, 0.22 / height))
     colours = figure.colorbar(ScalarMappable(_norm(), COLOURS), cax=bar, orientation="horizontal", extend="both")
     ticks = [0.002, 0.01, TOLERANCE, 0.2, 1.0]
-    colours.set_ticks(ticks, labels=[f"{100.0 * tick:g} %" + " (tolerance)" * (tick == TOLERANCE) for tick in ticks])
+    colours.set_ticks(ticks, labels=[f"{100.0 * tick:g} %" + "\n(tolerance)" * (tick == TOLERANCE) for tick in ticks])
     colours.ax.minorticks_off()
     bar.tick_params(labelsize=10.5, colors=INK)
     bar.set_title("relative error of the exitance", fontsize=11, color=INK, pad=4)
-    marks = figure.add_axes((5.7 / WIDTH, 0.75 / height, 11.0 / WIDTH, 0.5 / height))
+    marks = figure.add_axes((5.7 / WIDTH, 1.05 / height, 11.0 / WIDTH, 0.5 / height))
     marks.set(xlim=(0, 22), ylim=(0, 1))
     marks.axis("off")
     cell = COLOURS(0.3)
