@@ -75,8 +75,8 @@ class Figures:
         Largest difference from the exitance of the same scene at scale 1, by the largest exitance.
     finite : bool
         Whether fluence and exitance are numbers throughout.
-    adaptive, dips : bool
-        Whether the tolerance was to be met, and whether the equation itself may dip below zero.
+    dips : bool
+        Whether the equation itself may dip below zero.
     nodes : int
     seconds : float
     warnings : tuple of str
@@ -91,7 +91,6 @@ class Figures:
     error: float | None
     scaling: float | None
     finite: bool
-    adaptive: bool
     dips: bool
     nodes: int
     seconds: float
@@ -126,7 +125,6 @@ def measured(scene: Scene, method: Method) -> Figures:
         error=error,
         scaling=scaling,
         finite=bool(np.isfinite(solution.fluence).all() and np.isfinite(solution.exitance).all()),
-        adaptive=method.adaptive and scene.mesh is None,
         dips=scene.dips,
         nodes=len(solution.mesh.points),
         seconds=seconds,

@@ -35,7 +35,6 @@ GOOD = Figures(
     error=0.01,
     scaling=None,
     finite=True,
-    adaptive=True,
     dips=False,
     nodes=100,
     seconds=0.1,
@@ -138,7 +137,6 @@ def test_a_run_is_measured_against_the_closed_form() -> None:
     assert figures.overshoot < 0
     assert abs(figures.ledger) < 1e-12
     assert 0 < figures.residual < 1e-10
-    assert not figures.adaptive
 
 
 def test_residuals_are_computed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
