@@ -168,14 +168,18 @@ def _on_sphere(
     """The whole sphere, the true one."""
     assert shape.sphere is not None
     comparison = comparison_for(shape, medium, deposits, ["series"])
-    center, radius = np.asarray(shape.sphere.center), shape.sphere.radius
+    on_it = on_true_sphere(samples, np.asarray(shape.sphere.center), shape.sphere.radius)
+    told = "the same equation and boundary on the true sphere, solved in closed form"
+    return on_it, Reference("closed form", told, comparison.forms["series"](on_it.points))
+
+
+def on_true_sphere(samples: Samples, center: FloatArray, radius: float) -> Samples:
+    """Samples of the triangles of a sphere, taken to the sphere itself."""
     distances = np.linalg.norm(samples.points - center, axis=1)
     outward = (samples.points - center) / distances[:, None]
     # The solid angles of the pieces of triangles.
     seen = np.einsum("ij,ij->i", outward, samples.normals) * (radius / distances) ** 2
-    on_it = Samples(center + radius * outward, outward, samples.weights * seen)
-    told = "the same equation and boundary on the true sphere, solved in closed form"
-    return on_it, Reference("closed form", told, comparison.forms["series"](on_it.points))
+    return Samples(center + radius * outward, outward, samples.weights * seen)
 
 
 def _on_slab(

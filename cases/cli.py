@@ -1,4 +1,4 @@
-"""The command line: ``tetlux run``, ``tetlux check``, ``tetlux chart``, ``tetlux schema``."""
+"""The command line: ``tetlux run``, ``tetlux check``, ``tetlux chart``, ``tetlux stress``, ``tetlux schema``."""
 
 import argparse
 import json
@@ -91,6 +91,11 @@ def _parser() -> argparse.ArgumentParser:
     chart.add_argument("--quick", action="store_true", help="a few coarse runs of each method only")
     chart.set_defaults(command=_chart)
 
+    stress = commands.add_parser("stress", help="drive the solver to its edges and map what breaks")
+    stress.add_argument("--out", type=Path, default=Path("stress"), metavar="DIR", help="default: stress")
+    stress.add_argument("--quick", action="store_true", help="few values on each axis")
+    stress.set_defaults(command=_stress)
+
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
     schema.set_defaults(command=_schema)
     return parser
@@ -112,6 +117,12 @@ def _chart(options: argparse.Namespace) -> int:
     from tetlux.cases.chart import DEFAULT_CASES, chart  # noqa: PLC0415
 
     return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
+
+
+def _stress(options: argparse.Namespace) -> int:
+    from tetlux.cases.stress import stress  # noqa: PLC0415
+
+    return stress(options.out, quick=options.quick)
 
 
 def _schema(_: argparse.Namespace) -> int:

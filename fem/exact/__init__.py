@@ -4,6 +4,26 @@ Every function takes a `Medium` and returns what unit power, or unit irradiance,
 ``M = phi/(2A)``, W/unit², unless the function says otherwise.
 """
 
-from tetlux.fem.exact import cylinder, dipole, half_space, monte_carlo, slab, slab_plane, sphere, sphere_light
+from tetlux.fem.exact import (
+    concentric,
+    cylinder,
+    dipole,
+    half_space,
+    monte_carlo,
+    slab,
+    slab_plane,
+    sphere,
+    sphere_light,
+)
 
-__all__ = ["cylinder", "dipole", "half_space", "monte_carlo", "slab", "slab_plane", "sphere", "sphere_light"]
+__all__ = [
+    "concentric",
+    "cylinder",
+    "dipole",
+    "half_space",
+    "monte_carlo",
+    "slab",
+    "slab_plane",
+    "sphere",
+    "sphere_light",
+]

@@ -1,0 +1,289 @@
+"""`tetlux stress`: what it drives, what it measures, what counts as a violation, and what it writes."""
+
+import csv
+import ctypes
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from multiprocessing.connection import wait
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tetlux.cases import stress as stress_module
+from tetlux.cases import stress_scenes as scenes
+from tetlux.cases.cli import main
+from tetlux.cases.stress import COLUMNS, FILES, stress
+from tetlux.cases.stress_measure import CONSISTENT, DEFAULT, NOTHING, PLAIN, Figures, Method, measured
+from tetlux.cases.stress_meshes import ball_of_layers, spoiled
+from tetlux.cases.stress_panels import PANELS, Axis, Panel, Value
+from tetlux.cases.stress_rules import broken, violations
+from tetlux.cases.stress_runs import Run
+from tetlux.cases.stress_words import in_words
+from tetlux.fem import linear
+
+GOOD = Figures(
+    lowest=0.1,
+    overshoot=None,
+    ledger=1e-15,
+    residual=1e-14,
+    iterations=0,
+    estimate=0.01,
+    error=0.01,
+    scaling=None,
+    finite=True,
+    dips=False,
+    nodes=100,
+    seconds=0.1,
+    warnings=(),
+)
+OF_MODEL = "the reduced albedo is 0.5, below the 0.9 that diffusion is good for."
+NOT_MET = "the tolerance of 0.05 was not met: the estimated error is 0.2, on the mesh given."
+
+
+def panel(make: Callable[..., Any], x: Value, y: Value, *methods: Method, name: str = "stub") -> Panel:
+    return Panel(name, "a stub", Axis("x", (x,)), Axis("y", (y,)), make, methods or (DEFAULT,))
+
+
+def run_of(figures: Figures, method: Method = DEFAULT) -> Run:
+    return Run(panel(max, 1.0, 2.0, method), 1.0, 2.0, method, "ran", "", figures)
+
+
+def table(folder: Path) -> list[dict[str, str]]:
+    with (folder / "stress.csv").open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# What is driven
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"),
+    [
+        ("reduced albedo", 1e-3, 1.0),
+        ("σ_tr h", 0.01, 1000.0),
+        ("refractive index n", 0.5, 4.0),
+        ("g", -0.9, 0.99),
+        ("contrast", 1e-6, 1e6),
+        ("depth (mean free paths)", 0.01, 10.0),
+        ("thickness (mean free paths)", 0.1, 100.0),
+        ("radius (mean free paths)", 0.1, 100.0),
+        ("radius (units)", 1e-9, 1e9),
+    ],
+)
+def test_axes_reach_what_is_promised(name: str, low: float, high: float) -> None:
+    for panels in (PANELS, [panel.quick() for panel in PANELS]):
+        values = [
+            value
+            for one in panels
+            for axis in (one.x, one.y)
+            if axis.name.startswith(name)
+            for value in axis.values
+            if not isinstance(value, str)
+        ]
+        assert (min(values), max(values)) == (low, high)
+
+
+def test_bad_tetrahedra_and_hard_shapes_are_among_them() -> None:
+    quick = {panel.name: panel.quick() for panel in PANELS}
+    assert min(map(float, quick["bad tetrahedra"].y.values)) == 1e-4
+    shapes = " ".join(map(str, quick["shapes"].x.values))
+    for kind in ("needle", "plate", "touching", "cavity"):
+        assert kind in shapes
+    methods = {method.name for panel in PANELS for method in panel.methods}
+    assert {DEFAULT.name, PLAIN.name, CONSISTENT.name, NOTHING.name} <= methods
+
+
+def test_every_panel_makes_its_scenes() -> None:
+    """The first of each; those that are refused are refused when they are solved."""
+    for one in PANELS:
+        x, y = one.quick().places()[0]
+        scene = one.make(x, y)
+        if scene.truth is not None:
+            samples, exitance = scene.truth
+            assert len(samples.points) == len(exitance)
+            assert np.isfinite(exitance).all()
+
+
+def test_bad_tetrahedra_are_as_bad_as_asked_for_and_the_same_each_time() -> None:
+    good = ball_of_layers(1.0, 2, 5)
+    assert good.quality.min() > 0.3
+    mesh = spoiled(good, 1e-4)
+    assert mesh.quality.min() == pytest.approx(1e-4, rel=0.01)
+    assert (mesh.quality < 2e-4).sum() > 20
+    assert mesh.volume == pytest.approx(good.volume, rel=1e-12)
+    assert np.array_equal(mesh.points, spoiled(good, 1e-4).points)
+
+
+def test_a_core_of_layers_is_a_region_of_its_own() -> None:
+    mesh = ball_of_layers(2.0, 2, 5, core=3)
+    radii = np.linalg.norm(mesh.points[mesh.tetrahedra], axis=2)
+    assert (radii[mesh.regions == 1] < 1.2 + 1e-9).all()
+    assert (radii[mesh.regions == 0].max(axis=1) > 1.2 + 1e-9).all()
+
+
+# What is measured
+
+
+def test_a_run_is_measured_against_the_closed_form() -> None:
+    figures = measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert figures.error is not None
+    # Measured .03; twice as much absorption would be .4.
+    assert 0.001 < figures.error < 0.1
+    assert figures.overshoot is not None
+    assert figures.overshoot < 0
+    assert abs(figures.ledger) < 1e-12
+    assert 0 < figures.residual < 1e-10
+
+
+def test_residuals_are_computed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve_truly = linear.Solver._solved
+    monkeypatch.setattr(
+        linear.Solver, "_solved", lambda self, loads: np.asarray((1.0 + 1e-6) * solve_truly(self, loads))
+    )
+    figures = measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert figures.residual == pytest.approx(1e-6, rel=1e-3)
+    assert "residual" in broken(run_of(figures))
+
+
+def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def iterate(matrix: Any, loads: int) -> linear.Solver:
+        return linear.Solver(matrix, [linear.jacobi])
+
+    monkeypatch.setattr("tetlux.fem.system.solver_for", iterate)
+    assert 5 < measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
+
+
+@pytest.mark.parametrize("kind", scenes.LENGTH_KINDS[:4])
+def test_lengths_are_compared_with_scale_1(kind: str) -> None:
+    scene = scenes.by_length(1e3, kind)
+    figures = measured(scene, DEFAULT)
+    assert figures.scaling is not None
+    assert figures.scaling < 1e-8
+    assert scene.alike is not None
+    other = replace(scene, alike=replace(scene.alike, medium=scenes.turbid(0.98, free_path=0.1)))
+    assert (measured(other, DEFAULT).scaling or 0.0) > 1e-3
+
+
+# What counts
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"lowest": -1.1e-12}, "negative fluence"),
+        ({"overshoot": 1e-8}, "maximum principle"),
+        ({"ledger": -2e-9}, "ledger"),
+        ({"residual": 2e-8}, "residual"),
+        ({"scaling": 1e-6}, "scaling"),
+        ({"error": 0.051}, "silent error"),
+        ({"error": math.inf}, "silent error"),
+        ({"error": 0.2, "warnings": (OF_MODEL,)}, "silent error"),
+        ({"finite": False}, "not a number"),
+        ({"lowest": math.nan}, "not a number"),
+    ],
+)
+def test_what_must_hold_is_named_where_it_does_not(changes: dict[str, Any], rule: str) -> None:
+    bad = replace(GOOD, **changes)
+    assert list(violations(run_of(bad))) == [rule]
+    # Methods that are there to be compared with may break it.
+    assert list(broken(run_of(bad, CONSISTENT))) == [rule]
+    assert violations(run_of(bad, CONSISTENT)) == {}
+    words = in_words([run_of(GOOD), run_of(bad)])
+    assert f"* stub, default, at x 1, y 2: {rule}" in words
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"lowest": -1e-13},
+        {"lowest": -0.1, "dips": True},
+        {"overshoot": 1e-12},
+        {"error": None},
+        {"error": 0.2, "warnings": (OF_MODEL, NOT_MET)},
+    ],
+)
+def test_what_is_allowed_is_no_violation(changes: dict[str, Any]) -> None:
+    assert broken(run_of(replace(GOOD, **changes))) == {}
+
+
+# What is written
+
+
+def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "map"
+    grid = [
+        panel(scenes.diffuse_by_decay_and_albedo, 1.0, 0.9, DEFAULT, CONSISTENT, name="fine"),
+        panel(scenes.by_radius_and_depth, 0.1, 0.01, name="small"),
+    ]
+    assert stress(out, panels=grid) == 0
+    assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
+    rows = table(out)
+    assert [(row["panel"], row["method"], row["outcome"]) for row in rows] == [
+        ("fine", "default", "ran"),
+        ("fine", "consistent mass", "ran"),
+        ("small", "default", "refused"),
+    ]
+    assert tuple(rows[0]) == COLUMNS
+    assert 0 < float(rows[0]["error"]) < 0.3
+    assert "absurdly small" in rows[2]["message"]
+    words = (out / "stress.md").read_text(encoding="utf-8")
+    assert words in capsys.readouterr().out
+    assert "* small, once: sphere is 0.346 mm" in words
+    assert "## Violations\n\nNone." in words
+    with Image.open(out / "stress.png") as picture:
+        assert picture.width == 2125
+        picture.load()
+
+
+def test_violations_crashes_and_hangs_fail_the_command_and_end_nothing_else(tmp_path: Path) -> None:
+    grid = [
+        panel(ctypes.string_at, 1, 8, name="segfault"),
+        panel(wait, "", 1000.0, name="endless"),
+        panel(divmod, 1.0, 0, name="exception"),
+        panel(scenes.diffuse_by_decay_and_albedo, 10.0, 0.5, replace(CONSISTENT, counts=True), name="negative"),
+        panel(scenes.diffuse_by_decay_and_albedo, 1.0, 0.9, name="fine"),
+    ]
+    assert stress(tmp_path, panels=grid, time_limit=10.0, report=lambda _: None) == 1
+    found = {row["panel"]: row for row in table(tmp_path)}
+    assert {name: row["outcome"] for name, row in found.items()} == {
+        "segfault": "failed",
+        "endless": "failed",
+        "exception": "failed",
+        "negative": "ran",
+        "fine": "ran",
+    }
+    assert found["segfault"]["message"] == "crashed: the process died of signal 11"
+    assert found["endless"]["message"] == "hung: stopped after 10 s"
+    assert found["exception"]["message"].startswith("ZeroDivisionError: ")
+    assert float(found["negative"]["lowest"]) < -0.01
+    assert found["negative"]["broken"].startswith("negative fluence: -")
+    assert [name for name, row in found.items() if row["violation"] == "False"] == ["fine"]
+    words = (tmp_path / "stress.md").read_text(encoding="utf-8")
+    assert "* segfault, default, at x 1, y 8: failure, crashed: the process died of signal 11." in words
+    assert "* negative, consistent mass: negative fluence in 1 of 1, at x 10 and y 0.5." in words
+
+
+def test_the_command_asks_for_the_map(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[tuple[Path, bool]] = []
+
+    def record(out: Path, *, quick: bool) -> int:
+        asked.append((out, quick))
+        return 1
+
+    monkeypatch.setattr(stress_module, "stress", record)
+    assert main(["stress", "--quick", "--out", str(tmp_path)]) == 1
+    assert main(["stress"]) == 1
+    assert asked == [(tmp_path, True), (Path("stress"), False)]
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused_before_it_starts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").touch()
+    assert main(["stress", "--quick", "--out", str(tmp_path / "file")]) == 2
+    assert "tetlux: " in capsys.readouterr().err
