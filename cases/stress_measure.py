@@ -48,7 +48,7 @@ CONSISTENT = Method("consistent mass", {"mass": "consistent"})
 FREE_SPACE = Method("free space subtracted", {"subtract": "free-space"})
 NOTHING = Method("nothing subtracted", {"subtract": "nothing"})
 # What bears on the sign of the fluence, one beside the other.
-OF_SIGN = (DEFAULT, CONSISTENT)
+OF_SIGN = (DEFAULT, Method("no limiter", {"limit": False}), CONSISTENT)
 
 
 @dataclass(frozen=True)
