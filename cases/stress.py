@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.batch import check_writable
+from tetlux.cases.publish import check_writable
 from tetlux.cases.stress_panels import PANELS, Panel
 from tetlux.cases.stress_picture import draw_map
 from tetlux.cases.stress_rules import broken, violations

@@ -44,7 +44,7 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     moved = float(lacking.sum())
 
     def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
-        return np.bincount(nodes, values, minlength=len(power))
+        return np.asarray(np.bincount(nodes, values, minlength=len(power)), dtype=np.float64)
 
     for _ in range(SWEEPS):
         ways = edges[(lacking[edges] > 0).any(axis=1)]

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import meshio
@@ -336,26 +337,27 @@ def test_a_scheduler_may_stop_it(number: signal.Signals, tmp_path: Path) -> None
     assert processes_in(temporary) == []
 
 
-@pytest.fixture
-def smallest_file() -> Iterator[Callable[[int], None]]:
-    """Lets the system refuse to make a file larger than that, as a full disk would."""
+@contextmanager
+def no_file_larger_than(size: int) -> Iterator[None]:
+    """Lets the system refuse to make a larger file, as a full disk would; what tests print may be in one too."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("outputs", ["surface", "volume", "picture", ""])
-def test_a_full_disk_leaves_the_earlier_run(
-    outputs: str, tmp_path: Path, smallest_file: Callable[[int], None], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_full_disk_leaves_the_earlier_run(outputs: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")]
     written(tmp_path, 2.0)
     assert main(command) == 0
     written(tmp_path, 3.0, outputs)
     capsys.readouterr()
     # The mesh is remembered; not even a summary is as small as this.
-    smallest_file(500)
-    assert main(command) == 1
+    with no_file_larger_than(500):
+        assert main(command) == 1
     first, second = capsys.readouterr().err.splitlines()
     assert first == (
         f"tetlux: ball failed: results cannot be written to {tmp_path / 'out' / 'ball'}: File too large; "
@@ -366,25 +368,27 @@ def test_a_full_disk_leaves_the_earlier_run(
     assert left(tmp_path / "out") == []
 
 
-def test_a_full_disk_for_temporary_files(tmp_path: Path, smallest_file: Callable[[int], None]) -> None:
+def test_a_full_disk_for_temporary_files(tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     cache.mkdir()
-    smallest_file(1_000)
-    with pytest.raises(RunError, match=r"could not be run \(File too large\); make room in the system's folder"):
+    with (
+        no_file_larger_than(1_000),
+        pytest.raises(RunError, match=r"could not be run \(File too large\); make room in the system's folder"),
+    ):
         tetrahedralize(sphere(10.0), cache=cache)
     # Enough for what the mesher is given, and not for what it returns.
-    smallest_file(40_000)
-    with pytest.raises(RunError, match=r"failed \(OSError: .*File too large\); make room in the system's folder"):
+    with (
+        no_file_larger_than(40_000),
+        pytest.raises(RunError, match=r"failed \(OSError: .*File too large\); make room in the system's folder"),
+    ):
         tetrahedralize(sphere(10.0), cache=cache)
     assert list(cache.iterdir()) == []
 
 
-def test_a_full_disk_for_the_cache(
-    tmp_path: Path, smallest_file: Callable[[int], None], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_for_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mesher, "_made", lambda *_: block((9, 9, 9), (1.0, 1.0, 1.0)))
-    smallest_file(10_000)
-    assert len(tetrahedralize(sphere(10.0), cache=tmp_path).tetrahedra) == 6 * 9**3
+    with no_file_larger_than(10_000):
+        assert len(tetrahedralize(sphere(10.0), cache=tmp_path).tetrahedra) == 6 * 9**3
     assert list(tmp_path.iterdir()) == []
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tetlux.fem import DiffuseLight, Medium, PencilBeam, PointSource, System, solve
+from tetlux.fem import DiffuseLight, Light, Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.fitting import fitting_of
@@ -50,7 +50,7 @@ def test_subtracted_sources_go_with_fitted_coefficients(coarse: TetMesh) -> None
     """A source in the middle of all is its closed form, whatever the coefficients of the mesh's own part."""
     medium = Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4)
     assert fitting_of(coarse, coefficients_of(medium)) is not None
-    lights = [PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0)), PointSource((3.0, 0.0, 2.0), 1.0)]
+    lights: list[Light] = [PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0)), PointSource((3.0, 0.0, 2.0), 1.0)]
     solution = System(coarse, medium, sphere(10.0)).solve(lights)
     assert abs(solution.power.balance_error) < 1e-12
 

@@ -10,7 +10,7 @@ from tetlux.fem.limiter import nonnegative
 from tetlux.meshing import TetMesh, box, sphere, tetrahedralize
 
 DARK = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
-LIGHTS = {
+LIGHTS: dict[str, Light] = {
     "point": PointSource((0.0, 0.0, 8.0), 1.0),
     "pencil": PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0)),
     "diffuse": DiffuseLight(1.0),
@@ -31,7 +31,7 @@ def flat() -> TetMesh:
 @pytest.mark.parametrize("subtract", ["half-space", "nothing"])
 def test_no_fluence_below_zero(flat: TetMesh, name: str, subtract: str) -> None:
     """Without the limiter the fluence of the point dips to -2 % of its maximum here, that of the pencil to -1 %."""
-    light: Light = LIGHTS[name]
+    light = LIGHTS[name]
     if name == "point":
         light = PointSource((0.0, 0.0, 1.6), 1.0)
     found = System(flat, DARK).solve([light], subtract=subtract)  # type: ignore[arg-type]

@@ -338,7 +338,8 @@ def test_only_the_same_paths_are_known(ball_mesh: TetMesh, marches: list[int]) -
     asked = located(finer, deposit)
     marches.clear()
     load_vector(finer, coefficients_of(FORWARD), asked)
-    assert sum(marches) == (asked.cells >= 0).sum()  # type: ignore[operator]
+    assert asked.cells is not None
+    assert sum(marches) == np.count_nonzero(asked.cells >= 0)
 
 
 def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
