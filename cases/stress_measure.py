@@ -44,7 +44,7 @@ class Method:
 
 DEFAULT = Method("default", counts=True)
 PLAIN = Method("default, not refined", adaptive=False, counts=True)
-CONSISTENT = Method("consistent mass", {"mass": "consistent"})
+CONSISTENT = Method("consistent mass, no limiter", {"mass": "consistent", "limit": False})
 FREE_SPACE = Method("free space subtracted", {"subtract": "free-space"})
 NOTHING = Method("nothing subtracted", {"subtract": "nothing"})
 # What bears on the sign of the fluence, one beside the other.

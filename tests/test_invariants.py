@@ -184,7 +184,8 @@ def test_a_darker_body_lets_less_out(medium: Medium, place: Vector, factor: floa
     bright, dark = (solve(MESHES[name], m, source, subtract="nothing") for m in (medium, darker))
     assert dark.power.exited < bright.power.exited
     assert dark.power.absorbed > bright.power.absorbed
-    assert (dark.exitance < bright.exitance).all()
+    # Both are 0 where too coarse a mesh would have them below it.
+    assert ((dark.exitance < bright.exitance) | (bright.exitance == 0)).all()
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])

@@ -127,7 +127,9 @@ def test_the_surface_has_what_is_valid_in_all_channels(finished: Finished) -> No
     np.testing.assert_allclose(values["valid"], np.min(each, axis=0), rtol=1e-6, atol=1e-6)
     # Near the beam, that one; far away the channel that absorbs most.
     assert not np.allclose(values["valid"], each[0])
-    assert [channel["validity"]["least_valid"] < 0.6 for channel in finished.summary["channels"]] == [True, True, False]
+    least = [channel["validity"]["least_valid"] for channel in finished.summary["channels"]]
+    # Measured: .30 to .32, .29 to .33, and .54 to .63 without the beam, as nodes come to lie.
+    assert max(least[:2]) < 0.4 < least[2] - 0.05
 
 
 def test_the_surface_has_radiance_towards_the_camera(finished: Finished) -> None:

@@ -267,7 +267,7 @@ def test_the_cases_of_new_lights_and_media_run(name: str, tmp_path: Path) -> Non
         assert abs(channel["power"]["balance_error"]) < 1e-9
         assert channel["error_estimate"] <= case.tolerance
     # The ball in the plate absorbs more than diffusion likes, and a laser's spot is small: the run says so.
-    said = {"inclusion": ["region 1: the reduced albedo is 0.8"], "laser": ["within 2 mean free paths of where l"]}
+    said = {"inclusion": ["ball: the reduced albedo is 0.8, be"], "laser": ["within 2 mean free paths of where l"]}
     assert [warning[:35] for warning in summary["warnings"]] == said.get(name, [])
     power = [channel["power"] for channel in summary["channels"]]
     values = meshio.read(folder / "surface.ply").point_data

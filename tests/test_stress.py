@@ -225,7 +225,7 @@ def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[st
     rows = table(out)
     assert [(row["panel"], row["method"], row["outcome"]) for row in rows] == [
         ("fine", "default", "ran"),
-        ("fine", "consistent mass", "ran"),
+        ("fine", "consistent mass, no limiter", "ran"),
         ("small", "default", "refused"),
     ]
     assert tuple(rows[0]) == COLUMNS
@@ -265,7 +265,7 @@ def test_violations_crashes_and_hangs_fail_the_command_and_end_nothing_else(tmp_
     assert [name for name, row in found.items() if row["violation"] == "False"] == ["fine"]
     words = (tmp_path / "stress.md").read_text(encoding="utf-8")
     assert "* segfault, default, at x 1, y 8: failure, crashed: the process died of signal 11." in words
-    assert "* negative, consistent mass: negative fluence in 1 of 1, at x 10 and y 0.5." in words
+    assert "* negative, consistent mass, no limiter: negative fluence in 1 of 1, at x 10 and y 0.5." in words
 
 
 def test_the_command_asks_for_the_map(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -169,8 +169,8 @@ def test_a_body_close_by_changes_nothing() -> None:
     assert beside.error_estimate <= 0.02
 
 
-@pytest.mark.parametrize(("subtract", "depth"), [("half-space", 0.0), ("free-space", 1e-9)])
-def test_a_source_on_the_surface_loses_no_power(subtract: Subtract, depth: float) -> None:
+@pytest.mark.parametrize(("subtract", "depth"), [("half-space", 1e-7), ("free-space", 1e-7)])
+def test_a_source_next_to_the_surface_loses_no_power(subtract: Subtract, depth: float) -> None:
     """No integral over facets sees it there, so it is not subtracted."""
     mesh = block((16, 16, 8), (8.0, 8.0, 4.0))
     light = [PointSource((0.3, 0.2, -depth))]
