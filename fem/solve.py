@@ -42,6 +42,8 @@ SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
 SAFETY, POWER_SAFETY = 0.65, 0.4
 MOST_TETRAHEDRA = 1_000_000
+# A source whose depth the mesh's facets change by more than this share of it is worth a sentence.
+SHALLOW = 0.1
 # Seconds after which a word is said of the mesher.
 SLOW = 8.0
 
@@ -411,6 +413,7 @@ def _warnings(solution: Solution, validity: Validity, sources: Sources, toleranc
             "going below zero, where tetrahedra are too coarse or too flat for light that fades so fast; ask for a "
             "smaller tolerance, or give a finer mesh."
         )
+    warnings += _shallow(solution)
     brightest = float(np.max(solution.transmitted_irradiance))
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
         warnings.append(
@@ -419,3 +422,21 @@ def _warnings(solution: Solution, validity: Validity, sources: Sources, toleranc
             "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
         )
     return list(dict.fromkeys(warnings))
+
+
+def _shallow(solution: Solution) -> list[str]:
+    """What to say of sources that are much nearer to, or farther from, the mesh's facets than to the surface."""
+    for patch in solution.patches:
+        sources = patch.charges.positions[: patch.charges.sources]
+        if len(sources) == 0:
+            continue
+        depths = np.linalg.norm(solution.surface.closest(sources)[0] - sources, axis=1)
+        below_facets = np.linalg.norm(solution.mesh.closest_boundary(sources)[0] - sources, axis=1)
+        off = np.abs(below_facets - depths)
+        worst = int(np.argmax(off / depths))
+        if off[worst] > SHALLOW * depths[worst]:
+            return [
+                f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} below "
+                "the mesh's facets, and what leaves above it is off by as much; give a finer mesh, or put it deeper."
+            ]
+    return []
