@@ -437,6 +437,7 @@ def _shallow(solution: Solution) -> list[str]:
         if off[worst] > SHALLOW * depths[worst]:
             return [
                 f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} "
-                "below the mesh's facets, and what leaves above it is off by as much; give a finer mesh, or put it deeper."
+                "below the mesh's facets, and what leaves above it is off by as much; give a finer mesh, or put it "
+                "deeper."
             ]
     return []
