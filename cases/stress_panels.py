@@ -94,6 +94,14 @@ PANELS = (
         OF_SIGN,
     ),
     Panel(
+        "albedo and mesh, glow",
+        "a ball that glows throughout, on a given mesh of edges h",
+        DECAY,
+        BELOW_ONE,
+        scenes.glow_by_decay_and_albedo,
+        OF_SIGN,
+    ),
+    Panel(
         "bad tetrahedra",
         "a point in a ball on a given mesh of edges h, slivers and needles among its tetrahedra",
         DECAY,
@@ -115,6 +123,24 @@ PANELS = (
         replace(CONTRAST, name="contrast of σ_s'"),
         replace(CONTRAST, name="contrast of σ_a"),
         scenes.by_contrasts,
+        (DEFAULT, PLAIN),
+    ),
+    Panel(
+        "core",
+        "a ball of radius 10 in diffuse light, with a core of the shell's scattering",
+        replace(
+            CONTRAST, name="σ_a of the core by σ_s'", values=(1e-4, 0.01, 1.0, 10.0, 100.0, 1e3), few=(0.01, 1.0, 100.0)
+        ),
+        Axis("radius of the core (mean free paths)", (2.0, 4.0, 6.0, 8.0), (2.0, 6.0)),
+        scenes.diffuse_by_core,
+        (DEFAULT, PLAIN),
+    ),
+    Panel(
+        "wide beam",
+        "a beam as wide as the ball, matched index",
+        replace(RADIUS, values=(0.3, 1.0, 3.0, 10.0, 30.0), few=(0.3, 3.0, 10.0)),
+        ALBEDO,
+        scenes.beam_by_radius_and_albedo,
         (DEFAULT, PLAIN),
     ),
     Panel(

@@ -9,7 +9,7 @@ from tetlux.cases.chart_measure import surface_samples
 from tetlux.cases.chart_scene import Samples, on_true_sphere
 from tetlux.cases.stress_meshes import ball_of_layers, spoiled
 from tetlux.cases.stress_shapes import SHAPES
-from tetlux.fem import DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
+from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
 from tetlux.fem.exact import concentric, slab, sphere, sphere_light
 from tetlux.fem.grading import lit_points
 from tetlux.meshing import shapes
@@ -122,6 +122,35 @@ def diffuse_by_decay_and_albedo(decay: float, albedo: float) -> Scene:
     mesh = mesh_of_unit_edges()
     radius = float(np.linalg.norm(mesh.points, axis=1).max())
     return ball_in_diffuse_light(decaying(albedo, decay), radius, mesh)
+
+
+def glow_by_decay_and_albedo(decay: float, albedo: float) -> Scene:
+    """The same ball, glowing throughout, 1 W/unit³."""
+    mesh, medium = mesh_of_unit_edges(), decaying(albedo, decay)
+    radius = float(np.linalg.norm(mesh.points, axis=1).max())
+    surface, light = shapes.sphere(radius), Emission(1.0)
+    value = sphere_light.glow_exitance(medium, radius=radius)
+    return Scene(surface, medium, light, mesh=mesh, truth=_on_ball(surface, medium, light, radius, lambda _: value))
+
+
+def beam_by_radius_and_albedo(radius: float, albedo: float) -> Scene:
+    """A ball in a beam as wide as itself from above, of matched index."""
+    surface, medium, light = shapes.sphere(radius), turbid(albedo, eta=1.0), CollimatedBeam((0.0, 0.0, -1.0))
+    truth = _on_ball(
+        surface, medium, light, radius, lambda gamma: sphere_light.beam_exitance(medium, radius=radius, gamma=gamma)
+    )
+    return Scene(surface, medium, light, truth=truth)
+
+
+def diffuse_by_core(absorption: float, radius: float) -> Scene:
+    """A ball of radius 10 and albedo .99 with a core, by its radius and its absorption times its scattering."""
+    shell, core = turbid(0.99), Medium(sigma_a=absorption, sigma_s_prime=1.0, eta=INDEX)
+    surface, light, outer = shapes.sphere(10.0), DiffuseLight(1.0), 10.0
+    passed = light.deposit_in(surface, shell).transmitted_irradiance
+    value = passed * concentric.diffuse_exitance(core, shell, core_radius=radius, radius=outer)
+    truth = _on_ball(surface, shell, light, outer, lambda _: value)
+    regions = (Region(shapes.sphere(radius), core),)
+    return Scene(surface, shell, light, regions, truth=truth, bound=4.0 * INDEX**2)
 
 
 def by_decay_and_quality(decay: float, quality: float) -> Scene:

@@ -1,7 +1,7 @@
 """What the media of a body are on each tetrahedron of a mesh."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -106,6 +106,18 @@ def _check_regions(sizes: IntArray, media: int) -> None:
     for region in range(1, media):
         if sizes[region] == 0:
             raise InputError(f"the mesh has no region {region}; make one that has, or leave the region out.")
+
+
+def at_surface(medium: AnyMedium, mesh: TetMesh, coefficients: Coefficients) -> Medium:
+    """One medium for what is under the surface: the body's own, or the mean of one that varies."""
+    if isinstance(medium, Medium):
+        return medium
+    cells, areas = mesh.boundary_cells, mesh.boundary_areas / mesh.area
+    sigma_a, total = (float(areas @ at_cells(v, cells)) for v in (coefficients.sigma_a, coefficients.sigma_t_prime))
+    base, scattering = medium.base, total - sigma_a
+    if base.sigma_s is None:
+        return replace(base, sigma_a=sigma_a, sigma_s_prime=scattering)
+    return replace(base, sigma_a=sigma_a, sigma_s=base.sigma_s * scattering / base.reduced_scattering)
 
 
 def base_of(medium: AnyMedium) -> Medium:

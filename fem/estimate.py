@@ -23,6 +23,8 @@ Where light fades within less than the height of the boundary's tetrahedra, neit
 
     ∮ D k LAYERS x²/(1 + x²)^(3/2) |phi step| z
 
+Layers along interfaces are not fitted; they add ``∮ D k s (s - 1) |phi step| |z step|`` with s = sqrt(1 + (k h/2)²).
+
 Sums of moduli, so errors that cancel are counted.
 
 Where light is deposited all along the boundary, as that of a beam is, the exitance ripples from node to node as the
@@ -89,6 +91,7 @@ class Estimate:
 
 def estimated(
     solution: Solution,
+    whole: Solution,
     coefficients: Coefficients,
     solver: Solver,
     load: FloatArray,
@@ -96,11 +99,13 @@ def estimated(
     inner: Sequence[Surface] = (),
     fitting: Fitting | None = None,
 ) -> Estimate:
-    """Estimate the error of a solution.
+    """Estimate the error of a solution, or of a part of one.
 
     Parameters
     ----------
     solution : Solution
+    whole : Solution
+        That which it is part of, or itself: its exitance is what errors are errors of.
     coefficients : Coefficients
         Of its mesh.
     solver : Solver
@@ -119,10 +124,10 @@ def estimated(
     Estimate
     """
     mesh, surface = solution.mesh, solution.surface
-    fluence, exitance, patches = solution.fluence, solution.exitance, solution.patches
+    fluence, exitance, patches = solution.fluence, whole.exitance, solution.patches
     areas = mesh.boundary_node_areas
     size, total = float(np.sqrt(areas @ exitance**2)), float(areas @ np.abs(exitance))
-    if total <= ROUNDING * solution.power.incident:
+    if total <= ROUNDING * whole.power.incident:
         # Where no light leaves, there is nothing to be wrong about.
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
     loads = np.zeros((len(mesh.points), 2))
@@ -144,7 +149,7 @@ def estimated(
     slope_gap = _size(rough)
     corners = (mesh.tetrahedra[mesh.boundary_cells][:, None, :] == mesh.boundary_faces[:, :, None]).argmax(axis=2)
     leaving = np.zeros(len(mesh.points))
-    leaving[mesh.boundary_nodes] = exitance - solution.transmitted_irradiance
+    leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
 
     def shares_by(dual: FloatArray) -> FloatArray:
         shares = diffusion * mesh.volumes * slope_gap * _size(_roughness(mesh, mean, dual))
@@ -154,6 +159,7 @@ def estimated(
         if fitting is not None:
             shares += _of_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
         shares += FACETS * _of_facets(mesh, coefficients, surface, (fluence, leaving, dual), float(shares.sum()), kept)
+        shares += _of_inner_layers(mesh, coefficients, smooth, dual[mesh.tetrahedra])
         return shares + FACETS * _of_interfaces(mesh, coefficients, inner, emission, (fluence, dual))
 
     shares, power_shares = (shares_by(dual) for dual in duals.T)
@@ -226,6 +232,28 @@ def _of_layers(
     added = LAYERS * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
     added *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
     return np.asarray(np.bincount(cells, added, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+
+
+def _of_inner_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
+    """What layers along interfaces add that are thinner than their tetrahedra, (m,), by values at all corners (m, 4).
+
+    They are not fitted, and draw ``D k sqrt(1 + (k h/2)²)`` times the fluence from the interface instead of ``D k``,
+    which makes the dual there too faint by as much.
+    """
+    added = np.zeros(len(mesh.tetrahedra))
+    if not mesh.regions.any():
+        return added
+    faces, _, cells = mesh.interfaces
+    _, areas = triangle_areas(mesh.points, faces)
+    for side in cells.T:
+        diffusion, sigma_a = (at_cells(value, side) for value in (coefficients.diffusion, coefficients.sigma_a))
+        k = np.sqrt(sigma_a / diffusion)
+        over = np.sqrt(1.0 + (0.5 * k * 3.0 * mesh.volumes[side] / areas) ** 2)
+        outer = (mesh.tetrahedra[side][:, :, None] == faces[:, None, :]).any(axis=2)
+        first, second = (np.abs((np.where(outer, at / 3.0, -at)).sum(axis=1)) for at in (smooth[side], dual[side]))
+        shares = diffusion * k * (over - 1.0) * over * areas * first * second
+        added += np.bincount(side, shares, minlength=len(added))
+    return added
 
 
 def _of_facets(

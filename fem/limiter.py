@@ -32,13 +32,13 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     Returns
     -------
     fluence : (n,) ndarray
-        None below zero, and the sum of weights times fluence as before; as it was if that sum is below zero.
+        None below zero, and the sum of weights times fluence as before; as it was if that sum is below 1e-250.
     moved : float
         Power that was taken from some nodes and given to others, W.
     """
     power = weights * fluence
     total = float(power.sum())
-    if fluence.min(initial=0.0) >= 0 or total < 0:
+    if fluence.min(initial=0.0) >= 0 or total < NOTHING:
         return fluence, 0.0
     lacking, left = np.maximum(-power, 0.0), np.maximum(power, 0.0)
     moved = float(lacking.sum())

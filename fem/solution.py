@@ -191,10 +191,18 @@ class Solution:
             cells[lost] = self.mesh.boundary_cells[self.mesh.closest_boundary(queries[lost])[1]]
             weights[lost] = self.mesh.barycentric(queries[lost], cells[lost])
         fluence = np.full(len(queries), np.nan)
-        found = cells >= 0
-        fluence[found] = self._interpolated(
-            queries[found], cells[found], self.mesh.tetrahedra[cells[found]], weights[found]
-        )
+        found = np.flatnonzero(cells >= 0)
+
+        def fill(some: IntArray) -> None:
+            nodes = self.mesh.tetrahedra[cells[some]]
+            fluence[some] = self._interpolated(queries[some], cells[some], nodes, weights[some])
+
+        fill(found)
+        # What falls off towards the surface may not be carried on below zero.
+        below = lost[fluence[lost] < 0]
+        weights[below] = np.maximum(weights[below], 0.0)
+        weights[below] /= weights[below].sum(axis=1, keepdims=True)
+        fill(below)
         return fluence
 
 

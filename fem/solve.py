@@ -10,7 +10,7 @@ from typing import overload
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium, at_surface, base_of, coefficients_on
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
@@ -250,7 +250,8 @@ def solve_each(
     found = []
     for scene, step in sorted(steps.items()):
         made = step.solution
-        validity = Validity(made.mesh, base_of(media[scene][0]), scenes[scene], sources[scene].deposits)
+        under = at_surface(media[scene][0], made.mesh, coefficients_on(made.mesh, media[scene]))
+        validity = Validity(made.mesh, under, scenes[scene], sources[scene].deposits)
         warnings = _warnings(made, validity, sources[scene], tolerance, where)
         warnings += warnings_for_regions(inner, media[scene])
         found.append(replace(made, validity=validity, warnings=warnings))
@@ -377,7 +378,7 @@ def _warnings(solution: Solution, validity: Validity, sources: Sources, toleranc
     """What a user should know of a solution, and where refinement stopped."""
     warnings = [*solution.surface.warnings, *warnings_for(solution.surface, validity), *sources.warnings]
     warnings += solution.warnings
-    if solution.error_estimate > tolerance:
+    if not solution.error_estimate <= tolerance:
         warnings.append(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
             f"{where}."
@@ -418,7 +419,7 @@ def _warnings(solution: Solution, validity: Validity, sources: Sources, toleranc
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
         warnings.append(
             "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-            f"{1 / solution.medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            f"{1 / validity.medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
             "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
         )
     return list(dict.fromkeys(warnings))
@@ -437,7 +438,7 @@ def _shallow(solution: Solution) -> list[str]:
         if off[worst] > SHALLOW * depths[worst]:
             return [
                 f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} "
-                "below the mesh's facets, and what leaves above it is off by as much; give a finer mesh, or put it "
+                "below the mesh's facets, and what leaves above it may be off by as much; give a finer mesh, or put it "
                 "deeper."
             ]
     return []

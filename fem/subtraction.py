@@ -25,7 +25,6 @@ from skfem.refdom import RefTri
 
 from tetlux.fem.assembly import Mass
 from tetlux.fem.coefficients import coefficients_of
-from tetlux.fem.fitting import Fitting
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
@@ -292,7 +291,7 @@ def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
     return np.concatenate([good, good[cKDTree(points).query(added)[1]]])
 
 
-def patch_terms(patch: Patch, mass: Mass, fitting: Fitting | None = None) -> PatchTerms:
+def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     """Assemble what a patch adds.
 
     Parameters
@@ -300,8 +299,6 @@ def patch_terms(patch: Patch, mass: Mass, fitting: Fitting | None = None) -> Pat
     patch : Patch
     mass : {"lumped", "consistent"}
         As in the system matrix.
-    fitting : Fitting, optional
-        The same.
 
     Returns
     -------
@@ -323,11 +320,8 @@ def patch_terms(patch: Patch, mass: Mass, fitting: Fitting | None = None) -> Pat
     hats = mesh.hat_gradients[patch.cells]
     volumes = mesh.volumes[patch.cells]
     slope = np.einsum("mij,mi->mj", hats, values)
-    diffusion = medium.diffusion if fitting is None else fitting.diffusion[patch.cells]
-    stiff = (diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
+    stiff = (medium.diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
     absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)
-    if fitting is not None:
-        absorbed *= fitting.kept[cells]
     _, areas = triangle_areas(mesh.points, faces)
     exited = robin * (areas * on_boundary)[:, None] * _mass(patch.at_nodes[faces], mass)
     load += summed(cells, stiff + absorbed, count) + summed(faces, exited, count)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, base_of, coefficients_on
+from tetlux.fem.coefficients import AnyMedium, Coefficients, at_surface, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
@@ -27,6 +27,7 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # A light needs its own, once more where its patch shrinks, and two to estimate the error.
 LOADS_OF_A_LIGHT = 4
+SHARES = ("shares", "power_shares")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,21 +83,26 @@ class System:
         return coefficients_on(self.mesh, self.media)
 
     @cached_property
-    def solver(self) -> Solver:
-        """The solver of its matrix."""
-        assembly = self.assembly or Assembly(self.mesh)
-        coefficients, fitting = self.coefficients, self.fitting
+    def plain(self) -> "Equations":
+        """Those of points and beams."""
+        return self._equations(None)
+
+    @cached_property
+    def fitted(self) -> "Equations":
+        """Those of diffuse and emitted light, whose layers along the boundary are fitted where the mesh is coarse."""
+        fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
+        return self.plain if fitting is None else self._equations(fitting)
+
+    def _equations(self, fitting: Fitting | None) -> "Equations":
+        mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
+        sigma_a, kept = coefficients.sigma_a, 1.0 if fitting is None else fitting.kept
+        volumes = sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
         if fitting is None:
             matrix = assembly.of(coefficients, self.mass)
         else:
-            escape = coefficients.escape
-            matrix = assembly.matrix(fitting.diffusion, coefficients.sigma_a, escape, self.mass, fitting.kept)
-        return solver_for(matrix, LOADS_OF_A_LIGHT * self.expected)
-
-    @cached_property
-    def fitting(self) -> Fitting | None:
-        """What its matrix has in place of some coefficients."""
-        return fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
+            matrix = assembly.matrix(fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.kept)
+        solver = solver_for(matrix, LOADS_OF_A_LIGHT * self.expected)
+        return Equations(solver, np.asarray(kept * volumes), fitting)
 
     @property
     def body(self) -> Surface:
@@ -129,25 +135,43 @@ class System:
             sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
         solution, *_ = self._solved(sources, watch, None)
         warnings = [*solution.warnings, *sources.warnings]
-        validity = Validity(self.mesh, base_of(self.medium), lights, sources.deposits)
+        under = at_surface(self.medium, self.mesh, self.coefficients)
+        validity = Validity(self.mesh, under, lights, sources.deposits)
         return replace(solution, seconds=watch.read(), warnings=warnings, validity=validity)
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
-        solution, good, load, emission = self._solved(sources, watch, before)
+        solution, good, parts = self._solved(sources, watch, before)
         with watch.stage("solve"):
             inner = tuple(region.surface for region in self.regions)
-            estimate = estimated(solution, self.coefficients, self.solver, load, emission, inner, self.fitting)
+            estimates = [
+                estimated(
+                    part.solution,
+                    solution,
+                    self.coefficients,
+                    part.equations.solver,
+                    part.load,
+                    part.emission,
+                    inner,
+                    part.equations.fitting,
+                )
+                for part in parts
+            ]
+        estimate = Estimate(*(np.sum([getattr(each, name) for each in estimates], axis=0) for name in SHARES))
         return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
-    ) -> tuple[Solution, tuple[BoolArray, ...], FloatArray, float | FloatArray]:
-        """The solution, where its charges are good guesses, what was put on the nodes, and the emission."""
+    ) -> "tuple[Solution, tuple[BoolArray, ...], list[_Part]]":
+        """The solution, where its charges are good guesses, and its parts by the equations that they obey."""
         mesh = self.mesh
         with watch.stage("assemble"):
             deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
-            loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+            laws = [self._equations_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
+            loads = [
+                load_vector(mesh, self.coefficients, deposit) - equations.withheld(mesh, deposit)
+                for equations, deposit in zip(laws, deposits, strict=True)
+            ]
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.any()]
             if before is None:
@@ -159,45 +183,67 @@ class System:
                     patch_of(mesh, charges, inherited(good, coarse, mesh))
                     for charges, good in zip(sources.charges, before.good, strict=True)
                 ]
-            terms = [patch_terms(patch, self.mass, self.fitting) for patch in patches]
-            solver = self.solver
+            terms = [patch_terms(patch, self.mass) for patch in patches]
+            of_columns = [*(self.plain for _ in terms), *(laws[light] for light in lit)]
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
-            columns = [*(term.load for term in terms), *(loads[light] for light in lit)]
-            parts = solver.solve(np.column_stack(columns or loads))
+            columns = np.column_stack([*(term.load for term in terms), *(loads[light] for light in lit)] or loads[:1])
+            parts: FloatArray = np.zeros(columns.shape)
+            for equations in dict.fromkeys(of_columns):
+                mine = [i for i, each in enumerate(of_columns) if each is equations]
+                parts[:, mine] = equations.solver.solve(columns[:, mine])
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
         worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
         if worse:
             with watch.stage("assemble"):
                 for i in worse:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(patches[i], self.mass, self.fitting)
+                    terms[i] = patch_terms(patches[i], self.mass)
             with watch.stage("solve"):
-                parts[:, worse] = solver.solve(np.column_stack([terms[i].load for i in worse]))
+                parts[:, worse] = self.plain.solver.solve(np.column_stack([terms[i].load for i in worse]))
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
         of_lights = []
         for light, deposit in enumerate(deposits):
             fluence = parts[:, : len(owners)][:, owners == light].sum(axis=1)
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
-            of_lights.append(self._solution(deposit, fluence, [patches[i] for i in own], [terms[i] for i in own]))
-        emission = sum((deposit.emission for deposit in deposits), 0.0)
-        solution = replace(added(of_lights), warnings=[solver.note] if solver.note else [])
-        return solution, tuple(good), np.sum(loads, axis=0), emission
+            its_patches, its_terms = [patches[i] for i in own], [terms[i] for i in own]
+            of_lights.append(self._solution(deposit, laws[light], fluence, its_patches, its_terms))
+        found = []
+        for equations in dict.fromkeys(laws):
+            some = [light for light, each in enumerate(laws) if each is equations]
+            emission = sum((deposits[light].emission for light in some), 0.0)
+            # Emission is even, and what deposits ripple by is that they are not.
+            uneven = [light for light in some if len(deposits[light].points) or len(deposits[light].starts)]
+            load = np.sum([np.zeros(len(mesh.points)), *(loads[light] for light in uneven)], axis=0)
+            found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
+        notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
+        return replace(added(of_lights), warnings=notes), tuple(good), found
+
+    def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
+        """Fitted ones for what is spread evenly, the mesh's own for what is not."""
+        spread = len(deposit.points) == 0 and len(deposit.starts) == 0 and light not in sources.owners
+        return self.fitted if spread else self.plain
 
     def _solution(
-        self, deposit: Deposit, fluence: FloatArray, patches: list[Patch], terms: list[PatchTerms]
+        self,
+        deposit: Deposit,
+        equations: "Equations",
+        fluence: FloatArray,
+        patches: list[Patch],
+        terms: list[PatchTerms],
     ) -> Solution:
         """The solution of one light, by its deposit on this mesh."""
         mesh, moved = self.mesh, 0.0
         if self.limit and not (self._has_first_moment(deposit) or any(patch.charges.dips for patch in patches)):
-            fluence, moved = nonnegative(fluence, mesh.edges, self._losing)
+            fluence, moved = nonnegative(fluence, mesh.edges, self._losing(equations))
         outside = mesh.boundary_node_areas * deposit.irradiance
         transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
         emitted = float((mesh.volumes * deposit.emission).sum())
+        absorbed = float((equations.absorbing * fluence).sum()) + float(equations.withheld(mesh, deposit).sum())
         ledger = Power(
             incident=deposit.incident + float(outside.sum()) + emitted,
             specular=deposit.specular + float((outside - transmitted).sum()),
-            absorbed=deposit.absorbed + float((self._absorbing * fluence).sum()) + sum(term.absorbed for term in terms),
+            absorbed=deposit.absorbed + absorbed + sum(term.absorbed for term in terms),
             exited=0.0,
             ballistic=deposit.ballistic,
         )
@@ -231,17 +277,42 @@ class System:
         cells, _ = self.mesh.locate(points)
         return np.asarray(np.where(cells >= 0, self.mesh.regions[cells], 0))
 
-    @cached_property
-    def _absorbing(self) -> FloatArray:
-        """What a fluence of 1 at each node loses, (n,), unit²."""
-        sigma_a, kept = self.coefficients.sigma_a, 1.0 if self.fitting is None else self.fitting.kept
-        if self.coefficients.uniform:
-            return np.asarray(kept * (sigma_a * self.mesh.node_volumes))
-        return np.asarray(kept * self.mesh.to_nodes(sigma_a * self.mesh.volumes))
-
-    @cached_property
-    def _losing(self) -> FloatArray:
-        """The same, and what leaves for it through the boundary, (n,), unit²."""
-        losing = self._absorbing.copy()
+    def _losing(self, equations: "Equations") -> FloatArray:
+        """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""
+        losing = equations.absorbing.copy()
         losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
         return losing
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """A matrix on a mesh.
+
+    Attributes
+    ----------
+    solver : Solver
+    absorbing : (n,) ndarray
+        What a fluence of 1 at each node loses by absorption, unit².
+    fitting : Fitting, optional
+        What the matrix has in place of some coefficients.
+    """
+
+    solver: Solver
+    absorbing: FloatArray
+    fitting: Fitting | None
+
+    def withheld(self, mesh: TetMesh, deposit: Deposit) -> FloatArray:
+        """Emission that is absorbed where it is, since the layer's own absorption is all that a node keeps, (n,), W."""
+        if self.fitting is None or not np.any(deposit.emission):
+            return np.zeros(len(mesh.points))
+        return np.asarray((1.0 - self.fitting.kept) * mesh.to_nodes(deposit.emission * mesh.volumes))
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What of a solution obeys the same equations, what was put on the nodes for it, and what the volume emits."""
+
+    equations: Equations
+    solution: Solution
+    load: FloatArray
+    emission: float | FloatArray

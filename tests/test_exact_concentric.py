@@ -54,3 +54,15 @@ def test_a_black_core_takes_what_diffusion_lets_it() -> None:
 def test_a_core_outside_the_ball_is_refused() -> None:
     with pytest.raises(InputError, match="not inside the ball"):
         concentric.glow_exitance(TISSUE, TISSUE, core_radius=10.0, radius=10.0)
+
+
+@pytest.mark.parametrize("sigma_a", [0.0, 1e-9, 1e-7, 0.01, 1.0, 50.0])
+def test_a_ball_that_glows_throughout(sigma_a: float) -> None:
+    """A core and a shell that both glow, of one medium; what leaves without absorption is what is emitted."""
+    medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
+    found = sphere_light.glow_exitance(medium, radius=5.0)
+    if sigma_a == 0:
+        assert found == pytest.approx(5.0 / 3.0, rel=1e-12)
+        return
+    nearly = concentric.glow_exitance(medium, medium, core_radius=5.0 * (1 - 1e-9), radius=5.0)
+    assert found == pytest.approx(nearly, rel=1e-6)

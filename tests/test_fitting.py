@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from tetlux.fem import DiffuseLight, Light, Medium, PencilBeam, PointSource, System, solve
+from tetlux.fem import DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region, System, solve
 from tetlux.fem.coefficients import coefficients_of
-from tetlux.fem.exact import sphere_light
+from tetlux.fem.exact import concentric, sphere_light
 from tetlux.fem.fitting import fitting_of
 from tetlux.meshing import TetMesh, sphere, tetrahedralize
 
@@ -56,13 +56,47 @@ def test_the_tolerance_is_met_or_told_of() -> None:
         assert told == (solution.error_estimate > 0.05)
 
 
-def test_subtracted_sources_go_with_fitted_coefficients(coarse: TetMesh) -> None:
-    """A source in the middle of all is its closed form, whatever the coefficients of the mesh's own part."""
-    medium = Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4)
+@pytest.mark.parametrize("light", [PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0)), PointSource((0.0, 0.0, 9.0), 1.0)])
+def test_points_and_beams_are_not_fitted(coarse: TetMesh, light: Light, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Their fluence is no layer: fitted, a point one mean free path deep let five times as much out."""
+    medium = Medium(sigma_a=1.0, sigma_s_prime=1.0, eta=1.4)
     assert fitting_of(coarse, coefficients_of(medium)) is not None
-    lights: list[Light] = [PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0)), PointSource((3.0, 0.0, 2.0), 1.0)]
-    solution = System(coarse, medium, sphere(10.0)).solve(lights)
-    assert abs(solution.power.balance_error) < 1e-12
+    found = System(coarse, medium, sphere(10.0)).solve([light, DiffuseLight(1.0)])
+    assert abs(found.power.balance_error) < 1e-12
+    monkeypatch.setattr("tetlux.fem.system.fitting_of", lambda *_: None)
+    plain = System(coarse, medium, sphere(10.0)).solve([light, DiffuseLight(1.0)])
+    np.testing.assert_array_equal(found.of_lights[0].fluence, plain.of_lights[0].fluence)
+    assert not np.allclose(found.of_lights[1].fluence, plain.of_lights[1].fluence, rtol=0.1)
+
+
+@pytest.mark.parametrize("sigma_a", [0.01, 0.1, 1.0, 10.0, 100.0])
+@pytest.mark.parametrize("eta", [1.0, 1.4])
+def test_a_ball_that_glows_in_what_absorbs(sigma_a: float, eta: float) -> None:
+    """Measured: error .0001 to .05 on the mesher's own mesh, estimates .64 to 18 times that; 17 times M before."""
+    medium, body = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=eta), sphere(10.0)
+    exact = sphere_light.glow_exitance(medium, radius=10.0)
+    for solution in (
+        solve(tetrahedralize(body), medium, [Emission(1.0)]),
+        solve(body, medium, [Emission(1.0)], tolerance=0.05, most_tetrahedra=60_000),
+    ):
+        areas = solution.mesh.boundary_node_areas
+        error = float(np.sqrt(areas @ (solution.exitance - exact) ** 2 / areas.sum())) / exact
+        assert error < 0.07
+        assert solution.error_estimate > 0.5 * error
+        assert abs(solution.power.balance_error) < 1e-12
+
+
+def test_layers_at_interfaces_are_in_the_estimate() -> None:
+    """A core that absorbs within a hundredth of its tetrahedra: 7 % wrong, and the estimate said .7 %."""
+    core, shell = Medium(sigma_a=100.0, sigma_s_prime=1.0, eta=1.4), Medium(sigma_a=0.001, sigma_s_prime=1.0, eta=1.4)
+    regions = [Region(sphere(4.0), core)]
+    solution = solve(sphere(8.0), shell, [DiffuseLight(1.0)], regions=regions, most_tetrahedra=60_000)
+    exact = float(np.max(solution.transmitted_irradiance))
+    exact *= concentric.diffuse_exitance(core, shell, core_radius=4.0, radius=8.0)
+    areas = solution.mesh.boundary_node_areas
+    error = float(np.sqrt(areas @ (solution.exitance - exact) ** 2 / areas.sum())) / exact
+    # Measured 1.2 to 1.3; 1.0 to 2.5 for other cores, glowing ones among them.
+    assert 0.7 < solution.error_estimate / error < 3.0
 
 
 def test_meshes_that_show_the_layer_are_left_alone(coarse: TetMesh) -> None:

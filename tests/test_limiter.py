@@ -87,7 +87,7 @@ def test_the_limiter_keeps_power(seed: int, count: int, dark: float) -> None:
     edges = rng.integers(count, size=(3 * count, 2))
     power = float(weights @ fluence)
     found, moved = nonnegative(fluence, edges, weights)
-    if power < 0:
+    if power < 1e-250:
         np.testing.assert_array_equal(found, fluence)
         return
     assert found.min() >= 0

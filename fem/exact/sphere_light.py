@@ -192,6 +192,27 @@ def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     return float(1.0 - medium.diffusion / a * growth * surface)
 
 
+def glow_exitance(medium: Medium, *, radius: float) -> float:
+    """Exitance ``M = phi/(2A)`` of a ball that emits 1 W/unit³ throughout.
+
+    ``phi = (1 - C i_0(k r)/i_0(k a))/sigma_a`` with ``phi + zb dphi/dr = 0`` at the surface, so that
+    ``2 A M = q/((1 + q) sigma_a)`` with ``q = zb (k coth(k a) - 1/a)``; without absorption ``M = a/3``.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive.
+    """
+    a = checks.positive("radius", radius)
+    x = medium.sigma_tr * a
+    if x < 1e-3:
+        # k coth(k a) - 1/a = k² a/3 (1 - (k a)²/15 + ...).
+        q = medium.extrapolation_length * x**2 / (3.0 * a)
+        return a / 3.0 * (1.0 - x**2 / 15.0) / (1.0 + q)
+    q = medium.extrapolation_length * (x / math.tanh(x) - 1.0) / a
+    return q / ((1.0 + q) * medium.sigma_a * 2.0 * medium.boundary_factor)
+
+
 def _along_diameter(x: float, extinction: float, gamma: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
     """Integrate ``e^{-extinction s}`` times rho_l, signed beyond the centre, and times ``e^{-x d}/d``.
 

@@ -13,6 +13,8 @@ from tetlux.meshing.surface import Surface
 
 # A point nearer to the surface than this share of the body's diagonal is on it.
 ON_SURFACE = 1e-9
+# Squares of fainter and brighter lights are no numbers any more.
+FAINTEST = 1e-60
 
 
 def as_vector(value: Vector, name: str) -> FloatArray:
@@ -38,6 +40,8 @@ def check_positive(value: float, name: str, unit: str) -> None:
     """Refuse what is not a positive number."""
     if not math.isfinite(value) or value <= 0:
         raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.")
+    if not FAINTEST <= value <= 1.0 / FAINTEST:
+        raise InputError(f"{name} is {value:g}; give a number of {unit} between {FAINTEST:g} and {1.0 / FAINTEST:g}.")
 
 
 @dataclass(frozen=True)
