@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.conftest import block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.limiter import nonnegative
 from tetlux.meshing import TetMesh, box, sphere, tetrahedralize
@@ -30,7 +31,7 @@ def flat() -> TetMesh:
 @pytest.mark.parametrize("name", LIGHTS)
 @pytest.mark.parametrize("subtract", ["half-space", "nothing"])
 def test_no_fluence_below_zero(flat: TetMesh, name: str, subtract: str) -> None:
-    """Without the limiter the fluence of the point dips to -2 % of its maximum here, that of the pencil to -1 %."""
+    """Without the limiter the fluence of the point dips to -3 % of its maximum here, that of the pencil to -1 %."""
     light = LIGHTS[name]
     if name == "point":
         light = PointSource((0.0, 0.0, 1.6), 1.0)
@@ -43,7 +44,7 @@ def test_no_fluence_below_zero(flat: TetMesh, name: str, subtract: str) -> None:
     assert found.power.absorbed + found.power.exited == pytest.approx(raw.power.absorbed + raw.power.exited, rel=1e-12)
     # Nothing else changes much: where it was bright it stays as it was.
     bright = raw.fluence > 0.3 * raw.fluence.max()
-    np.testing.assert_allclose(found.fluence[bright], raw.fluence[bright], rtol=0.05)
+    np.testing.assert_allclose(found.fluence[bright], raw.fluence[bright], rtol=0.1)
 
 
 @pytest.mark.parametrize("light", [PencilBeam((0.0, 0.0, 50.0), (0.0, 0.0, -1.0)), PointSource((0.0, 0.0, 9.0), 1.0)])
@@ -70,11 +71,13 @@ def test_a_beam_of_a_first_moment_is_not_limited(flat: TetMesh) -> None:
 
 
 def test_what_was_moved_is_told() -> None:
-    """A mesh that is far too coarse, and says so."""
-    mesh = tetrahedralize(box((20.0, 20.0, 20.0)), edge_length=5.0)
-    solution = solve(mesh, DARK, [PointSource((0.0, 5.0, 5.0), 1.0)], subtract="nothing", tolerance=0.5)
-    assert solution.moved > 1e-4
-    assert any("was moved between nodes to keep the fluence from going below zero" in w for w in solution.warnings)
+    """A mesh that is far too coarse, and leans over, so that its angles are obtuse."""
+    upright = block((5, 5, 5), (20.0, 20.0, 20.0))
+    leaning = upright.points + np.outer(upright.points[:, 2], (1.5, 0.0, 0.0))
+    mesh = TetMesh(leaning, upright.tetrahedra, upright.unit)
+    solution = solve(mesh, DARK, [PointSource((-15.0, 0.0, -10.0), 1.0)], subtract="nothing", tolerance=0.5)
+    assert solution.moved == pytest.approx(3.28e-3, rel=0.01)
+    assert any("0.33% of the power was moved between nodes to keep the fluence" in w for w in solution.warnings)
 
 
 @settings(max_examples=200, deadline=None)
