@@ -127,18 +127,18 @@ PANELS = (
     ),
     Panel(
         "core",
-        "a ball of radius 10 in diffuse light, with a core of the shell's scattering",
+        "a ball of radius 10 in diffuse light, with a core of the shell's scattering; its radius in mean free paths",
         replace(
             CONTRAST, name="σ_a of the core by σ_s'", values=(1e-4, 0.01, 1.0, 10.0, 100.0, 1e3), few=(0.01, 1.0, 100.0)
         ),
-        Axis("radius of the core (mean free paths)", (2.0, 4.0, 6.0, 8.0), (2.0, 6.0)),
+        Axis("core radius", (2.0, 4.0, 6.0, 8.0), (2.0, 6.0)),
         scenes.diffuse_by_core,
         (DEFAULT, PLAIN),
     ),
     Panel(
         "wide beam",
         "a beam as wide as the ball, matched index",
-        replace(RADIUS, values=(0.3, 1.0, 3.0, 10.0, 30.0), few=(0.3, 3.0, 10.0)),
+        replace(RADIUS, values=(0.3, 1.0, 3.0, 10.0, 30.0), few=(0.3, 3.0)),
         ALBEDO,
         scenes.beam_by_radius_and_albedo,
         (DEFAULT, PLAIN),
