@@ -9,6 +9,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Embree computes in single precision: rays start this share of the triangles' extent along their way.
 OFFSET = 1e-5
+# And are nowhere as far as this many extents away, where single precision has no numbers any more.
+FARTHEST = 1e12
 
 
 class RayCaster:
@@ -36,7 +38,7 @@ class RayCaster:
 
     def _single(self, points: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
         """Places about the origin, in units of the extent, which single precision can hold."""
-        return np.asarray((points - self._origin) / self._size, dtype=np.float32)
+        return np.asarray(np.clip((points - self._origin) / self._size, -FARTHEST, FARTHEST), dtype=np.float32)
 
     def first(self, origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first triangle that each ray meets.
