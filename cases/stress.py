@@ -7,14 +7,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.publish import check_writable
+from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
 from tetlux.cases.stress_panels import PANELS, Panel
 from tetlux.cases.stress_picture import draw_map
 from tetlux.cases.stress_rules import broken, violations
 from tetlux.cases.stress_runs import TIME_LIMIT, Run, runs_of
 from tetlux.cases.stress_scenes import TOLERANCE
 from tetlux.cases.stress_words import in_words
-from tetlux.meshing.errors import RunError
 
 # Runs between two lines that say how far it is.
 PROGRESS = 50
@@ -91,23 +90,18 @@ def _in_order(runs: list[Run], panels: Sequence[Panel]) -> list[Run]:
 
 
 def _write(runs: Sequence[Run], words: str, out: Path) -> None:
-    """Write the files, each whole: into a folder beside them first."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".partial-", dir=out) as name:
-            folder = Path(name)
+    """Write the files, whole: into a folder beside them first."""
+    with claimed(out, ".") as folder:
+        try:
             with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
                 writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
                 writer.writeheader()
                 writer.writerows(map(_as_row, runs))
             (folder / "stress.md").write_text(words, encoding="utf-8")
             draw_map(runs, folder / "stress.png")
-            for each in FILES:
-                (folder / each).replace(out / each)
-    except OSError as error:
-        raise RunError(
-            f"the map cannot be written to {out}: {error.strerror or error}; choose another folder with --out."
-        ) from error
+            publish(folder, out, FILES)
+        except OSError as error:
+            raise cannot_write(out, error) from error
 
 
 def _as_row(run: Run) -> dict[str, Any]:

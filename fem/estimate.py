@@ -44,7 +44,7 @@ from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -217,6 +217,12 @@ def _lumping(first: FloatArray, second: FloatArray) -> FloatArray:
     return np.asarray(np.abs(corners * np.einsum("mi,mi->m", first, second) - sums) / (corners * (corners + 1)))
 
 
+def _step_across(mesh: TetMesh, cells: IntArray, faces: IntArray, values: FloatArray) -> FloatArray:
+    """How far values at the corners of tetrahedra (f, 4) go from a face of each (f, 3) to the node opposite, (f,)."""
+    on_face = (mesh.tetrahedra[cells][:, :, None] == faces[:, None, :]).any(axis=2)
+    return np.asarray(np.abs(np.where(on_face, values / 3.0, -values).sum(axis=1)))
+
+
 def _of_layers(
     mesh: TetMesh, coefficients: Coefficients, fitting: Fitting, smooth: FloatArray, dual: FloatArray
 ) -> FloatArray:
@@ -227,8 +233,7 @@ def _of_layers(
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
     across = fitting.across[faces].mean(axis=1)
-    outer = (mesh.tetrahedra[cells][:, :, None] == faces[:, None, :]).any(axis=2)
-    step = np.abs((np.where(outer, smooth / 3.0, -smooth)).sum(axis=1))
+    step = _step_across(mesh, cells, faces, smooth)
     added = LAYERS * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
     added *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
     return np.asarray(np.bincount(cells, added, minlength=len(mesh.tetrahedra)), dtype=np.float64)
@@ -249,8 +254,7 @@ def _of_inner_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArr
         diffusion, sigma_a = (at_cells(value, side) for value in (coefficients.diffusion, coefficients.sigma_a))
         k = np.sqrt(sigma_a / diffusion)
         over = np.sqrt(1.0 + (0.5 * k * 3.0 * mesh.volumes[side] / areas) ** 2)
-        outer = (mesh.tetrahedra[side][:, :, None] == faces[:, None, :]).any(axis=2)
-        first, second = (np.abs((np.where(outer, at / 3.0, -at)).sum(axis=1)) for at in (smooth[side], dual[side]))
+        first, second = (_step_across(mesh, side, faces, values[side]) for values in (smooth, dual))
         shares = diffusion * k * (over - 1.0) * over * areas * first * second
         added += np.bincount(side, shares, minlength=len(added))
     return added

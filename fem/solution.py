@@ -1,6 +1,6 @@
 """`Solution`: fluence, exitance, and where the power went."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
@@ -119,11 +119,15 @@ class Solution:
         (q,) ndarray
             W/unit²; nan at points that are not finite.
         """
+        return self._at_nearest(points, self.exitance_on)
+
+    def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """What there is at the points of the surface nearest to given points; nan where those are not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
-        exitance = np.full(len(places), np.nan)
-        exitance[finite] = self.exitance_on(self.surface.project(places[finite])[0])
-        return exitance
+        values = np.full(len(places), np.nan)
+        values[finite] = values_on(self.surface.project(places[finite])[0])
+        return values
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
@@ -145,10 +149,10 @@ class Solution:
         -------
         (q,) ndarray
             1 less the expected relative error of the exitance, not below 0: see `tetlux.fem.local_validity`. It is the
-            error of the model, which no mesh makes smaller; that of the mesh is `error_estimate`.
+            error of the model, which no mesh makes smaller; that of the mesh is `error_estimate`. nan at points that
+            are not finite.
         """
-        queries, _ = self.surface.project(np.asarray(points, dtype=float).reshape(-1, 3))
-        return self.valid_on(queries)
+        return self._at_nearest(points, self.valid_on)
 
     def valid_on(self, queries: FloatArray) -> FloatArray:
         """`valid_at` points (q, 3) that lie on the surface, (q,)."""

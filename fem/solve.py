@@ -10,11 +10,10 @@ from typing import overload
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, at_surface, base_of, coefficients_on
+from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
-from tetlux.fem.local_validity import Validity
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
 from tetlux.fem.solution import Solution
@@ -249,12 +248,9 @@ def solve_each(
         where = "on the mesh given"
     found = []
     for scene, step in sorted(steps.items()):
-        made = step.solution
-        under = at_surface(media[scene][0], made.mesh, coefficients_on(made.mesh, media[scene]))
-        validity = Validity(made.mesh, under, scenes[scene], sources[scene].deposits)
-        warnings = _warnings(made, validity, sources[scene], tolerance, where)
+        warnings = _warnings(step.solution, sources[scene], tolerance, where)
         warnings += warnings_for_regions(inner, media[scene])
-        found.append(replace(made, validity=validity, warnings=warnings))
+        found.append(replace(step.solution, warnings=warnings))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
 
@@ -374,10 +370,13 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     return marked
 
 
-def _warnings(solution: Solution, validity: Validity, sources: Sources, tolerance: float, where: str) -> list[str]:
+def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
     """What a user should know of a solution, and where refinement stopped."""
-    warnings = [*solution.surface.warnings, *warnings_for(solution.surface, validity), *sources.warnings]
-    warnings += solution.warnings
+    warnings, medium = list(solution.surface.warnings), solution.medium
+    if solution.validity is not None:
+        warnings += warnings_for(solution.surface, solution.validity)
+        medium = solution.validity.medium
+    warnings += [*sources.warnings, *solution.warnings]
     if not solution.error_estimate <= tolerance:
         warnings.append(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
@@ -419,7 +418,7 @@ def _warnings(solution: Solution, validity: Validity, sources: Sources, toleranc
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
         warnings.append(
             "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-            f"{1 / validity.medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            f"{1 / medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
             "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
         )
     return list(dict.fromkeys(warnings))

@@ -27,7 +27,6 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # A light needs its own, once more where its patch shrinks, and two to estimate the error.
 LOADS_OF_A_LIGHT = 4
-SHARES = ("shares", "power_shares")
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +133,7 @@ class System:
         with watch.stage("surface"):
             sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
         solution, *_ = self._solved(sources, watch, None)
-        warnings = [*solution.warnings, *sources.warnings]
-        under = at_surface(self.medium, self.mesh, self.coefficients)
-        validity = Validity(self.mesh, under, lights, sources.deposits)
-        return replace(solution, seconds=watch.read(), warnings=warnings, validity=validity)
+        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
@@ -157,7 +153,8 @@ class System:
                 )
                 for part in parts
             ]
-        estimate = Estimate(*(np.sum([getattr(each, name) for each in estimates], axis=0) for name in SHARES))
+        shares = np.sum([each.shares for each in estimates], axis=0)
+        estimate = Estimate(shares, np.sum([each.power_shares for each in estimates], axis=0))
         return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
@@ -168,10 +165,13 @@ class System:
         with watch.stage("assemble"):
             deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
             laws = [self._equations_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
-            loads = [
-                load_vector(mesh, self.coefficients, deposit) - equations.withheld(mesh, deposit)
-                for equations, deposit in zip(laws, deposits, strict=True)
-            ]
+            loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+            for light, (deposit, equations) in enumerate(zip(deposits, laws, strict=True)):
+                if equations.fitting is not None and np.any(deposit.emission):
+                    withheld = (1.0 - equations.fitting.kept) * mesh.to_nodes(deposit.emission * mesh.volumes)
+                    # Absorbed where it is emitted, since of its absorption a node keeps only that of the layer.
+                    loads[light] -= withheld
+                    deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.any()]
             if before is None:
@@ -213,16 +213,17 @@ class System:
             some = [light for light, each in enumerate(laws) if each is equations]
             emission = sum((deposits[light].emission for light in some), 0.0)
             # Emission is even, and what deposits ripple by is that they are not.
-            uneven = [light for light in some if len(deposits[light].points) or len(deposits[light].starts)]
-            load = np.sum([np.zeros(len(mesh.points)), *(loads[light] for light in uneven)], axis=0)
+            uneven = [loads[light] for light in some if not deposits[light].even]
+            load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        return replace(added(of_lights), warnings=notes), tuple(good), found
+        under = at_surface(self.medium, mesh, self.coefficients)
+        validity = Validity(mesh, under, sources.lights, sources.deposits)
+        return replace(added(of_lights), warnings=notes, validity=validity), tuple(good), found
 
     def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
         """Fitted ones for what is spread evenly, the mesh's own for what is not."""
-        spread = len(deposit.points) == 0 and len(deposit.starts) == 0 and light not in sources.owners
-        return self.fitted if spread else self.plain
+        return self.fitted if deposit.even and light not in sources.owners else self.plain
 
     def _solution(
         self,
@@ -239,7 +240,7 @@ class System:
         outside = mesh.boundary_node_areas * deposit.irradiance
         transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
         emitted = float((mesh.volumes * deposit.emission).sum())
-        absorbed = float((equations.absorbing * fluence).sum()) + float(equations.withheld(mesh, deposit).sum())
+        absorbed = float((equations.absorbing * fluence).sum())
         ledger = Power(
             incident=deposit.incident + float(outside.sum()) + emitted,
             specular=deposit.specular + float((outside - transmitted).sum()),
@@ -300,12 +301,6 @@ class Equations:
     solver: Solver
     absorbing: FloatArray
     fitting: Fitting | None
-
-    def withheld(self, mesh: TetMesh, deposit: Deposit) -> FloatArray:
-        """Emission that is absorbed where it is, since the layer's own absorption is all that a node keeps, (n,), W."""
-        if self.fitting is None or not np.any(deposit.emission):
-            return np.zeros(len(mesh.points))
-        return np.asarray((1.0 - self.fitting.kept) * mesh.to_nodes(deposit.emission * mesh.volumes))
 
 
 @dataclass(frozen=True, eq=False)

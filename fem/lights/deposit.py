@@ -84,6 +84,11 @@ class Deposit:
     warnings: tuple[str, ...] = ()
     on_mesh: Callable[[TetMesh, Surface, Coefficients], "Deposit"] | None = None
 
+    @property
+    def even(self) -> bool:
+        """Whether it is spread over surface or volume, and nothing of it lies at points or along segments."""
+        return len(self.points) == 0 and len(self.starts) == 0
+
     def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> "Deposit":
         """What it is on a mesh of the surface with given coefficients."""
         if self.on_mesh is None:
