@@ -197,7 +197,7 @@ def _averaging(mesh: TetMesh) -> Callable[[FloatArray], FloatArray]:
     shape = (int(groups.max()) + 1, len(groups))
     around = csc_array((np.repeat(mesh.volumes, 4), groups.reshape(-1), starts), shape=shape)
     volumes: FloatArray = np.asarray(around.sum(axis=1))
-    return lambda vectors: np.asarray((np.asarray(around @ vectors) / volumes[:, None])[groups])
+    return lambda vectors: (np.asarray(around @ vectors) / volumes[:, None]).take(groups, axis=0)
 
 
 def _roughness(mesh: TetMesh, mean: Callable[[FloatArray], FloatArray], values: FloatArray) -> FloatArray:
@@ -206,7 +206,9 @@ def _roughness(mesh: TetMesh, mean: Callable[[FloatArray], FloatArray], values: 
     Across an interface, where the gradient jumps, it is not averaged.
     """
     slope = np.einsum("mij,mi->mj", mesh.hat_gradients, values[mesh.tetrahedra])
-    return np.asarray(mean(slope) - slope[:, None])
+    rough = mean(slope)
+    rough -= slope[:, None]
+    return rough
 
 
 def _lumping(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.refine import refine
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -72,8 +73,11 @@ def graded_towards(
         return mesh
     tree = cKDTree(points)
     while True:
-        distance, nearest = tree.query(mesh.points[mesh.tetrahedra].mean(axis=1))
-        marked = mesh.longest_edges > longest * np.maximum(distance, resolutions[nearest])
+        long = np.flatnonzero(mesh.longest_edges > longest * resolutions.min())
+        middles = mesh.points.take(mesh.tetrahedra[long], axis=0).mean(axis=1)
+        distance, nearest = tree.query(middles, workers=THREADS)
+        marked = np.zeros(len(mesh.tetrahedra), dtype=bool)
+        marked[long] = mesh.longest_edges[long] > longest * np.maximum(distance, resolutions[nearest])
         if not marked.any():
             return mesh
         finer = refine(mesh, marked, surface, inner)

@@ -18,7 +18,8 @@ REFUSED = 1e-8
 # And here where a few digits are enough; a residual ten times as large is not taken for that.
 ROUGH_AIM = 1e-4
 ITERATIONS = 1000
-# Right-hand sides that are iterated on together: each pass over the matrix then serves all of them.
+# Right-hand sides that are iterated on together where every core has so many: each pass over the matrix then serves all
+# of them. Fewer are quicker one by one, for SciPy's products with two or three columns.
 TOGETHER = 8
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000
@@ -51,6 +52,11 @@ class Product:
         self._blocks = [_rows_of(matrix, rows) for rows in self._rows] if threads > 1 else [matrix]
         self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
+    @property
+    def on_all_cores(self) -> bool:
+        """Whether one product has all cores at work."""
+        return self._pool is not None
+
     def __call__(self, x: FloatArray) -> FloatArray:
         """``matrix @ x``."""
         if self._pool is None:
@@ -79,7 +85,7 @@ def _rows_of(matrix: csr_array, rows: slice) -> csr_array:
 def jacobi(product: Product) -> Method:
     """Conjugate gradients, preconditioned by the diagonal."""
     inverse = 1.0 / product.matrix.diagonal()[:, None]
-    return lambda rest: conjugate_gradients(product, lambda r: inverse * r, rest)
+    return _on_all_cores(product, lambda rest: conjugate_gradients(product, lambda r: inverse * r, rest))
 
 
 def direct(product: Product) -> Method:
@@ -109,7 +115,22 @@ def multigrid(product: Product) -> Method:
         return result
 
     finest = levels[0].product if levels else product
-    return lambda rest: conjugate_gradients(finest, cycle, rest)
+    return _on_all_cores(finest, lambda rest: conjugate_gradients(finest, cycle, rest))
+
+
+def _on_all_cores(product: Product, method: Method) -> Method:
+    """A method on a column or a few at once, each core at its own, unless one product has all of them at work."""
+
+    def of_all(rest: FloatArray) -> FloatArray:
+        count = rest.shape[1]
+        size = TOGETHER if count >= TOGETHER * THREADS and not product.on_all_cores else 1
+        groups = [np.ascontiguousarray(rest[:, start : start + size]) for start in range(0, count, size)]
+        if len(groups) == 1 or THREADS == 1 or product.on_all_cores:
+            return np.hstack([method(group) for group in groups])
+        with ThreadPoolExecutor(THREADS) as pool:
+            return np.hstack(list(pool.map(method, groups)))
+
+    return of_all
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,9 +246,10 @@ class Solver:
         """
         loads = load.reshape(len(load), -1)
         result = np.empty(loads.shape)
-        for start in range(0, loads.shape[1], TOGETHER):
-            columns = slice(start, start + TOGETHER)
-            result[:, columns] = self._solved(np.ascontiguousarray(loads[:, columns], dtype=np.float64))
+        portion = TOGETHER * THREADS
+        for start in range(0, loads.shape[1], portion):
+            columns = slice(start, start + portion)
+            result[:, columns] = self._solved(np.asarray(loads[:, columns], dtype=np.float64))
         return result.reshape(load.shape)
 
     def roughly(self, load: FloatArray) -> FloatArray:
@@ -235,9 +257,7 @@ class Solver:
         # In units in which the iteration stops there.
         size = np.sqrt(_dots(load, load)) * ROUGH_AIM / AIM
         size[size == 0] = 1.0
-        # Two at a time take longer than one by one, for SciPy's products with them.
-        each = np.split(load / size, load.shape[1], axis=1)
-        result = np.column_stack([self._ready[0](np.ascontiguousarray(column)) for column in each]) * size
+        result = self._ready[0](load / size) * size
         left = load - self._product(result)
         return result if (np.sqrt(_dots(left, left)) <= 10.0 * AIM * size).all() else self.solve(load)
 

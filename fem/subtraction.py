@@ -32,7 +32,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tetmesh import FACES, TetMesh
 
 # The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,
 # as far as a share of exp(-REACH) of it.
@@ -216,11 +216,14 @@ class Patch:
     @cached_property
     def faces(self) -> tuple[IntArray, BoolArray]:
         """Its outer faces (f, 3), oriented outward, and which of them are of the body's boundary (f,)."""
-        mesh = self.mesh
-        if self.cells.all():
+        mesh, inside = self.mesh, np.flatnonzero(self.cells)
+        if len(inside) == len(self.cells):
             return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
-        faces = TetMesh(mesh.points, mesh.tetrahedra[self.cells], mesh.unit).boundary_faces
-        return faces, np.isin(_keys(faces, len(mesh.points)), _keys(mesh.boundary_faces, len(mesh.points)))
+        beyond = mesh.neighbours[inside]
+        # Of those at the boundary, which have no number, the last one's is looked at, and does not matter.
+        places = np.flatnonzero((beyond < 0) | ~self.cells[beyond])
+        cells, faces = np.divmod(places, 4)
+        return mesh.tetrahedra[inside[cells, None], FACES[faces]], beyond.reshape(-1)[places] < 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,12 +342,6 @@ def _mass(values: FloatArray, mass: Mass) -> FloatArray:
     if mass == "lumped":
         return np.asarray(values / corners)
     return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
-
-
-def _keys(faces: IntArray, count: int) -> IntArray:
-    """One integer for each triangle, whatever the order of its corners; good for two million nodes."""
-    low, middle, high = np.sort(faces.astype(np.int64), axis=1).T
-    return np.asarray((low * count + middle) * count + high)
 
 
 def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, FloatArray]:

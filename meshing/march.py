@@ -52,31 +52,38 @@ def march(
     left = [np.arange(len(starts))]
     if cells is not None:
         known, left = np.flatnonzero(cells >= 0), [np.flatnonzero(cells < 0)]
-        while len(known):
-            some = known[:PORTION]
-            part = _kept(mesh, np.vstack([starts[some].T, directions[some].T, lengths[some]]), cells[some])
-            some, known = known[: len(part.cells)], known[len(part.cells) :]
-            yield replace(part.stretches, paths=some[part.stretches.paths])
-            left.append(some[part.lost])
+        lines = np.vstack([starts[known].T, directions[known].T, lengths[known]])
+        for some, part in _kept(mesh, lines, cells[known]):
+            yield replace(part.stretches, paths=known[some[part.stretches.paths]])
+            left.append(known[some[part.lost]])
     others = np.concatenate(left)
     if len(others):
         for stretches in mesh.tree.cut(starts[others], directions[others], lengths[others]):
             yield replace(stretches, paths=others[stretches.paths])
 
 
-def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Marched:
-    """Lines (7, p), their starts, directions and lengths, marched; only the first of them where these are known."""
-    known = mesh.marched.find(lines, cells)
-    if known is None:
-        part = _marched(mesh, lines, cells, np.zeros(len(cells)))
+def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, Marched]]:
+    """Lines (7, p), their starts, directions and lengths, marched if they are not known: some of them at a time."""
+    unknown = np.arange(len(cells))
+    for number, part in enumerate(mesh.marched.parts):
+        places = part.find(lines[:, unknown], cells[unknown])
+        found = places >= 0
+        some, places, unknown = unknown[found], places[found], unknown[~found]
+        if len(some) == 0:
+            continue
+        wanted = lines[6, some]
+        short = (wanted > part.lines[6, places]) & ~part.lost[places]
+        if short.any():
+            further = places[short]
+            more = _marched(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further])
+            part = part.on(more, further)  # noqa: PLW2901
+            mesh.marched.add(part, instead=number)
+        yield some, part.some(places).up_to(wanted)
+    for start in range(0, len(unknown), PORTION):
+        some = unknown[start : start + PORTION]
+        part = _marched(mesh, lines[:, some], cells[some], np.zeros(len(some)))
         mesh.marched.add(part)
-        return part
-    wanted = lines[6, : len(known.cells)]
-    further = np.flatnonzero((wanted > known.lines[6]) & ~known.lost)
-    if len(further):
-        known = known.on(_marched(mesh, lines[:, further], known.ends[further], known.lines[6, further]), further)
-        mesh.marched.add(known)
-    return known.up_to(wanted)
+        yield some, part
 
 
 def _marched(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:

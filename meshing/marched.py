@@ -4,6 +4,7 @@ Light of one refractive index takes the same paths in every medium, and only fad
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,12 +37,35 @@ class Marched:
     lost: BoolArray
     stretches: Stretches
 
-    def first(self, count: int) -> "Marched":
-        """The first paths only."""
-        if count == len(self.cells):
+    @cached_property
+    def _by_key(self) -> tuple[FloatArray, IntArray]:
+        """The keys of all paths, ascending, and whose they are."""
+        keys = _keys(self.lines)
+        order = np.argsort(keys)
+        return keys[order], order
+
+    def find(self, lines: FloatArray, cells: IntArray) -> IntArray:
+        """The paths that are the same as lines (7, p) from given tetrahedra, however far, (p,); -1 where none is.
+
+        Of lines that are the same, only one is found.
+        """
+        keys, order = self._by_key
+        places = order[np.minimum(np.searchsorted(keys, _keys(lines)), len(order) - 1)]
+        same = (self.lines[:6, places] == lines[:6]).all(axis=0) & (self.cells[places] == cells)
+        one, every = np.empty(len(order), dtype=np.int64), np.arange(len(places))
+        one[places[same]] = every[same]
+        same &= one[places] == every
+        return np.where(same, places, -1)
+
+    def some(self, places: IntArray) -> "Marched":
+        """Some of the paths, in a given order."""
+        if np.array_equal(places, np.arange(len(self.cells))):
             return self
-        stretches = some_of(self.stretches, self.stretches.paths < count)
-        return Marched(self.lines[:, :count], self.cells[:count], self.ends[:count], self.lost[:count], stretches)
+        number = np.full(len(self.cells), -1)
+        number[places] = np.arange(len(places))
+        numbers = number[self.stretches.paths]
+        stretches = some_of(replace(self.stretches, paths=numbers), numbers >= 0)
+        return Marched(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], stretches)
 
     def up_to(self, lengths: FloatArray) -> "Marched":
         """The same no further than some lengths (p,); where they end is not known any more."""
@@ -71,35 +95,39 @@ def some_of(every: Stretches, chosen: BoolArray) -> Stretches:
     """The chosen stretches."""
     if chosen.all():
         return every
+    places = np.flatnonzero(chosen)
     return Stretches(
-        every.paths[chosen],
-        every.cells[chosen],
-        every.enter[chosen],
-        every.leave[chosen],
-        every.weights[chosen],
-        every.slopes[chosen],
+        every.paths[places],
+        every.cells[places],
+        every.enter[places],
+        every.leave[places],
+        # As they are marched, by corners.
+        every.weights.T.take(places, axis=1).T,
+        every.slopes.T.take(places, axis=1).T,
     )
+
+
+# Any numbers of the same size that have nothing to do with each other.
+_WEIGHTS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
+
+
+def _keys(lines: FloatArray) -> FloatArray:
+    """A number for each of lines (7, p), by where they start and go; the same, to the last bit, for the same."""
+    return np.asarray(sum(weight * row for weight, row in zip(_WEIGHTS, lines[:6], strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """What was marched through one mesh, found again by where its first path begins."""
+    """What was marched through one mesh."""
 
-    parts: dict[bytes, Marched] = field(default_factory=dict)
+    parts: list[Marched] = field(default_factory=list)
 
-    def find(self, lines: FloatArray, cells: IntArray) -> Marched | None:
-        """As many of the first lines (7, p) as were marched before, in this order, however far."""
-        part = self.parts.get(lines[:6, 0].tobytes())
-        if part is None:
-            return None
-        count = min(len(cells), len(part.cells))
-        same = (lines[:6, :count] == part.lines[:6, :count]).all(axis=0) & (cells[:count] == part.cells[:count])
-        count = count if same.all() else int(same.argmin())
-        return part.first(count) if count > 0 else None
-
-    def add(self, part: Marched) -> None:
-        """Keep paths in the place of those that begin alike, if they are not too many."""
-        key = part.lines[:6, 0].tobytes()
-        others = sum(len(each.stretches.paths) for known, each in self.parts.items() if known != key)
-        if others + len(part.stretches.paths) <= MOST_KEPT:
-            self.parts[key] = part
+    def add(self, part: Marched, instead: int | None = None) -> None:
+        """Keep paths, in the place of a part that they continue if there is one, unless they are too many."""
+        others = sum(len(each.stretches.paths) for number, each in enumerate(self.parts) if number != instead)
+        if others + len(part.stretches.paths) > MOST_KEPT:
+            return
+        if instead is None:
+            self.parts.append(part)
+        else:
+            self.parts[instead] = part

@@ -248,11 +248,16 @@ class TetMesh:
     @cached_property
     def hat_gradients(self) -> FloatArray:
         """Gradients of the barycentric coordinates in each tetrahedron, (m, 4, 3), 1/unit."""
-        corners = self.points[self.tetrahedra]
-        u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
-        inward = np.stack([np.cross(v, w), np.cross(w, u), np.cross(u, v)], axis=1)
-        three = inward / (6.0 * self.volumes)[:, None, None]
-        return np.concatenate([-three.sum(axis=1, keepdims=True), three], axis=1)
+        result = np.empty((len(self.tetrahedra), 4, 3))
+
+        def fill(block: slice, corners: FloatArray) -> None:
+            u, v, w = corners[1:] - corners[0]
+            three = np.stack([cross(v, w), cross(w, u), cross(u, v)]) / (6.0 * self.volumes[block])
+            result[block, 1:] = three.transpose(2, 0, 1)
+            result[block, 0] = -three.sum(axis=0).T
+
+        over_corners(fill, self.points, self.tetrahedra)
+        return result
 
     @cached_property
     def area(self) -> float:

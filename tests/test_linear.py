@@ -46,7 +46,7 @@ def test_every_method_solves(method: Callable[[Product], Method], medium: Medium
     truth = spsolve(matrix.tocsc(), loads)
     # In a strong absorber the residual says less of the exitance, which is a billionth of the fluence at the source.
     exitance, expected = found[wide.boundary_nodes], truth[wide.boundary_nodes]
-    assert (np.linalg.norm(exitance - expected, axis=0) < 1e-7 * np.linalg.norm(expected, axis=0)).all()
+    assert (np.linalg.norm(exitance - expected, axis=0) < 1e-6 * np.linalg.norm(expected, axis=0)).all()
 
 
 @pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])

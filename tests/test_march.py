@@ -258,6 +258,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     deposit = from_facets(mesh, 60, 6)
     load = load_vector(mesh, coefficients_of(FORWARD), deposit)
     monkeypatch.setattr(marching, "PORTION", portion)
+    mesh = same_mesh(mesh)
     parts = list(march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells))
     assert len(parts) >= -(-len(deposit.starts) // portion)
     assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(load, abs=1e-14)
@@ -311,7 +312,7 @@ def test_paths_are_marched_once_and_then_further(uniform: bool, ball_mesh: TetMe
 
 
 def test_only_the_same_paths_are_known(ball_mesh: TetMesh, marches: list[int]) -> None:
-    """Others that begin alike are marched: with another direction or tetrahedron, after a gap, or on another mesh."""
+    """In any order; others that begin alike are marched, with another direction or tetrahedron, or on another mesh."""
     deposit, other = from_facets(ball_mesh, 100, 8), from_facets(ball_mesh, 100, 10)
     assert deposit.cells is not None
     assert other.cells is not None
@@ -321,8 +322,10 @@ def test_only_the_same_paths_are_known(ball_mesh: TetMesh, marches: list[int]) -
         (replace(deposit, directions=np.where(later[:, None], -deposit.directions, deposit.directions)), 60),
         (replace(deposit, cells=np.where(later, other.cells, deposit.cells)), 60),
         (chosen(deposit, ~later), 0),
-        (chosen(deposit, np.arange(100) != 70), 29),
-        (chosen(deposit, later), 60),
+        (chosen(deposit, np.arange(100) != 70), 0),
+        (chosen(deposit, later), 0),
+        (reordered(deposit, np.random.default_rng(11).permutation(100)), 0),
+        (reordered(deposit, np.repeat(np.arange(100), 2)), 100),
         (together([deposit, other]), 100),
         (other, 100),
     )
@@ -346,7 +349,7 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     deposits = [from_facets(ball_mesh, 50, seed) for seed in (1, 2, 3)]
     mesh = same_mesh(ball_mesh)
     load_vector(mesh, coefficients_of(FORWARD), deposits[0])
-    held = sum(len(part.stretches.paths) for part in mesh.marched.parts.values())
+    held = sum(len(part.stretches.paths) for part in mesh.marched.parts)
     # Room for two and a half.
     monkeypatch.setattr(marched, "MOST_KEPT", int(2.5 * held))
     for deposit in deposits:
@@ -359,13 +362,17 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
 
 
 def chosen(deposit: Deposit, some: BoolArray) -> Deposit:
+    return reordered(deposit, np.flatnonzero(some))
+
+
+def reordered(deposit: Deposit, places: IntArray) -> Deposit:
     assert deposit.cells is not None
     return Deposit(
-        starts=deposit.starts[some],
-        directions=deposit.directions[some],
-        lengths=deposit.lengths[some],
-        fluxes=deposit.fluxes[some],
-        cells=deposit.cells[some],
+        starts=deposit.starts[places],
+        directions=deposit.directions[places],
+        lengths=deposit.lengths[places],
+        fluxes=deposit.fluxes[places],
+        cells=deposit.cells[places],
     )
 
 
