@@ -45,6 +45,7 @@ from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.blocks import at_once
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -162,7 +163,7 @@ def estimated(
         shares += _of_inner_layers(mesh, coefficients, smooth, dual[mesh.tetrahedra])
         return shares + FACETS * _of_interfaces(mesh, coefficients, inner, emission, (fluence, dual))
 
-    shares, power_shares = (shares_by(dual) for dual in duals.T)
+    shares, power_shares = at_once(shares_by, list(duals.T))
     return Estimate(shares + _ripple(mesh, coefficients, load, size), power_shares)
 
 

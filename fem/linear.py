@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.blocks import THREADS
+from tetlux.meshing.blocks import THREADS, at_once
 from tetlux.meshing.errors import RunError
 
 # The iteration aims here; a true residual above the second is refused.
@@ -125,10 +125,7 @@ def _on_all_cores(product: Product, method: Method) -> Method:
         count = rest.shape[1]
         size = TOGETHER if count >= TOGETHER * THREADS and not product.on_all_cores else 1
         groups = [np.ascontiguousarray(rest[:, start : start + size]) for start in range(0, count, size)]
-        if len(groups) == 1 or THREADS == 1 or product.on_all_cores:
-            return np.hstack([method(group) for group in groups])
-        with ThreadPoolExecutor(THREADS) as pool:
-            return np.hstack(list(pool.map(method, groups)))
+        return np.hstack([method(group) for group in groups] if product.on_all_cores else at_once(method, groups))
 
     return of_all
 

@@ -100,8 +100,9 @@ def _phi(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``∫0..1 exp(-x u) du`` and ``∫0..1 u exp(-x u) du``."""
     small = np.flatnonzero(x < 1e-2)
     with np.errstate(divide="ignore", invalid="ignore"):
-        first = -np.expm1(-x) / x
-        second = (first - np.exp(-x)) / x
+        less = np.expm1(-x)
+        first = -less / x
+        second = (first - 1.0 - less) / x
     x = x[small]
     first[small] = 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720
     second[small] = 1 / 2 - x / 3 + x**2 / 8 - x**3 / 30 + x**4 / 144 - x**5 / 840

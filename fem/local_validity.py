@@ -76,7 +76,8 @@ class Validity:
     @cached_property
     def thickness(self) -> FloatArray:
         """How thick the body is under each facet of the boundary, (f,), mean free paths."""
-        return thickness(self.mesh) / self.medium.mean_free_path
+        of_mesh = self.mesh.remembered(thickness, lambda: thickness(self.mesh))
+        return of_mesh / self.medium.mean_free_path
 
     @cached_property
     def thin_errors(self) -> FloatArray:

@@ -19,8 +19,9 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # What a ray still carries when it has faded to this share of the average ray's power stays where the rest of it did.
 FAINTEST = 1e-10
-# What is reflected, or comes in again, with less than this share stays at its facet.
-FAINTEST_AGAIN = 1e-8
+# What is reflected, or comes in again, with less than this share stays at its facet: it is spread within a mean free
+# path of there anyway, and tolerances end at 1e-4.
+FAINTEST_AGAIN = 1e-6
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
 

@@ -30,6 +30,7 @@ from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.march import march
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import FACES, TetMesh
@@ -269,12 +270,11 @@ def _is_sound(patch: Patch) -> bool:
     The ledger cannot tell, since it is made of the same integrals.
     """
     mesh, charges, cells = patch.mesh, patch.charges, patch.cells
-    homes, _ = mesh.locate(charges.positions)
-    sources, images = homes[: charges.sources], homes[charges.sources :]
-    if (sources < 0).any() or not cells[sources].all() or cells[images[images >= 0]].any():
-        return False
     places = charges.positions[: charges.sources]
     foot, face, _ = mesh.closest_boundary(places)
+    homes = _homes(mesh, places, foot, face)
+    if (homes < 0).any() or not cells[homes].all() or _any_inside(patch, charges.positions[charges.sources :]):
+        return False
     size = longest_sides(mesh.points[mesh.boundary_faces[face]])
     if (np.linalg.norm(foot - places, axis=1) < RESOLVED * size).any():
         return False
@@ -284,6 +284,30 @@ def _is_sound(patch: Patch) -> bool:
     inner = mesh.points[faces[~on_boundary]]
     apart, _ = cKDTree(charges.positions).query(inner.mean(axis=1))
     return bool((longest_sides(inner) <= COARSEST_INNER * apart).all())
+
+
+def _homes(mesh: TetMesh, places: FloatArray, foot: FloatArray, face: IntArray) -> IntArray:
+    """The tetrahedra that points (q, 3) lie in, by the way there from the boundary (q, 3); -1 where it ends outside."""
+    way, homes = places - foot, np.full(len(places), -1)
+    lengths = np.linalg.norm(way, axis=1)
+    directions = way / np.where(lengths > 0, lengths, 1.0)[:, None]
+    for part in march(mesh, foot, directions, lengths, np.where(lengths > 0, mesh.boundary_cells[face], -1)):
+        last = np.flatnonzero(part.leave == lengths[part.paths])
+        homes[part.paths[last]] = part.cells[last]
+    return homes
+
+
+def _any_inside(patch: Patch, places: FloatArray) -> bool:
+    """Whether any of some points (q, 3) lies in a patch: for most, what they see away from the charges tells."""
+    mesh = patch.mesh
+    away = places - patch.charges.positions[0]
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    _, met = mesh.rays.first(places, away)
+    inside = (met >= 0) & (np.einsum("ij,ij->i", mesh.surface.normals[met], away) > 0)
+    if not inside.any():
+        return False
+    homes, _ = mesh.locate(places[inside])
+    return bool(patch.cells[homes[homes >= 0]].any())
 
 
 def inherited(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
@@ -318,10 +342,11 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     leaving = robin * out_of_faces * on_boundary[:, None]
     load = -summed(faces, through + leaving, count)
     # The interpolant's own part: stiffness, absorption and boundary of the patch, times G at the nodes.
-    cells = mesh.tetrahedra[patch.cells]
+    inside = slice(None) if patch.cells.all() else np.flatnonzero(patch.cells)
+    cells = mesh.tetrahedra[inside]
     values = patch.at_nodes[cells]
-    hats = mesh.hat_gradients[patch.cells]
-    volumes = mesh.volumes[patch.cells]
+    hats = mesh.hat_gradients[inside]
+    volumes = mesh.volumes[inside]
     slope = np.einsum("mij,mi->mj", hats, values)
     stiff = (medium.diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
     absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)

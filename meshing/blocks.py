@@ -1,8 +1,9 @@
 """Work on long arrays in blocks that stay in the processor's cache, on all cores."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,19 +16,22 @@ BLOCK = 8192
 PART = 1 << 20
 MOST_PARTS = 8
 
+_Item, _Result = TypeVar("_Item"), TypeVar("_Result")
+
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+def at_once(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """``[work(item) for item in items]``, on all cores at once."""
+    if len(items) < 2 or THREADS < 2:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(work, items))
 
 
 def in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:
     """Call ``work(slice)`` for slices of `size` that together cover ``range(count)``, on all cores at once."""
-    slices = [slice(start, min(start + size, count)) for start in range(0, count, size)]
-    if len(slices) < 2 or THREADS < 2:
-        for block in slices:
-            work(block)
-        return
-    with ThreadPoolExecutor(THREADS) as pool:
-        for done in [pool.submit(work, block) for block in slices]:
-            done.result()
+    at_once(work, [slice(start, min(start + size, count)) for start in range(0, count, size)])
 
 
 def grouped(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.int32]]:

@@ -11,8 +11,8 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import Stretches
 
-# Stretches that are kept of one mesh: a hundred megabytes.
-MOST_KEPT = 1 << 20
+# Stretches that are kept of one mesh: two hundred megabytes.
+MOST_KEPT = 1 << 21
 
 
 @dataclass(frozen=True, eq=False)

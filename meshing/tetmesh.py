@@ -1,7 +1,9 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +26,9 @@ EDGES_OF_FACES = np.array([[3, 4, 5], [1, 2, 5], [0, 2, 4], [0, 1, 3]])
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
+# What is remembered of one mesh for others.
+MOST_REMEMBERED = 32
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,6 +338,27 @@ class TetMesh:
     def marched(self) -> Kept:
         """Paths that were marched through it, see `tetlux.meshing.march`."""
         return Kept()
+
+    @cached_property
+    def _remembered(self) -> dict[Hashable, Any]:
+        return {}
+
+    def remembered(self, key: Hashable, work: Callable[[], _T]) -> _T:
+        """What others work out for this mesh and ask for again: the latest of it is kept, by a key.
+
+        Nothing is kept if the key has no hash, as one with lists in it has none.
+        """
+        try:
+            hash(key)
+        except TypeError:
+            return work()
+        known = self._remembered
+        if key not in known:
+            if len(known) >= MOST_REMEMBERED:
+                del known[next(iter(known))]
+            known[key] = work()
+        found: _T = known[key]
+        return found
 
     def barycentric(self, queries: FloatArray, cells: IntArray) -> FloatArray:
         """Barycentric coordinates of query i in tetrahedron ``cells[i]``, (q, 4)."""

@@ -94,13 +94,15 @@ class CollimatedBeam:
 
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
         del surface
-        rays, normals = self._falling(mesh)
+        key = (tuple(self.direction), self.spot, self.from_center)
+        rays, normals = mesh.remembered(key, lambda: self._falling(mesh))
+        rays = replace(rays, powers=self.irradiance * rays.powers)
         inside, specular = entered(rays, normals, coefficients.outer.eta)
         deposit = follow(mesh, coefficients, inside)
         return replace(deposit, incident=float(rays.powers.sum()), specular=specular + deposit.specular)
 
     def _falling(self, mesh: TetMesh) -> tuple[Rays, FloatArray]:
-        """The rays that reach facets of a mesh, and the normals there (r, 3)."""
+        """The rays that reach facets of a mesh, their powers at an irradiance of 1, and the normals there (r, 3)."""
         direction = unit_vector(self.direction, "direction")
         normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
         facing = np.flatnonzero(normals @ direction < 0)
@@ -110,7 +112,7 @@ class CollimatedBeam:
         points = corners.mean(axis=1)
         sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         caught = -0.5 * sides @ direction
-        powers, way = self.irradiance * caught, np.full(len(points), np.inf)
+        powers, way = caught, np.full(len(points), np.inf)
         if self.spot is not None:
             center = np.asarray(self.spot.center, dtype=float)
             points, bright = _seen(self.spot, corners - center, direction)

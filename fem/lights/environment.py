@@ -98,6 +98,11 @@ class EnvironmentLight:
 
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
         del surface
+        eta = coefficients.outer.eta
+        return mesh.remembered((self, eta), lambda: self._seen_from(mesh, eta))
+
+    def _seen_from(self, mesh: TetMesh, eta: float) -> Deposit:
+        """What falls on a mesh, and what passes into refractive index eta."""
         normals, middles = mesh.surface.normals, mesh.points[mesh.boundary_faces].mean(axis=1)
         outside, passed = np.zeros((2, len(middles)))
         for towards, power in zip(*self.directions, strict=True):
@@ -107,7 +112,7 @@ class EnvironmentLight:
             seen = facing[hit < 0]
             falling = power * cosine[seen]
             outside[seen] += falling
-            passed[seen] += (1.0 - reflectance(cosine[seen], 1.0 / coefficients.outer.eta)) * falling
+            passed[seen] += (1.0 - reflectance(cosine[seen], 1.0 / eta)) * falling
         irradiance, transmitted = (
             mesh.to_boundary_nodes(each * mesh.boundary_areas) / mesh.boundary_node_areas for each in (outside, passed)
         )
