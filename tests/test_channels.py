@@ -1,6 +1,7 @@
 """Several channels, scenes and lights at once are what each is alone on the same mesh."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,9 +23,12 @@ from tetlux.fem import (
     solve,
 )
 from tetlux.fem.coefficients import AnyMedium
+from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.paths import Rays
 from tetlux.fem.solve import solve_each
 from tetlux.fem.varying import VaryingMedium
-from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
+from tetlux.meshing import InputError, Surface, TetMesh, box, sphere, tetmesh
+from tetlux.meshing.arrays import FloatArray
 
 RED = Medium(sigma_a=0.01, sigma_s=4.0, g=0.75, eta=1.4)
 BLUE = Medium(sigma_a=0.3, sigma_s=6.0, g=0.7, eta=1.4)
@@ -71,6 +75,54 @@ def test_channels_are_solved_as_each_alone(media: Sequence[AnyMedium]) -> None:
         assert channel.warnings == alone.warnings
         assert channel.medium == alone.medium
         assert abs(channel.power.balance_error) < 1e-9
+
+
+def test_what_falls_on_a_mesh_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For all channels of one index, and for a spot that only differs in its irradiance."""
+    worked: list[str] = []
+    draw, look = CollimatedBeam._falling, EnvironmentLight._seen_from
+
+    def counting_draw(light: CollimatedBeam, mesh: TetMesh) -> tuple[Rays, FloatArray]:
+        worked.append("beam")
+        return draw(light, mesh)
+
+    def counting_look(light: EnvironmentLight, mesh: TetMesh, eta: float) -> Deposit:
+        worked.append("sky")
+        return look(light, mesh, eta)
+
+    monkeypatch.setattr(CollimatedBeam, "_falling", counting_draw)
+    monkeypatch.setattr(EnvironmentLight, "_seen_from", counting_look)
+    sky, disc = EnvironmentLight(np.ones((4, 8))), Disc((0.0, 0.5, 1.0), 1.0)
+    down, spot = CollimatedBeam((0.0, 0.0, -1.0)), CollimatedBeam((0.0, 0.0, -1.0), spot=disc)
+    cases: list[tuple[list[Medium], list[Light], list[str]]] = [
+        ([RED, BLUE, THIN], [down, sky], ["beam", "sky"]),
+        ([RED, OTHER_INDEX], [sky], ["sky", "sky"]),
+        ([RED], [down, spot, replace(spot, irradiance=3.0)], ["beam", "beam"]),
+        ([RED], [spot, replace(spot, from_center=True), replace(spot, direction=(0.0, 0.1, -1.0))], ["beam"] * 3),
+        # A direction that cannot be looked up is no fault.
+        ([RED, BLUE], [CollimatedBeam((0.0, 0.0, -1.0), spot=Disc([0.0, 0.5, 1.0], 1.0))], ["beam"] * 2),  # type: ignore[arg-type]
+    ]
+    for media, lights, expected in cases:
+        worked.clear()
+        solve(TetMesh(CUBE.points, CUBE.tetrahedra), media, lights)
+        assert sorted(worked) == expected
+
+
+def test_a_mesh_remembers_the_latest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tetmesh, "MOST_REMEMBERED", 2)
+    mesh = TetMesh(CUBE.points, CUBE.tetrahedra)
+    worked: list[str] = []
+
+    def work(key: str) -> str:
+        def working() -> str:
+            worked.append(key)
+            return key
+
+        return mesh.remembered(key, working)
+
+    assert [work(key) for key in "aababcbac"] == list("aababcbac")
+    # The third drives out the first, which then drives out the second.
+    assert worked == ["a", "b", "c", "a"]
 
 
 def test_regions_have_a_medium_in_each_channel() -> None:

@@ -11,7 +11,7 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PointSource, linear, solve
 from tetlux.fem.assembly import system_matrix
 from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
-from tetlux.meshing import RunError, TetMesh, refine
+from tetlux.meshing import RunError, TetMesh, blocks, refine
 
 METHODS = [jacobi, multigrid, direct]
 # Nearly singular; strongly absorbing.
@@ -63,15 +63,25 @@ def test_the_ledger_closes_wherever_the_iteration_stops(
     assert out + medium.sigma_a * (wide.node_volumes @ fluence) == pytest.approx(1.0, abs=1e-12)
 
 
-def test_many_loads_are_solved_as_one_by_one(wide: TetMesh) -> None:
-    loads = loads_on(wide, 11)
-    loads[:, 4] = 0.0
-    loads[:, 5] *= 1e6
+@pytest.mark.parametrize("cores", [1, 3])
+@pytest.mark.parametrize("count", [3, 11, 50])
+@pytest.mark.parametrize("large", [False, True])
+def test_many_loads_are_solved_as_one_by_one(
+    large: bool, count: int, cores: int, wide: TetMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In groups where there are many, and one by one where a single product has all cores at work."""
+    monkeypatch.setattr(linear, "THREADS", cores)
+    monkeypatch.setattr(blocks, "THREADS", cores)
+    if large:
+        monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
+    loads = loads_on(wide, count)
+    loads[:, 1] = 0.0
+    loads[:, 2] *= 1e6
     solver = Solver(system_matrix(wide, TISSUE), [multigrid])
     together = solver.solve(loads)
     assert together.shape == loads.shape
-    assert (together[:, 4] == 0.0).all()
-    for column in range(11):
+    assert (together[:, 1] == 0.0).all()
+    for column in range(count):
         alone = solver.solve(loads[:, column])
         assert alone.shape == (len(loads),)
         assert np.linalg.norm(alone - together[:, column]) <= 1e-9 * np.linalg.norm(alone)

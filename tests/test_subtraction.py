@@ -1,5 +1,7 @@
 """What is subtracted of point sources: it is a solution, it is nearly the half-space's, and it does no harm."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.assembly import Mass
 from tetlux.fem.exact import half_space
 from tetlux.fem.sources import Subtract, sources_of
-from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.fem.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 
@@ -204,3 +206,54 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
             float(c.strengths[: c.sources].sum()) for c in sources.charges
         ) == pytest.approx(sum(float(d.powers.sum()) for d in sources.deposits))
         assert len(sources.charges) >= 1 + most
+
+
+@pytest.fixture(scope="module")
+def ring_mesh() -> TetMesh:
+    """Concave: what lies in its hole sees it all round."""
+    return tetrahedralize(torus(6.0, 2.5), edge_length=1.5)
+
+
+def test_faces_of_a_patch_are_its_boundary(ring_mesh: TetMesh) -> None:
+    middles = ring_mesh.points[ring_mesh.tetrahedra].mean(axis=1)
+    for cells in (middles[:, 0] > 2.0, middles[:, 0] < -50.0, middles[:, 0] > -50.0, np.arange(len(middles)) % 3 == 0):
+        patch = Patch(ring_mesh, NO_CHARGES, cells, np.zeros(len(ring_mesh.points)))
+        faces, on_boundary = patch.faces
+        expected = set()
+        if cells.any():
+            alone = TetMesh(ring_mesh.points, ring_mesh.tetrahedra[cells])
+            expected = {turned(face) for face in alone.boundary_faces.tolist()}
+        assert len(faces) == len(expected)
+        assert {turned(face) for face in faces.tolist()} == expected
+        outer = {turned(face) for face in ring_mesh.boundary_faces.tolist()}
+        assert [turned(face) in outer for face in faces.tolist()] == on_boundary.tolist()
+
+
+NO_CHARGES = Charges(np.zeros((0, 3)), np.zeros(0), 0, 1.0, TISSUE)
+
+
+def turned(face: list[int]) -> tuple[int, ...]:
+    """The same triangle, seen from the same side, from its smallest corner on."""
+    first = face.index(min(face))
+    return tuple(face[first:] + face[:first])
+
+
+def test_points_are_found_in_a_concave_body_by_the_way_from_its_boundary(ring_mesh: TetMesh) -> None:
+    """And those outside are known to be, as the box tree knows both."""
+    random = np.random.default_rng(3)
+    points = random.uniform(-9.0, 9.0, (3000, 3)) * [1.0, 1.0, 0.3]
+    truly, _ = ring_mesh.locate(points)
+    assert 0.2 < (truly >= 0).mean() < 0.8
+    foot, face, _ = ring_mesh.closest_boundary(points)
+    found = _homes(ring_mesh, points, foot, face)
+    assert ((found >= 0) == (truly >= 0)).all()
+    # Between two tetrahedra either is right.
+    inside = np.flatnonzero(found >= 0)
+    assert ring_mesh.barycentric(points[inside], found[inside]).min() > -1e-8
+    cells = ring_mesh.points[ring_mesh.tetrahedra].mean(axis=1)[:, 0] > 0.0
+    charges = replace(NO_CHARGES, positions=points[:1], strengths=ONE)
+    patch = Patch(ring_mesh, charges, cells, np.zeros(len(ring_mesh.points)))
+    for point, home in zip(points[1:400], truly[1:400].tolist(), strict=True):
+        assert _any_inside(patch, point[None]) == (home >= 0 and bool(cells[home]))
+    assert _any_inside(patch, points[1:])
+    assert not _any_inside(patch, points[1:][truly[1:] < 0])
