@@ -108,6 +108,15 @@ def test_what_falls_on_a_mesh_is_worked_out_once(monkeypatch: pytest.MonkeyPatch
         assert sorted(worked) == expected
 
 
+@pytest.mark.parametrize("light", LIGHTS[:2])
+def test_twice_the_irradiance_is_twice_the_light(light: CollimatedBeam) -> None:
+    """Though both fall on the same places of one mesh."""
+    one, two = (System(CUBE, RED).solve([replace(light, irradiance=irradiance)]) for irradiance in (0.7, 1.4))
+    assert two.exitance == pytest.approx(2.0 * one.exitance, rel=1e-9)
+    for name in SHARES:
+        assert getattr(two.power, name) == pytest.approx(2.0 * getattr(one.power, name), rel=1e-9)
+
+
 def test_a_mesh_remembers_the_latest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tetmesh, "MOST_REMEMBERED", 2)
     mesh = TetMesh(CUBE.points, CUBE.tetrahedra)

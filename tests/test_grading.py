@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from tests.conftest import block
 from tetlux.fem import Deposit, Medium
-from tetlux.fem.grading import lit_points
+from tetlux.fem.grading import graded_towards, lit_points
 
 
 def test_of_several_channels_the_finest_counts() -> None:
@@ -20,3 +21,17 @@ def test_of_several_channels_the_finest_counts() -> None:
     points, resolutions = lit_points([Deposit()], Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4))
     assert points.shape == (0, 3)
     assert resolutions.shape == (0,)
+
+
+def test_no_tetrahedron_is_longer_than_its_distance_from_the_light() -> None:
+    """Or than what resolves the light that is nearest, of several."""
+    mesh = block((3, 3, 3), (6.0, 6.0, 6.0))
+    points, resolutions = np.array([[-1.0, 0.5, -1.0], [2.0, -1.0, -4.0]]), np.array([0.3, 1.5])
+    finer = graded_towards(mesh, mesh.surface, points, resolutions, 100_000)
+    middles = finer.points[finer.tetrahedra].mean(axis=1)
+    apart = np.linalg.norm(middles[:, None] - points, axis=2)
+    allowed = np.maximum(apart.min(axis=1), resolutions[apart.argmin(axis=1)])
+    assert (finer.longest_edges <= allowed).all()
+    assert finer.longest_edges.max() > 1.5
+    # It stops before there are too many.
+    assert graded_towards(mesh, mesh.surface, points, resolutions, len(mesh.tetrahedra)) is mesh

@@ -301,7 +301,7 @@ def test_paths_are_marched_once_and_then_further(uniform: bool, ball_mesh: TetMe
     shares = np.random.default_rng(9).random(len(whole.starts))
     coefficients = coefficients_of(FORWARD) if uniform else several(mesh, FORWARD)
     further = int((shares > 0.5).sum())
-    for share, anew in ((0.5, 200), (0.5, 0), (0.3, 0), (shares, further), (1.0, 200), (0.4, 0)):
+    for share, anew in ((0.5, 200), (0.5, 0), (0.3, 0), (shares, further), (1.0, 200), (1.0, 0), (0.4, 0)):
         deposit = replace(whole, lengths=share * whole.lengths)
         marches.clear()
         load = load_vector(mesh, coefficients, deposit)
