@@ -194,7 +194,8 @@ def test_a_slanting_line_beam_meets_the_far_face_at_its_angle() -> None:
     lost = float(reflectance(math.cos(angle), 1 / 1.4))
     fading = math.exp(-0.1 * 4 / math.cos(inside))
     assert deposit.fluxes[:3] == pytest.approx((1 - lost) * np.array([1, lost * fading, (lost * fading) ** 2]))
-    assert deposit.ballistic == pytest.approx((1 - lost) ** 2 * fading / (1 - lost * fading), rel=1e-9)
+    # A beam of 3e-8 is not followed any more.
+    assert deposit.ballistic == pytest.approx((1 - lost) ** 2 * fading / (1 - lost * fading), rel=1e-8)
     assert deposit.directions[1] == pytest.approx([math.sin(inside), 0, math.cos(inside)])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System
+from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System, paths
 from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.loads import load_vector
@@ -104,14 +104,15 @@ def test_a_wide_beam_passes_a_plate_as_a_thin_one_does() -> None:
 def test_a_beam_through_two_walls(eta: float, kind: str) -> None:
     """Each wall lets through t and back b of what falls on it, having reflected F; what it reflects outside is lost.
 
-    In the gap the first wall's t goes to and fro, the share b each time: t/(1-b) falls on walls in all.
+    In the gap the first wall's t goes to and fro, the share b each time: t/(1-b) falls on walls in all. What has become
+    a millionth of the beam is not followed, which at index 1.4 makes 2e-6 of what leaves.
     """
     of = medium(eta)
     lost, through, back = plate_by_hand(of, 4.0)
     power = lit(TROUGH, of, thin_beam((-10.0, 0.3, -1.4), (1.0, 0.0, 0.0), kind))
     in_gap = through / (1.0 - back)
     assert power.specular / power.incident == pytest.approx(lost * (1.0 + in_gap), rel=1e-6, abs=1e-12)
-    assert power.ballistic / power.incident == pytest.approx(back + in_gap * through, rel=1e-6)
+    assert power.ballistic / power.incident == pytest.approx(back + in_gap * through, rel=1e-5)
     if eta == 1.0:
         assert power.ballistic / power.incident == pytest.approx(math.exp(-8.0 * extinction(of)), rel=1e-9)
 
@@ -200,7 +201,7 @@ def test_a_beam_that_fades_stays_on_its_way(uniform: bool) -> None:
         # Up to 23 mean free paths light is followed to the far side.
         through = 3.0 * math.exp(-4.0 * thick) * (1.0 - float(reflectance(1.0, 1.4)))
         assert deposit.ballistic == pytest.approx(through if thick < 5.7 else 0.0, rel=1e-2)
-        assert (deposit.powers <= 1e-8 * 1.5).all()
+        assert (deposit.powers <= paths.FAINTEST_AGAIN * 1.5).all()
 
 
 # Along faces, through edges and corners, at grazing incidence, and where it just touches.
