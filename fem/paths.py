@@ -19,8 +19,8 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # What a ray still carries when it has faded to this share of the average ray's power stays where the rest of it did.
 FAINTEST = 1e-10
-# What is reflected, or comes in again, with less than this share stays at its facet: it is spread within a mean free
-# path of there anyway, and tolerances end at 1e-4.
+# What is reflected, or comes in again, with less than this share of what would be lost on its way stays at its facet:
+# tolerances end at 1e-4.
 FAINTEST_AGAIN = 1e-6
 # And through so many reflections and crossings of gaps.
 MOST_MEETINGS = 64
@@ -152,9 +152,12 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         slipped = (met < 0) | (distances < OFFSET * mesh.diagonal)
         ballistic += float(rays.powers[slipped].sum())
         rays, distances, met = rays[~slipped], distances[~slipped], met[~slipped]
+        if len(rays.powers) == 0:
+            break
         lengths = np.minimum(distances, longest)
         ends, lost = _fade(mesh, coefficients, rays, lengths)
         faded = rays.powers - ends
+        share = 1.0 - float(ends.sum()) / float(rays.powers.sum())
         stays = (faded > 0) & ((ends <= FAINTEST * average) | (lengths < distances))
         # Of these all is spread on their way as what faded there is.
         whole = np.where(stays, rays.powers / np.where(stays, faded, 1.0), 1.0)
@@ -165,7 +168,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         rays, gone, reflected = beyond(mesh, coefficients, arrived[~stays], met[~stays])
         ballistic += gone
         specular += reflected
-        faint = rays.powers <= FAINTEST_AGAIN * average
+        faint = rays.powers <= FAINTEST_AGAIN * average * share
         stopped.append(rays[faint])
         rays = rays[~faint]
     every, left = joined(segments), joined([*stopped, rays])

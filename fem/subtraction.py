@@ -31,6 +31,7 @@ from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
 from tetlux.meshing.march import march
+from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import FACES, TetMesh
@@ -273,10 +274,14 @@ def _is_sound(patch: Patch) -> bool:
     places = charges.positions[: charges.sources]
     foot, face, _ = mesh.closest_boundary(places)
     homes = _homes(mesh, places, foot, face)
-    if (homes < 0).any() or not cells[homes].all() or _any_inside(patch, charges.positions[charges.sources :]):
+    if (homes < 0).any() or not cells[homes].all():
         return False
-    size = longest_sides(mesh.points[mesh.boundary_faces[face]])
-    if (np.linalg.norm(foot - places, axis=1) < RESOLVED * size).any():
+    if (np.linalg.norm(foot - places, axis=1) < RESOLVED * _sizes(mesh, face)).any():
+        return False
+    images = charges.positions[charges.sources :]
+    foot, face, _ = mesh.closest_boundary(images)
+    close = np.linalg.norm(foot - images, axis=1) < RESOLVED * _sizes(mesh, face)
+    if (close & cells[mesh.boundary_cells[face]]).any() or _any_inside(patch, images):
         return False
     if cells.all():
         return True
@@ -286,12 +291,19 @@ def _is_sound(patch: Patch) -> bool:
     return bool((longest_sides(inner) <= COARSEST_INNER * apart).all())
 
 
+def _sizes(mesh: TetMesh, faces: IntArray) -> FloatArray:
+    """Longest sides of boundary triangles, (q,)."""
+    return longest_sides(mesh.points[mesh.boundary_faces[faces]])
+
+
 def _homes(mesh: TetMesh, places: FloatArray, foot: FloatArray, face: IntArray) -> IntArray:
     """The tetrahedra that points (q, 3) lie in, by the way there from the boundary (q, 3); -1 where it ends outside."""
     way, homes = places - foot, np.full(len(places), -1)
     lengths = np.linalg.norm(way, axis=1)
     directions = way / np.where(lengths > 0, lengths, 1.0)[:, None]
-    for part in march(mesh, foot, directions, lengths, np.where(lengths > 0, mesh.boundary_cells[face], -1)):
+    for part in march(
+        mesh, foot, directions, lengths, np.where(lengths > 0, mesh.boundary_cells[face], -1), keep=False
+    ):
         last = np.flatnonzero(part.leave == lengths[part.paths])
         homes[part.paths[last]] = part.cells[last]
     return homes
@@ -302,8 +314,11 @@ def _any_inside(patch: Patch, places: FloatArray) -> bool:
     mesh = patch.mesh
     away = places - patch.charges.positions[0]
     away /= np.linalg.norm(away, axis=1, keepdims=True)
-    _, met = mesh.rays.first(places, away)
-    inside = (met >= 0) & (np.einsum("ij,ij->i", mesh.surface.normals[met], away) > 0)
+    inside = np.zeros(len(places), dtype=bool)
+    # Rays do not see what they are next to: one begins before the point, and one behind it.
+    for begin in (0.0, -2.0 * OFFSET * mesh.diagonal):
+        _, met = mesh.rays.first(places + begin * away, away)
+        inside |= (met >= 0) & (np.einsum("ij,ij->i", mesh.surface.normals[met], away) > 0)
     if not inside.any():
         return False
     homes, _ = mesh.locate(places[inside])

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import SLACK, Stretches
 from tetlux.meshing.corners import cross, dot
-from tetlux.meshing.marched import Marched
+from tetlux.meshing.marched import Marched, keys_of
 from tetlux.meshing.tetmesh import TetMesh
 
 # How far outside a tetrahedron, in barycentric coordinates, a stretch in it may begin. Where a path passes an edge
@@ -28,7 +28,13 @@ PORTION = 1 << 12
 
 
 def march(
-    mesh: TetMesh, starts: FloatArray, directions: FloatArray, lengths: FloatArray, cells: IntArray | None = None
+    mesh: TetMesh,
+    starts: FloatArray,
+    directions: FloatArray,
+    lengths: FloatArray,
+    cells: IntArray | None = None,
+    *,
+    keep: bool = True,
 ) -> Iterator[Stretches]:
     """Cut paths where they pass from tetrahedron to tetrahedron, each from where it begins.
 
@@ -43,6 +49,8 @@ def march(
         Directions are unit vectors.
     cells : (p,) ndarray, optional
         The tetrahedron in which each begins, -1 if not known.
+    keep : bool
+        Whether they may be asked for again.
 
     Yields
     ------
@@ -53,7 +61,7 @@ def march(
     if cells is not None:
         known, left = np.flatnonzero(cells >= 0), [np.flatnonzero(cells < 0)]
         lines = np.vstack([starts[known].T, directions[known].T, lengths[known]])
-        for some, part in _kept(mesh, lines, cells[known]):
+        for some, part in _kept(mesh, lines, cells[known]) if keep else _anew(mesh, lines, cells[known]):
             yield replace(part.stretches, paths=known[some[part.stretches.paths]])
             left.append(known[some[part.lost]])
     others = np.concatenate(left)
@@ -64,26 +72,31 @@ def march(
 
 def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, Marched]]:
     """Lines (7, p), their starts, directions and lengths, marched if they are not known: some of them at a time."""
-    unknown = np.arange(len(cells))
-    for number, part in enumerate(mesh.marched.parts):
-        places = part.find(lines[:, unknown], cells[unknown])
+    keys, unknown = keys_of(lines), np.arange(len(cells))
+    for part in list(mesh.marched.parts):
+        places = part.find(keys[unknown], lines[:, unknown], cells[unknown])
         found = places >= 0
-        some, places, unknown = unknown[found], places[found], unknown[~found]
-        if len(some) == 0:
+        if not found.any():
             continue
+        some, places, unknown = unknown[found], places[found], unknown[~found]
         wanted = lines[6, some]
         short = (wanted > part.lines[6, places]) & ~part.lost[places]
+        whole = part
         if short.any():
             further = places[short]
-            more = _marched(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further])
-            part = part.on(more, further)  # noqa: PLW2901
-            mesh.marched.add(part, instead=number)
-        yield some, part.some(places).up_to(wanted)
-    for start in range(0, len(unknown), PORTION):
-        some = unknown[start : start + PORTION]
-        part = _marched(mesh, lines[:, some], cells[some], np.zeros(len(some)))
+            whole = part.on(_marched(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further]), further)
+            mesh.marched.add(whole, instead=part)
+        yield some, whole.some(places).up_to(wanted)
+    for some, part in _anew(mesh, lines[:, unknown], cells[unknown]):
         mesh.marched.add(part)
-        yield some, part
+        yield unknown[some], part
+
+
+def _anew(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, Marched]]:
+    """Lines (7, p) marched, some of them at a time."""
+    for start in range(0, len(cells), PORTION):
+        some = np.arange(start, min(start + PORTION, len(cells)))
+        yield some, _marched(mesh, lines[:, some], cells[some], np.zeros(len(some)))
 
 
 def _marched(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:

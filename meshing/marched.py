@@ -13,6 +13,8 @@ from tetlux.meshing.cell_tree import Stretches
 
 # Stretches that are kept of one mesh: two hundred megabytes.
 MOST_KEPT = 1 << 21
+# And parts, each of which is looked through; the oldest go first.
+MOST_PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,22 +42,29 @@ class Marched:
     @cached_property
     def _by_key(self) -> tuple[FloatArray, IntArray]:
         """The keys of all paths, ascending, and whose they are."""
-        keys = _keys(self.lines)
+        keys = keys_of(self.lines)
         order = np.argsort(keys)
         return keys[order], order
 
-    def find(self, lines: FloatArray, cells: IntArray) -> IntArray:
+    def find(self, keys: FloatArray, lines: FloatArray, cells: IntArray) -> IntArray:
         """The paths that are the same as lines (7, p) from given tetrahedra, however far, (p,); -1 where none is.
 
         Of lines that are the same, only one is found.
         """
-        keys, order = self._by_key
-        places = order[np.minimum(np.searchsorted(keys, _keys(lines)), len(order) - 1)]
-        same = (self.lines[:6, places] == lines[:6]).all(axis=0) & (self.cells[places] == cells)
-        one, every = np.empty(len(order), dtype=np.int64), np.arange(len(places))
-        one[places[same]] = every[same]
-        same &= one[places] == every
-        return np.where(same, places, -1)
+        known, order = self._by_key
+        places = np.minimum(np.searchsorted(known, keys), len(order) - 1)
+        alike = np.flatnonzero(known[places] == keys)
+        found = np.full(len(keys), -1)
+        if len(alike) == 0:
+            return found
+        places = order[places[alike]]
+        same = (self.lines[:6, places] == lines[:6, alike]).all(axis=0) & (self.cells[places] == cells[alike])
+        places, alike = places[same], alike[same]
+        one = np.empty(len(order), dtype=np.int64)
+        one[places] = alike
+        first = one[places] == alike
+        found[alike[first]] = places[first]
+        return found
 
     def some(self, places: IntArray) -> "Marched":
         """Some of the paths, in a given order."""
@@ -111,7 +120,7 @@ def some_of(every: Stretches, chosen: BoolArray) -> Stretches:
 _WEIGHTS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
 
 
-def _keys(lines: FloatArray) -> FloatArray:
+def keys_of(lines: FloatArray) -> FloatArray:
     """A number for each of lines (7, p), by where they start and go; the same, to the last bit, for the same."""
     return np.asarray(sum(weight * row for weight, row in zip(_WEIGHTS, lines[:6], strict=True)))
 
@@ -122,12 +131,8 @@ class Kept:
 
     parts: list[Marched] = field(default_factory=list)
 
-    def add(self, part: Marched, instead: int | None = None) -> None:
+    def add(self, part: Marched, instead: Marched | None = None) -> None:
         """Keep paths, in the place of a part that they continue if there is one, unless they are too many."""
-        others = sum(len(each.stretches.paths) for number, each in enumerate(self.parts) if number != instead)
-        if others + len(part.stretches.paths) > MOST_KEPT:
-            return
-        if instead is None:
-            self.parts.append(part)
-        else:
-            self.parts[instead] = part
+        others = [each for each in self.parts if each is not instead]
+        if sum(len(each.stretches.paths) for each in [*others, part]) <= MOST_KEPT:
+            self.parts[:] = [*others, part][-MOST_PARTS:]

@@ -1,6 +1,7 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, TypeVar
@@ -353,12 +354,17 @@ class TetMesh:
         except TypeError:
             return work()
         known = self._remembered
-        if key not in known:
-            if len(known) >= MOST_REMEMBERED:
+        if key in known:
+            with suppress(KeyError):
+                found: _T = known[key]
+                return found
+        made = work()
+        # Another thread may be at it too.
+        with suppress(KeyError, RuntimeError, StopIteration):
+            while len(known) >= MOST_REMEMBERED:
                 del known[next(iter(known))]
-            known[key] = work()
-        found: _T = known[key]
-        return found
+        known[key] = made
+        return made
 
     def barycentric(self, queries: FloatArray, cells: IntArray) -> FloatArray:
         """Barycentric coordinates of query i in tetrahedron ``cells[i]``, (q, 4)."""

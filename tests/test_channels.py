@@ -13,6 +13,7 @@ from tetlux.fem import (
     Disc,
     Emission,
     EnvironmentLight,
+    Image,
     Light,
     Medium,
     PencilBeam,
@@ -115,6 +116,29 @@ def test_twice_the_irradiance_is_twice_the_light(light: CollimatedBeam) -> None:
     assert two.exitance == pytest.approx(2.0 * one.exitance, rel=1e-9)
     for name in SHARES:
         assert getattr(two.power, name) == pytest.approx(2.0 * getattr(one.power, name), rel=1e-9)
+
+
+def test_a_spot_of_ones_own_may_change() -> None:
+    """Of those that cannot, what they light is remembered; an image keeps its place."""
+
+    class Own:
+        """Anything that does what a spot does."""
+
+        def __init__(self, radius: float) -> None:
+            self.disc = Disc((0.0, 0.5, 1.0), radius)
+
+        def __getattr__(self, name: str) -> object:
+            return getattr(self.disc, name)
+
+    own, system = Own(0.5), System(CUBE, RED)
+    light = CollimatedBeam((0.0, 0.0, -1.0), spot=own)  # type: ignore[arg-type]
+    small = system.solve([light]).power.incident
+    own.disc = Disc((0.0, 0.5, 1.0), 1.0)
+    assert system.solve([light]).power.incident == pytest.approx(4.0 * small, rel=0.02)
+    center = np.array([0.0, 0.5, 1.0])
+    image = Image(center, 2.0, np.ones((2, 2)))  # type: ignore[arg-type]
+    center += 100.0
+    assert image.center == (0.0, 0.5, 1.0)
 
 
 def test_a_mesh_remembers_the_latest(monkeypatch: pytest.MonkeyPatch) -> None:

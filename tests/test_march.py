@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import block
+from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
-from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, paths
+from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
 from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
@@ -359,6 +359,25 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert marches == [len(deposits[2].starts)]
+
+
+def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is looked through for every path; and what is marched to find a point is none."""
+    monkeypatch.setattr(marched, "MOST_PARTS", 3)
+    mesh = same_mesh(ball_mesh)
+    deposits = [from_facets(mesh, 20, seed) for seed in range(5)]
+    for deposit in deposits:
+        load_vector(mesh, coefficients_of(FORWARD), deposit)
+    assert len(mesh.marched.parts) == 3
+    marches.clear()
+    for deposit in deposits[::-1]:
+        load_vector(mesh, coefficients_of(FORWARD), deposit)
+    assert marches == [len(deposits[1].starts), len(deposits[0].starts)]
+    mesh = same_mesh(ball_mesh)
+    system = System(mesh, TISSUE)
+    for depth in (1.0, 2.0, 3.0):
+        system.solve([PointSource((0.0, 0.0, 10.0 - depth))])
+    assert len(mesh.marched.parts) == 0
 
 
 def chosen(deposit: Deposit, some: BoolArray) -> Deposit:

@@ -83,7 +83,7 @@ def test_what_passes_a_plate(eta: float, degrees: float, kind: str) -> None:
     # The power of a spot itself is right to .2 %.
     assert power.incident == pytest.approx(1.0, rel=5e-3)
     assert power.specular / power.incident == pytest.approx(lost, rel=1e-4, abs=1e-12)
-    # Up to 1e-10 is not followed any further.
+    # Up to 1e-6 is not followed any further.
     assert power.ballistic / power.incident == pytest.approx(through + back, rel=1e-6)
     first = math.exp(-extinction(of) / inside) * (1.0 - lost) ** 2
     assert first <= through + back <= (1.0 + 1.2 * lost) * first
@@ -97,6 +97,20 @@ def test_a_wide_beam_passes_a_plate_as_a_thin_one_does() -> None:
     assert power.incident == pytest.approx(256.0)
     assert power.specular == pytest.approx(256.0 * lost)
     assert power.ballistic == pytest.approx(256.0 * (through + back), rel=1e-6)
+
+
+@pytest.mark.parametrize("thickness", [1e-2, 1e-4, 1e-6])
+def test_what_stays_in_a_thin_plate(thickness: float) -> None:
+    """By its thickness in mean free paths: what is not followed is a millionth of that, not of the beam."""
+    of = medium(1.4, sigma_a=0.4 * thickness, sigma_s=0.6 * thickness, g=0.0)
+    lost, through, back = plate_by_hand(of, 1.0)
+    deposit = PencilBeam((0.3, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
+    plate = block((6, 6, 2), (16.0, 16.0, 1.0))
+    found = deposit.deposit_in(plate.surface, of).on(plate, plate.surface, coefficients_of(of))
+    scattered = load_vector(plate, coefficients_of(of), found).sum()
+    stays = 1.0 - lost - through - back
+    assert found.absorbed == pytest.approx(0.4 * stays, rel=1e-5)
+    assert scattered == pytest.approx(0.6 * stays, rel=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["pencil", "round pencil", "spot"])

@@ -10,7 +10,7 @@ from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.assembly import Mass
 from tetlux.fem.exact import half_space
 from tetlux.fem.sources import Subtract, sources_of
-from tetlux.fem.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of
+from tetlux.fem.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of, patch_of
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 
@@ -229,6 +229,19 @@ def test_faces_of_a_patch_are_its_boundary(ring_mesh: TetMesh) -> None:
         assert [turned(face) in outer for face in faces.tolist()] == on_boundary.tolist()
 
 
+@pytest.mark.parametrize("height", [-1e-2, -1e-5, 1e-5])
+def test_an_image_in_the_body_or_next_to_it_drops_the_patch(height: float) -> None:
+    """The integrals over the facet next to it would not see it, nor the ledger that they are wrong."""
+    mesh = block((4, 4, 4), (4.0, 4.0, 4.0))
+    facets = mesh.points[mesh.boundary_faces]
+    above = facets[np.flatnonzero(mesh.surface.normals[:, 2] > 0.5)[5]].mean(axis=0)
+    everywhere = np.ones(len(mesh.points), dtype=bool)
+    for up, sound in ((height, False), (0.5, True)):
+        positions = np.array([[0.1, 0.2, -1.5], np.add(above, [0.0, 0.0, up])])
+        charges = Charges(positions, np.array([1.0, -0.5]), 1, 0.01, TISSUE)
+        assert patch_of(mesh, charges, everywhere).cells.any() == sound
+
+
 NO_CHARGES = Charges(np.zeros((0, 3)), np.zeros(0), 0, 1.0, TISSUE)
 
 
@@ -239,9 +252,11 @@ def turned(face: list[int]) -> tuple[int, ...]:
 
 
 def test_points_are_found_in_a_concave_body_by_the_way_from_its_boundary(ring_mesh: TetMesh) -> None:
-    """And those outside are known to be, as the box tree knows both."""
+    """And those outside are known to be, as the box tree knows both; also a hair from the boundary."""
     random = np.random.default_rng(3)
     points = random.uniform(-9.0, 9.0, (3000, 3)) * [1.0, 1.0, 0.3]
+    hairs = 1e-6 * ring_mesh.diagonal * random.choice([-1.0, 1.0], (300, 1)) * ring_mesh.surface.normals[:300]
+    points[100:400] = ring_mesh.points[ring_mesh.boundary_faces[:300]].mean(axis=1) + hairs
     truly, _ = ring_mesh.locate(points)
     assert 0.2 < (truly >= 0).mean() < 0.8
     foot, face, _ = ring_mesh.closest_boundary(points)

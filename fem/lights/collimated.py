@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive, unit_vector
-from tetlux.fem.lights.spot import Spot, scattered, sunflower
+from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
 from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, entered, follow
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
@@ -94,8 +94,11 @@ class CollimatedBeam:
 
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
         del surface
-        key = (tuple(self.direction), self.spot, self.from_center)
-        rays, normals = mesh.remembered(key, lambda: self._falling(mesh))
+        if self.spot is None or isinstance(self.spot, UNCHANGING):
+            key = (type(self), tuple(self.direction), self.spot, self.from_center)
+            rays, normals = mesh.remembered(key, lambda: self._falling(mesh))
+        else:
+            rays, normals = self._falling(mesh)
         rays = replace(rays, powers=self.irradiance * rays.powers)
         inside, specular = entered(rays, normals, coefficients.outer.eta)
         deposit = follow(mesh, coefficients, inside)

@@ -316,7 +316,9 @@ class Image:
     up: Vector = (0.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:
-        as_vector(self.center, "center")
+        for name in ("center", "up"):
+            # Nobody can change them afterwards.
+            object.__setattr__(self, name, tuple(as_vector(getattr(self, name), name).tolist()))
         _check_length(self.width, "width")
         check_pixels(self.pixels)
 
@@ -382,3 +384,7 @@ class Image:
         within = scattered(count)
         places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
         return np.asarray(places * [self.width, self.height] @ np.stack(_axes(direction, self.up)))
+
+
+# Spots that stay what they are, of which what they light may be remembered.
+UNCHANGING = (Disc, Gaussian, Rectangle, Image)
