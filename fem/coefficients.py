@@ -64,6 +64,22 @@ def coefficients_of(medium: Medium) -> Coefficients:
     return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, medium)
 
 
+def apart(one: Coefficients, other: Coefficients) -> float:
+    """How far apart the ratios of two sets of coefficients are, the largest over the smallest, on one mesh.
+
+    For any fluence the terms of the one's weak form are within these ratios of the other's, and so is their sum: this
+    bounds the condition number of the one's matrix when it is preconditioned by the other's.
+    """
+    ratios = []
+    for name in ("diffusion", "sigma_a", "escape"):
+        first, second = np.broadcast_arrays(getattr(one, name), getattr(other, name))
+        some = (first > 0) | (second > 0)
+        with np.errstate(divide="ignore"):
+            ratios.append(np.ravel(first[some] / second[some]))
+    every = np.concatenate(ratios)
+    return float(every.max() / every.min()) if every.min() > 0 else np.inf
+
+
 def at_cells(value: float | FloatArray, cells: IntArray) -> FloatArray:
     """A coefficient in given tetrahedra, (q,)."""
     return np.full(len(cells), value) if np.ndim(value) == 0 else np.asarray(value)[cells]

@@ -97,9 +97,21 @@ def direct(product: Product) -> Method:
     return lambda rest: np.asarray(factors.solve(rest))
 
 
-def multigrid(product: Product) -> Method:
+@dataclass(frozen=True, eq=False)
+class Multigrid:
+    """Conjugate gradients, preconditioned by a cycle through a hierarchy of matrices: this one's or one's like it."""
+
+    product: Product
+    cycle: Method
+
+    def __call__(self, rest: FloatArray) -> FloatArray:
+        """See `Method`."""
+        return _on_all_cores(self.product, lambda some: conjugate_gradients(self.product, self.cycle, some))(rest)
+
+
+def multigrid(product: Product) -> Multigrid:
     """Conjugate gradients, preconditioned by smoothed aggregation (Vaněk, Mandel & Brezina 1996)."""
-    levels: list[_Level] = []
+    finest, levels = product, list[_Level]()
     while product.matrix.shape[0] > COARSEST and (level := _level(product)) is not None:
         levels.append(level)
         product = Product(csr_array(level.down.matrix @ (product.matrix @ level.up.matrix)))
@@ -114,8 +126,7 @@ def multigrid(product: Product) -> Method:
         result += level.smoother * (rest - level.product(result))
         return result
 
-    finest = levels[0].product if levels else product
-    return _on_all_cores(finest, lambda rest: conjugate_gradients(finest, cycle, rest))
+    return Multigrid(finest, cycle)
 
 
 def _on_all_cores(product: Product, method: Method) -> Method:
@@ -224,6 +235,12 @@ class Solver:
         self._row_sums = np.asarray(matrix.sum(axis=1))[:, None]
         self.note = ""
 
+    @property
+    def cycle(self) -> Method | None:
+        """That which preconditions it, if multigrid does."""
+        first = self._ready[0]
+        return first.cycle if isinstance(first, Multigrid) else None
+
     def solve(self, load: FloatArray) -> FloatArray:
         """Solve for one right-hand side or for several.
 
@@ -294,7 +311,7 @@ class Solver:
         return np.asarray(result * size)
 
 
-def solver_for(matrix: csr_array, loads: int = 1) -> Solver:
+def solver_for(matrix: csr_array, loads: int = 1, cycle: Method | None = None) -> Solver:
     """The solver that is quickest for a matrix.
 
     Parameters
@@ -303,6 +320,8 @@ def solver_for(matrix: csr_array, loads: int = 1) -> Solver:
         Symmetric, positive definite.
     loads : int
         How many right-hand sides are to come, roughly.
+    cycle : callable, optional
+        That of a matrix much like this one: if multigrid is the method, its preparation is spared.
 
     Returns
     -------
@@ -331,5 +350,14 @@ def solver_for(matrix: csr_array, loads: int = 1) -> Solver:
     if nodes <= MOST_FOR_DIRECT and loads > 1 + (nodes / 1800) ** 2:
         return Solver(matrix, [direct, multigrid])
     if nodes * loads > 15_000:
-        return Solver(matrix, [multigrid, jacobi, direct] if nodes <= MOST_TO_FALL_BACK else [multigrid, jacobi])
+        methods: list[Callable[[Product], Method]] = [multigrid, jacobi]
+        if nodes <= MOST_TO_FALL_BACK:
+            methods.append(direct)
+        if cycle is not None:
+
+            def multigrid_of_another(product: Product) -> Multigrid:
+                return Multigrid(product, cycle)
+
+            methods.insert(0, multigrid_of_another)
+        return Solver(matrix, methods)
     return Solver(matrix, [jacobi, multigrid, direct])

@@ -96,11 +96,12 @@ class System:
         mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
         sigma_a, kept = coefficients.sigma_a, 1.0 if fitting is None else fitting.kept
         volumes = sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
+        loads = LOADS_OF_A_LIGHT * self.expected
         if fitting is None:
-            matrix = assembly.of(coefficients, self.mass)
+            solver = assembly.solver(coefficients, self.mass, loads)
         else:
             matrix = assembly.matrix(fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.kept)
-        solver = solver_for(matrix, LOADS_OF_A_LIGHT * self.expected)
+            solver = solver_for(matrix, loads)
         return Equations(solver, np.asarray(kept * volumes), fitting)
 
     @property

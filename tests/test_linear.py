@@ -1,6 +1,7 @@
 """The linear solvers: one solution by all of them, true residuals, the ledger, and what happens when one fails."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PointSource, linear, solve
-from tetlux.fem.assembly import system_matrix
+from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
+from tetlux.fem.coefficients import apart, coefficients_of
 from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
 from tetlux.meshing import RunError, TetMesh, blocks, refine
 
@@ -204,7 +206,45 @@ def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest
     def helpless(product: Product) -> Method:
         return lambda rest: 0.0 * rest
 
-    monkeypatch.setattr("tetlux.fem.system.solver_for", lambda matrix, _: Solver(matrix, [helpless, direct]))
+    monkeypatch.setattr("tetlux.fem.assembly.solver_for", lambda matrix, *_: Solver(matrix, [helpless, direct]))
     solution = solve(wide, TISSUE, [PointSource((0.0, 0.0, -1.0))])
     assert any("had to fall back from helpless to direct" in warning for warning in solution.warnings)
     assert abs(solution.power.balance_error) < 1e-12
+
+
+def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], linear._level
+
+    def counting(product: Product) -> linear._Level | None:
+        prepared.append(product.matrix.shape[0])
+        return level(product)
+
+    monkeypatch.setattr(linear, "_level", counting)
+    assembly, loads = Assembly(mesh), loads_on(mesh)
+    base, near, far = (
+        coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.2)
+    )
+    for coefficients, anew in ((base, True), (near, False), (far, True), (near, False)):
+        prepared.clear()
+        solver = assembly.solver(coefficients, "lumped", 4)
+        assert (len(mesh.points) in prepared) == anew
+        matrix = assembly.of(coefficients)
+        assert np.array_equal(solver.matrix.data, matrix.data)
+        assert (np.linalg.norm(loads - matrix @ solver.solve(loads), axis=0) < 2e-11).all()
+        assert solver.note == ""
+
+
+def test_how_far_apart_coefficients_are() -> None:
+    base = coefficients_of(TISSUE)
+    assert apart(base, base) == 1.0
+    darker = coefficients_of(replace(TISSUE, sigma_a=3.0 * TISSUE.sigma_a))
+    # Diffusion is a little less there.
+    ratio = 3.0 * (TISSUE.sigma_t_prime + 2.0 * TISSUE.sigma_a) / TISSUE.sigma_t_prime
+    assert apart(darker, base) == pytest.approx(ratio)
+    assert apart(base, darker) == pytest.approx(ratio)
+    varying = replace(base, sigma_a=np.array([0.5, 1.0, 2.0]) * TISSUE.sigma_a)
+    assert apart(varying, base) == pytest.approx(4.0)
+    clear = coefficients_of(replace(TISSUE, sigma_a=0.0))
+    assert apart(clear, clear) == 1.0
+    assert apart(clear, base) == apart(base, clear) == np.inf
+    assert ratio < ALIKE < np.inf

@@ -150,10 +150,11 @@ def test_residuals_are_computed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    def iterate(matrix: Any, loads: int) -> linear.Solver:
+    def iterate(matrix: Any, *_: Any) -> linear.Solver:
         return linear.Solver(matrix, [linear.jacobi])
 
-    monkeypatch.setattr("tetlux.fem.system.solver_for", iterate)
+    for module in ("assembly", "system"):
+        monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)
     assert 5 < measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
 
 
