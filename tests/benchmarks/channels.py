@@ -2,8 +2,8 @@
 
 Seconds from the triangle surface to the exitance, and what more is solved for, as multiples of that. All are the least
 of several runs, taken in turn. The first is with a new mesh each time; the others go on from one, since no two of the
-mesher's meshes take the same time. The second light is a pencil beam from another side, and beside light from all sides
-more of that: it needs no finer mesh than the first.
+mesher's meshes take the same time. The second light is a pencil beam where the mesh is fine, beside a pencil beam one
+from another side, and beside light from all sides more of that: it needs no finer mesh than the first.
 """
 
 import os
@@ -56,7 +56,8 @@ def main() -> None:
     for name, light in LIGHTS.items():
         scenes: list[tuple[list[Medium], list[Light]]] = [(CHANNELS[:n], [light]) for n in (1, 2, 3)]
         even = isinstance(light, DiffuseLight | EnvironmentLight)
-        scenes.append((CHANNELS[:1], [light, DiffuseLight(0.5) if even else OTHER]))
+        second = DiffuseLight(0.5) if even else OTHER if light is PENCIL else PENCIL
+        scenes.append((CHANNELS[:1], [light, second]))
         with tempfile.TemporaryDirectory() as meshes:
             os.environ["TETLUX_CACHE_DIR"] = meshes
             runs = [partial(solve, ball, *scene) for scene in scenes]
