@@ -108,6 +108,23 @@ def test_rays_lie_where_the_spot_is_bright_and_balance_about_its_middle() -> Non
         assert fluxes @ offsets / fluxes.sum() == pytest.approx(np.zeros(3), abs=2e-3 * spot.reach)
 
 
+@pytest.mark.parametrize("name", ["disc", "noise", "bright quarter"])
+def test_a_facet_has_one_ray_from_the_middle_of_what_it_sees(name: str) -> None:
+    """However many parts of it were looked at: a finer mesh has more rays."""
+    mesh, spot = MESHES["seven"], SPOTS[name]
+    rays, normals = CollimatedBeam(DOWN, spot=spot)._falling(mesh)
+    facets = mesh.closest_boundary(rays.starts)[1]
+    assert len(np.unique(facets)) == len(facets) == len(normals)
+    assert (mesh.boundary_cells[facets] == rays.cells).all()
+    assert rays.starts[:, 2] == pytest.approx(0.0, abs=1e-12)
+    # Their moments are those of the spot, by a million points of it.
+    random = np.random.default_rng(1)
+    offsets = random.uniform(-spot.reach, spot.reach, (1_000_000, 3)) * [1.0, 1.0, 0.0]
+    bright = spot.brightness(offsets, np.array(DOWN))
+    expected = bright @ offsets / bright.sum() + [*spot.center[:2], 0.0]
+    assert rays.powers @ rays.starts / rays.powers.sum() == pytest.approx(expected, abs=5e-3 * spot.reach)
+
+
 def test_what_of_a_spot_misses_the_body_is_not_incident() -> None:
     """Half of it past the edge of the face, and the light does not come in through the side."""
     for spot in (Disc((5.0, 1.0, 3.0), 2.0), Rectangle((5.0, 1.0, 3.0), 3.0, 2.0), Gaussian((5.0, 1.0, 3.0), 1.0)):

@@ -10,7 +10,7 @@ from tetlux.fem.lights.point import check_positive, unit_vector
 from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
 from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, entered, follow
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
@@ -125,8 +125,12 @@ class CollimatedBeam:
         lit = np.flatnonzero((powers > 0) & (way > 0))
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= way[lit]]
-        along = np.broadcast_to(direction, (len(lit), 3))
-        return Rays(points[lit], along, powers[lit], mesh.boundary_cells[owner[lit]]), normals[owner[lit]]
+        # All that a facet gets of a spot is one ray, from the middle of it.
+        facets, places = np.unique(owner[lit], return_inverse=True)
+        total = summed(places, powers[lit], len(facets))
+        starts = np.column_stack([summed(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T])
+        along = np.broadcast_to(direction, starts.shape)
+        return Rays(starts, along, total, mesh.boundary_cells[facets]), normals[facets]
 
     def _pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
         """Parts of facets (f, 3, 3) that are small enough to see the spot, (p, 3, 3), and whose they are, (p,)."""
