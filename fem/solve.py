@@ -40,6 +40,8 @@ LARGEST_BULGE = 0.015
 SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
 # Refinement goes on until the estimate is this share of the tolerance, and that of the power that leaves another one.
 SAFETY, POWER_SAFETY = 0.65, 0.4
+# An error that is above what is aimed at by less than this is not worth another mesh.
+WORTH_A_MESH = 1.05
 MOST_TETRAHEDRA = 1_000_000
 # A source whose depth the mesh's facets change by more than this share of it is worth a sentence.
 SHALLOW = 0.1
@@ -361,7 +363,7 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
     wanted += [(step.estimate.power_shares, POWER_SAFETY * tolerance) for step in steps]
     for shares, aim in wanted:
         error = float(shares.sum())
-        if error <= aim:
+        if error <= WORTH_A_MESH * aim:
             continue
         part = float(np.clip((1.0 - aim / error) / GAIN, LEAST_SHARE, SPLIT_SHARE))
         order = np.argsort(-shares)
