@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.coefficients import Coefficients, apart, coefficients_of
-from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.linear import Method, Solver, solver_for
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners
@@ -60,18 +60,19 @@ class Assembly:
     Parameters
     ----------
     mesh : TetMesh
-    solvers : list of tuple of Coefficients and Solver
-        Those that were prepared, by their coefficients.
+    cycles : list of tuple of Coefficients and callable
+        What was prepared for multigrid, and the coefficients that it was prepared for.
     """
 
     mesh: TetMesh
-    solvers: list[tuple[Coefficients, Solver]] = field(default_factory=list)
+    cycles: list[tuple[Coefficients, Method]] = field(default_factory=list)
 
     def solver(self, coefficients: Coefficients, mass: Mass, loads: int) -> Solver:
         """One for the matrix of given coefficients, prepared with what was prepared for others much like them."""
-        alike = [solver.cycle for others, solver in self.solvers if apart(coefficients, others) <= ALIKE]
-        solver = solver_for(self.of(coefficients, mass), loads, next((each for each in alike if each), None))
-        self.solvers.append((coefficients, solver))
+        known = next((cycle for others, cycle in self.cycles if apart(coefficients, others) <= ALIKE), None)
+        solver = solver_for(self.of(coefficients, mass), loads, known)
+        if known is None and solver.cycle is not None:
+            self.cycles.append((coefficients, solver.cycle))
         return solver
 
     def of(self, coefficients: Coefficients, mass: Mass = "lumped") -> csr_array:

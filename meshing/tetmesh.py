@@ -349,15 +349,13 @@ class TetMesh:
 
         Nothing is kept if the key has no hash, as one with lists in it has none.
         """
+        known = self._remembered
         try:
-            hash(key)
+            found: _T | None = known.get(key)
         except TypeError:
             return work()
-        known = self._remembered
-        if key in known:
-            with suppress(KeyError):
-                found: _T = known[key]
-                return found
+        if found is not None:
+            return found
         made = work()
         # Another thread may be at it too.
         with suppress(KeyError, RuntimeError, StopIteration):

@@ -221,10 +221,12 @@ def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(linear, "_level", counting)
     assembly, loads = Assembly(mesh), loads_on(mesh)
-    base, near, far = (
-        coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.2)
+    base, near, beyond, far = (
+        coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.125, 0.9)
     )
-    for coefficients, anew in ((base, True), (near, False), (far, True), (near, False)):
+    assert apart(beyond, near) < ALIKE
+    # What is like one that only borrowed is not like what that was prepared for.
+    for coefficients, anew in ((base, True), (near, False), (beyond, True), (far, True), (near, False)):
         prepared.clear()
         solver = assembly.solver(coefficients, "lumped", 4)
         assert (len(mesh.points) in prepared) == anew

@@ -14,8 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from tetlux.fem import CollimatedBeam, DiffuseLight, EnvironmentLight, Light, Medium, PencilBeam, solve
-from tetlux.fem.lights.spot import Disc, Image
+from tetlux.fem import CollimatedBeam, DiffuseLight, Disc, EnvironmentLight, Image, Light, Medium, PencilBeam, solve
 from tetlux.meshing import sphere
 
 RUNS = 10
