@@ -11,7 +11,7 @@ import numpy as np
 
 from tetlux.cases.chart_measure import relative_error
 from tetlux.cases.stress_scenes import TOLERANCE, Scene
-from tetlux.fem import linear
+from tetlux.fem import krylov, linear
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
@@ -163,7 +163,7 @@ class _Seen:
 def _watched() -> Iterator[_Seen]:
     """Note what the linear solver does; its residuals are computed anew."""
     seen = _Seen()
-    solve_system, iterate = linear.Solver.solve, linear.conjugate_gradients
+    solve_system, iterate = linear.Solver.solve, krylov.conjugate_gradients
 
     def solve_and_check(solver: linear.Solver, load: FloatArray) -> FloatArray:
         result = solve_system(solver, load)
@@ -174,7 +174,7 @@ def _watched() -> Iterator[_Seen]:
         seen.residual = float(np.max([seen.residual, *(left / np.where(size > 0, size, 1.0))]))
         return result
 
-    def iterate_and_count(product: linear.Product, precondition: linear.Method, loads: FloatArray) -> FloatArray:
+    def iterate_and_count(product: krylov.Product, precondition: krylov.Method, loads: FloatArray) -> FloatArray:
         count = 0
 
         def counted(rest: FloatArray) -> FloatArray:
@@ -188,6 +188,6 @@ def _watched() -> Iterator[_Seen]:
 
     with (
         patch.object(linear.Solver, "solve", solve_and_check),
-        patch.object(linear, "conjugate_gradients", iterate_and_count),
+        patch.object(krylov, "conjugate_gradients", iterate_and_count),
     ):
         yield seen

@@ -19,7 +19,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.coefficients import Coefficients, apart, coefficients_of
-from tetlux.fem.linear import Method, Solver, solver_for
+from tetlux.fem.krylov import Method
+from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners

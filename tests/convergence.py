@@ -21,7 +21,8 @@ from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
-from tetlux.fem.linear import Solver, multigrid
+from tetlux.fem.linear import Solver
+from tetlux.fem.multigrid import multigrid
 from tetlux.fem.solve import solve
 from tetlux.fem.sources import Subtract
 from tetlux.meshing import Surface, TetMesh, refine

@@ -9,10 +9,14 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Medium, PointSource, linear, solve
+from tetlux.fem import Medium, PointSource, krylov, linear, solve
+from tetlux.fem import multigrid as multigrid_module
 from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
 from tetlux.fem.coefficients import apart, coefficients_of
-from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
+from tetlux.fem.direct import direct
+from tetlux.fem.krylov import Method, Product, jacobi
+from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.multigrid import multigrid
 from tetlux.meshing import RunError, TetMesh, blocks, refine
 
 METHODS = [jacobi, multigrid, direct]
@@ -56,7 +60,7 @@ def test_every_method_solves(method: Callable[[Product], Method], medium: Medium
 def test_the_ledger_closes_wherever_the_iteration_stops(
     monkeypatch: pytest.MonkeyPatch, aim: float, medium: Medium, wide: TetMesh
 ) -> None:
-    monkeypatch.setattr(linear, "AIM", aim)
+    monkeypatch.setattr(krylov, "AIM", aim)
     monkeypatch.setattr(linear, "REFUSED", 1.0)
     load = loads_on(wide, 1)[:, 0]
     matrix = system_matrix(wide, medium)
@@ -72,10 +76,10 @@ def test_many_loads_are_solved_as_one_by_one(
     large: bool, count: int, cores: int, wide: TetMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In groups where there are many, and one by one where a single product has all cores at work."""
-    monkeypatch.setattr(linear, "THREADS", cores)
-    monkeypatch.setattr(blocks, "THREADS", cores)
+    for module in (krylov, linear, blocks):
+        monkeypatch.setattr(module, "THREADS", cores)
     if large:
-        monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
+        monkeypatch.setattr(krylov, "ENTRIES_FOR_THREADS", 1)
     loads = loads_on(wide, count)
     loads[:, 1] = 0.0
     loads[:, 2] *= 1e6
@@ -152,8 +156,8 @@ def test_what_is_left_is_solved_for_again(wide: TetMesh) -> None:
 
 def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetMesh) -> None:
     matrix = system_matrix(wide, TISSUE)
-    monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
-    monkeypatch.setattr(linear, "THREADS", 3)
+    monkeypatch.setattr(krylov, "ENTRIES_FOR_THREADS", 1)
+    monkeypatch.setattr(krylov, "THREADS", 3)
     x = np.random.default_rng(0).normal(size=(matrix.shape[0], 2))
     product = Product(matrix)
     assert len(product._blocks) == 3
@@ -213,13 +217,13 @@ def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest
 
 
 def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], linear._level
+    mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], multigrid_module._level
 
-    def counting(product: Product) -> linear._Level | None:
+    def counting(product: Product) -> multigrid_module._Level | None:
         prepared.append(product.matrix.shape[0])
         return level(product)
 
-    monkeypatch.setattr(linear, "_level", counting)
+    monkeypatch.setattr(multigrid_module, "_level", counting)
     assembly, loads = Assembly(mesh), loads_on(mesh)
     base, near, beyond, far = (
         coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.125, 0.9)

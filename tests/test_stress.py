@@ -23,7 +23,7 @@ from tetlux.cases.stress_panels import PANELS, Axis, Panel, Value
 from tetlux.cases.stress_rules import broken, violations
 from tetlux.cases.stress_runs import Run
 from tetlux.cases.stress_words import in_words
-from tetlux.fem import linear
+from tetlux.fem import krylov, linear
 
 GOOD = Figures(
     lowest=0.1,
@@ -151,7 +151,7 @@ def test_residuals_are_computed_anew(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     def iterate(matrix: Any, *_: Any) -> linear.Solver:
-        return linear.Solver(matrix, [linear.jacobi])
+        return linear.Solver(matrix, [krylov.jacobi])
 
     for module in ("assembly", "system"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)
