@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from tetlux.fem import krylov
 from tetlux.fem.direct import direct
 from tetlux.fem.krylov import TOGETHER, Method, Product, dots, jacobi
-from tetlux.fem.multigrid import Multigrid, multigrid
+from tetlux.fem.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import RunError
@@ -157,13 +157,15 @@ def solver_for(matrix: csr_array, loads: int = 1, cycle: Method | None = None) -
     ======= ================== ================= ===================
 
     An albedo of .9999 with eta 1.5 changes nothing; in a strong absorber (sigma_a 3, sigma_s' 10) jacobi takes a
-    third of these times, multigrid three quarters.
+    third of these times, multigrid three quarters. Between regions whose coefficients differ by 1e-4 to 1e6 jacobi
+    takes up to 1.5 times its iterations of an even body, and its residuals are as small as multigrid's; so it serves
+    where PyAMG is missing.
     """
     nodes = matrix.shape[0]
     if nodes <= MOST_FOR_DIRECT and loads > 1 + (nodes / 1800) ** 2:
-        return Solver(matrix, [direct, multigrid])
-    if nodes * loads > 15_000:
-        methods: list[Callable[[Product], Method]] = [multigrid, jacobi]
+        methods: list[Callable[[Product], Method]] = [direct, multigrid, jacobi]
+    elif nodes * loads > 15_000:
+        methods = [multigrid, jacobi]
         if nodes <= MOST_TO_FALL_BACK:
             methods.append(direct)
         if cycle is not None:
@@ -172,5 +174,6 @@ def solver_for(matrix: csr_array, loads: int = 1, cycle: Method | None = None) -
                 return Multigrid(product, cycle)
 
             methods.insert(0, multigrid_of_another)
-        return Solver(matrix, methods)
-    return Solver(matrix, [jacobi, multigrid, direct])
+    else:
+        methods = [jacobi, multigrid, direct]
+    return Solver(matrix, [method for method in methods if HAS_PYAMG or method is not multigrid])

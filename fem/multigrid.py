@@ -1,6 +1,7 @@
 """Multigrid by smoothed aggregation, as the preconditioner of conjugate gradients."""
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix
@@ -9,6 +10,8 @@ from tetlux.fem.direct import direct
 from tetlux.fem.krylov import Method, Product, dots, preconditioned
 from tetlux.meshing.arrays import FloatArray
 
+# PyAMG finds the aggregates, and has no wheel for Linux on ARM.
+HAS_PYAMG = find_spec("pyamg") is not None
 # Matrices of this many unknowns or fewer are factorised, and spectral radii are estimated in so many steps.
 COARSEST = 500
 POWER_STEPS = 8

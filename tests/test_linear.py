@@ -1,5 +1,6 @@
 """The linear solvers: one solution by all of them, true residuals, the ledger, and what happens when one fails."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from tetlux.meshing import RunError, TetMesh, blocks, refine
 METHODS = [jacobi, multigrid, direct]
 # Nearly singular; strongly absorbing.
 CLEAR = Medium(sigma_a=1e-4, sigma_s_prime=0.9999, eta=1.5)
+CLEAREST = Medium(sigma_a=1e-6, sigma_s_prime=1.0, eta=2.0)
 DARK = Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.4)
 
 
@@ -180,6 +182,42 @@ def test_the_solver_goes_by_size(cells: int, loads: int, expected: Callable[[Pro
     assert solver._methods[0] is expected
     load = loads_on(mesh, 1)
     assert np.linalg.norm(load - solver.matrix @ solver.solve(load)) < 2e-11
+
+
+# Regions a thousandfold and more apart: absorption and reduced scattering of the inner one.
+CORES = [(100.0, 1.0), (0.01, 1e-4), (0.01, 1e4), (100.0, 1e4), (1e-6, 1e-4)]
+
+
+def matrix_with_a_core(mesh: TetMesh, sigma_a: float, sigma_s_prime: float) -> csr_array:
+    """Tissue, and other coefficients within a ball in its middle."""
+    core = Medium(sigma_a=sigma_a, sigma_s_prime=sigma_s_prime, eta=TISSUE.eta)
+    centres = mesh.points[mesh.tetrahedra].mean(axis=1)
+    inside = np.linalg.norm(centres - mesh.points.mean(axis=0), axis=1) < 5.0
+    return Assembly(mesh).of(
+        replace(
+            coefficients_of(TISSUE),
+            sigma_a=np.where(inside, core.sigma_a, TISSUE.sigma_a),
+            sigma_t_prime=np.where(inside, core.sigma_t_prime, TISSUE.sigma_t_prime),
+        )
+    )
+
+
+@pytest.mark.parametrize(("cells", "count", "first"), [(16, 1, jacobi), (26, 3, jacobi), (12, 20, direct)])
+def test_without_pyamg_residuals_are_as_small(
+    cells: int, count: int, first: Callable[[Product], Method], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Strong internal reflection, strong absorption, and regions 1e4 apart."""
+    monkeypatch.setattr(linear, "HAS_PYAMG", False)
+    monkeypatch.setitem(sys.modules, "pyamg.aggregation", None)
+    mesh = block((cells,) * 3, (20.0,) * 3)
+    matrices = [system_matrix(mesh, medium) for medium in (CLEAR, DARK, CLEAREST)]
+    matrices += [matrix_with_a_core(mesh, *core) for core in CORES]
+    for matrix in matrices:
+        solver, loads = solver_for(matrix, count), loads_on(mesh, count)
+        assert solver._methods[0] is first
+        assert multigrid not in solver._methods
+        assert (np.linalg.norm(loads - matrix @ solver.solve(loads), axis=0) < 2e-11).all()
+        assert solver.note == ""
 
 
 @pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])

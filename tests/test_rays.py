@@ -120,7 +120,7 @@ def test_rays_from_far_away(engine: str, away: float) -> None:
 def test_the_far_end_is_met(engine: str) -> None:
     """By a ray from far away that passes everything else."""
     near = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    two = RayCaster(np.concatenate([near, near + [10.0, 1.0, 0.0]]), np.arange(6).reshape(2, 3))
+    two = RayCaster(np.concatenate([near, near + np.array([10.0, 1.0, 0.0])]), np.arange(6).reshape(2, 3))
     distances, faces = two.first(np.array([[-1000.0, 1.2, 0.2]]), np.array([[1.0, 0.0, 0.0]]))
     assert (distances[0], faces[0]) == (pytest.approx(1010.0), 1)
 
