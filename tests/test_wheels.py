@@ -13,10 +13,11 @@ from packaging.requirements import Requirement
 from tests.conftest import TISSUE, block
 from tetlux.cases.cli import main
 from tetlux.fem import CollimatedBeam, PencilBeam, PointSource, solve
+from tetlux.fem.lights import Light
 from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.libraries import installed_versions
 
-LIGHTS = [
+LIGHTS: list[Light] = [
     PencilBeam((0.3, 0.2, 5.0), (0.1, 0.0, -1.0), deposit="line"),
     CollimatedBeam((0.4, 0.1, -1.0), irradiance=0.01),
     PointSource((1.0, 2.0, -3.0)),
