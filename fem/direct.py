@@ -11,4 +11,4 @@ def direct(product: Product) -> Method:
 
     options = {"SymmetricMode": True}
     factors = splu(product.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return lambda rest: np.asarray(factors.solve(rest))
+    return lambda rest: (np.asarray(factors.solve(rest)), 0)

@@ -19,8 +19,10 @@ TOGETHER = 8
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000
 
-# From residuals (n, k) to corrections of the solution, (n, k).
-Method = Callable[[FloatArray], FloatArray]
+# From residuals (n, k) to rough corrections of the solution, (n, k).
+Preconditioner = Callable[[FloatArray], FloatArray]
+# From residuals (n, k) to corrections (n, k), and the most iterations that a column took, 0 of a direct method.
+Method = Callable[[FloatArray], tuple[FloatArray, int]]
 
 
 class Product:
@@ -76,30 +78,34 @@ def jacobi(product: Product) -> Method:
     return preconditioned(product, lambda rest: inverse * rest)
 
 
-def preconditioned(product: Product, precondition: Method) -> Method:
+def preconditioned(product: Product, precondition: Preconditioner) -> Method:
     """Conjugate gradients on one or a few columns at a time, a core each, unless one product keeps all cores busy."""
 
-    def iterate(rest: FloatArray) -> FloatArray:
+    def iterate(rest: FloatArray) -> tuple[FloatArray, int]:
         return conjugate_gradients(product, precondition, rest)
 
-    def iterate_on_groups(rest: FloatArray) -> FloatArray:
+    def iterate_on_groups(rest: FloatArray) -> tuple[FloatArray, int]:
         count = rest.shape[1]
         size = TOGETHER if count >= TOGETHER * THREADS and not product.on_all_cores else 1
         groups = [np.ascontiguousarray(rest[:, start : start + size]) for start in range(0, count, size)]
-        return np.hstack([iterate(group) for group in groups] if product.on_all_cores else at_once(iterate, groups))
+        found = [iterate(group) for group in groups] if product.on_all_cores else at_once(iterate, groups)
+        return np.hstack([x for x, _ in found]), max(iterations for _, iterations in found)
 
     return iterate_on_groups
 
 
-def conjugate_gradients(product: Product, precondition: Method, loads: FloatArray) -> FloatArray:
+def conjugate_gradients(product: Product, precondition: Preconditioner, loads: FloatArray) -> tuple[FloatArray, int]:
     """Preconditioned conjugate gradients (Saad 2003, algorithm 9.1) on all columns of (n, k) loads side by side.
 
-    They stop when the norms of all residuals are below `AIM`, or after `ITERATIONS`.
+    They stop when the norms of all residuals are below `AIM`, or after `ITERATIONS`. The second result is how many
+    there were.
     """
     result, rest = np.zeros_like(loads), loads.copy()
     step = precondition(rest)
     size = dots(rest, step)
-    for _ in range(ITERATIONS):
+    iterations = 0
+    while iterations < ITERATIONS:
+        iterations += 1
         image = product(step)
         length = _ratio(size, dots(step, image))
         result += length * step
@@ -110,7 +116,7 @@ def conjugate_gradients(product: Product, precondition: Method, loads: FloatArra
         before, size = size, dots(rest, towards)
         step *= _ratio(size, before)
         step += towards
-    return result
+    return result, iterations
 
 
 def dots(a: FloatArray, b: FloatArray) -> FloatArray:

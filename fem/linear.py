@@ -1,13 +1,14 @@
 """Solve the system with the method that is quickest for its size, and check the residual."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem import krylov
 from tetlux.fem.direct import direct
-from tetlux.fem.krylov import TOGETHER, Method, Product, dots, jacobi
+from tetlux.fem.krylov import TOGETHER, Method, Preconditioner, Product, dots, jacobi
 from tetlux.fem.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS
@@ -21,6 +22,27 @@ ROUGH_AIM = 1e-4
 MOST_FOR_DIRECT = 20_000
 # But where all else fails, they may.
 MOST_TO_FALL_BACK = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class LinearResult:
+    """Solutions of a linear system for one right-hand side or several.
+
+    Attributes
+    ----------
+    x : (n,) or (n, k) ndarray
+    residual : float
+        Largest relative residual of a right-hand side, computed anew from its solution.
+    iterations : int
+        Most that one took, of all methods together; 0 of the direct method.
+    method : str
+        The last method that was needed.
+    """
+
+    x: FloatArray
+    residual: float
+    iterations: int
+    method: str
 
 
 class Solver:
@@ -49,12 +71,12 @@ class Solver:
         self.note = ""
 
     @property
-    def cycle(self) -> Method | None:
+    def cycle(self) -> Preconditioner | None:
         """That which preconditions it, if multigrid does."""
         first = self._ready[0]
         return first.cycle if isinstance(first, Multigrid) else None
 
-    def solve(self, load: FloatArray) -> FloatArray:
+    def solve(self, load: FloatArray) -> LinearResult:
         """Solve for one right-hand side or for several.
 
         Parameters
@@ -63,8 +85,8 @@ class Solver:
 
         Returns
         -------
-        (n,) or (n, k) ndarray
-            Its residuals sum to zero, so that no power is lost.
+        LinearResult
+            Residuals of each right-hand side sum to zero, so that no power is lost.
 
         Raises
         ------
@@ -72,27 +94,38 @@ class Solver:
             If a residual, computed anew from the solution, is above 1e-8 of its load.
         """
         loads = load.reshape(len(load), -1)
-        result = np.empty(loads.shape)
+        result, found = np.empty(loads.shape), []
         portion = TOGETHER * THREADS
         for start in range(0, loads.shape[1], portion):
             columns = slice(start, start + portion)
-            result[:, columns] = self._solved(np.asarray(loads[:, columns], dtype=np.float64))
-        return result.reshape(load.shape)
+            found.append(self._solve_together(np.asarray(loads[:, columns], dtype=np.float64)))
+            result[:, columns] = found[-1].x
+        names = [method.__name__ for method in self._methods]
+        return LinearResult(
+            result.reshape(load.shape),
+            max((part.residual for part in found), default=0.0),
+            max((part.iterations for part in found), default=0),
+            max((part.method for part in found), key=names.index, default=names[0]),
+        )
 
-    def roughly(self, load: FloatArray) -> FloatArray:
-        """Solve to a few digits, for less than half of the iterations: as `solve`, to a residual of 1e-3 at most."""
+    def roughly(self, loads: FloatArray) -> LinearResult:
+        """Solve for (n, k) right-hand sides to residuals of 1e-3 at most, in less than half of the iterations."""
         # In units in which the iteration stops there.
-        size = np.sqrt(dots(load, load)) * ROUGH_AIM / krylov.AIM
+        size = np.sqrt(dots(loads, loads)) * ROUGH_AIM / krylov.AIM
         size[size == 0] = 1.0
-        result = self._ready[0](load / size) * size
-        left = load - self._product(result)
-        return result if (np.sqrt(dots(left, left)) <= 10.0 * krylov.AIM * size).all() else self.solve(load)
+        x, iterations = self._ready[0](loads / size)
+        left = loads / size - self._product(x)
+        residual = float(np.sqrt(dots(left, left)).max()) * ROUGH_AIM / krylov.AIM
+        if not residual <= 10.0 * ROUGH_AIM:
+            return self.solve(loads)
+        return LinearResult(x * size, residual, iterations, self._methods[0].__name__)
 
-    def _solved(self, loads: FloatArray) -> FloatArray:
+    def _solve_together(self, loads: FloatArray) -> LinearResult:
         size = np.linalg.norm(loads, axis=0)
         size[size == 0] = 1.0
         loads = loads / size
-        result, rest, residual = np.zeros_like(loads), loads, 1.0
+        result, rest, residual, iterations = np.zeros_like(loads), loads, 1.0, 0
+        name = self._methods[0].__name__
         for number, method in enumerate(self._methods):
             if residual <= krylov.AIM:
                 break
@@ -106,7 +139,8 @@ class Solver:
             helps = True
             # The iteration's own residual drifts from the true one; the same again on what is left mends that.
             while residual > krylov.AIM and helps:
-                better = result + self._ready[number](rest)
+                correction, more = self._ready[number](rest)
+                better, iterations, name = result + correction, iterations + more, method.__name__
                 left = loads - self._product(better)
                 reached = float(np.linalg.norm(left, axis=0).max())
                 helps = reached < 0.1 * residual
@@ -121,10 +155,10 @@ class Solver:
                 f"the linear solver stopped at a relative residual of {residual:.1e}, above {REFUSED:.0e}; "
                 "the mesh is too badly shaped or the coefficients too far apart: try a finer or cleaner mesh."
             )
-        return np.asarray(result * size)
+        return LinearResult(np.asarray(result * size), residual, iterations, name)
 
 
-def solver_for(matrix: csr_array, loads: int = 1, cycle: Method | None = None) -> Solver:
+def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None = None) -> Solver:
     """The solver that is quickest for a matrix.
 
     Parameters

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
 from tetlux.fem.direct import direct
-from tetlux.fem.krylov import Method, Product, dots, preconditioned
+from tetlux.fem.krylov import Preconditioner, Product, dots, preconditioned
 from tetlux.meshing.arrays import FloatArray
 
 # PyAMG finds the aggregates, and has no wheel for Linux on ARM.
@@ -22,10 +22,10 @@ class Multigrid:
     """Conjugate gradients, preconditioned by a cycle through a hierarchy of matrices: this one's or one's like it."""
 
     product: Product
-    cycle: Method
+    cycle: Preconditioner
 
-    def __call__(self, rest: FloatArray) -> FloatArray:
-        """See `Method`."""
+    def __call__(self, rest: FloatArray) -> tuple[FloatArray, int]:
+        """See `tetlux.fem.krylov.Method`."""
         return preconditioned(self.product, self.cycle)(rest)
 
 
@@ -39,7 +39,7 @@ def multigrid(product: Product) -> Multigrid:
 
     def cycle(rest: FloatArray, depth: int = 0) -> FloatArray:
         if depth == len(levels):
-            return coarsest(rest)
+            return coarsest(rest)[0]
         level = levels[depth]
         result = level.smoother * rest
         result += level.up(cycle(level.down(rest - level.product(result)), depth + 1))

@@ -69,7 +69,7 @@ def tetlux(points: FloatArray, tetrahedra: IntArray, method: str) -> Row:
     matrix = system_matrix(TetMesh(points, tetrahedra), medium)
     assembled = time.perf_counter()
     solver = linear.Solver(matrix, [krylov.jacobi]) if method == "jacobi" else linear.solver_for(matrix)
-    fluence = solver.solve(load)
+    fluence = solver.solve(load).x
     solved = time.perf_counter()
     residual = float(np.linalg.norm(load - matrix @ fluence))
     return {"assembly": assembled - started, "solve": solved - assembled, "residual": residual}
