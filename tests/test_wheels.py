@@ -46,9 +46,7 @@ def figures() -> dict[str, Any]:
     solution = solve(block((24, 24, 24), (20.0, 20.0, 20.0)), TISSUE, LIGHTS)
     power, exitance = solution.power, solution.exitance
     return {
-        "libraries": [
-            name for name in ("embreex", "pyamg.aggregation", "pytetwild.pytetwild") if sys.modules.get(name)
-        ],
+        "loaded": [name for name in ("embreex", "pyamg.aggregation") if sys.modules.get(name)],
         "figures": [power.exited, power.absorbed, power.ballistic, *exitance[::200].tolist()],
         "balance_error": power.balance_error,
     }
