@@ -7,7 +7,6 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
 from tetlux.cases.summary import LIBRARIES
 from tetlux.fem import Medium, PointSource, solve
 from tetlux.meshing.errors import InputError, TetluxError
+from tetlux.meshing.libraries import installed_versions
 from tetlux.meshing.shapes import sphere
 
 DEFAULT_CASES = ("slab", "sphere", "torus", "hare")
@@ -154,6 +154,5 @@ def as_data(charted: Sequence[Charted]) -> dict[str, Any]:
         "radiative transfer, the difference of the two models",
         "machine": {"cores": os.cpu_count(), "processor": platform.machine()},
         "versions": {"python": platform.python_version()}
-        | {name: version(name) for name in LIBRARIES}
-        | {peer.package: version(peer.package) for peer in PEERS if peer.installed},
+        | installed_versions((*LIBRARIES, *(peer.package for peer in PEERS))),
     }

@@ -2,7 +2,6 @@
 
 import math
 import platform
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,9 @@ from tetlux.fem.solution import Power, Solution
 from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
+from tetlux.meshing.libraries import installed_versions
 
-LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "pyvista", "trimesh")
+LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
 def summarize(
@@ -48,7 +48,7 @@ def summarize(
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
-        "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+        "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
     }
 
 

@@ -135,7 +135,7 @@ def estimated(
     robin = coefficients.escape
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / size**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
-    duals = solver.roughly(loads)
+    duals = solver.roughly(loads).x
 
     diffusion, kept = coefficients.diffusion, 1.0
     if fitting is not None:

@@ -12,7 +12,7 @@ from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.limiter import nonnegative
-from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.linear import LinearResult, Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.region import Region, only_medium
@@ -189,10 +189,7 @@ class System:
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
             columns = np.column_stack([*(term.load for term in terms), *(loads[light] for light in lit)] or loads[:1])
-            parts: FloatArray = np.zeros(columns.shape)
-            for equations in dict.fromkeys(of_columns):
-                mine = [i for i, each in enumerate(of_columns) if each is equations]
-                parts[:, mine] = equations.solver.solve(columns[:, mine])
+            parts, solved = _solve_columns(of_columns, columns)
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
         worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
         if worse:
@@ -201,7 +198,8 @@ class System:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
                     terms[i] = patch_terms(patches[i], self.mass)
             with watch.stage("solve"):
-                parts[:, worse] = self.plain.solver.solve(np.column_stack([terms[i].load for i in worse]))
+                solved.append(self.plain.solver.solve(np.column_stack([terms[i].load for i in worse])))
+                parts[:, worse] = solved[-1].x
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
         of_lights = []
         for light, deposit in enumerate(deposits):
@@ -220,7 +218,14 @@ class System:
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
         under = at_surface(self.medium, mesh, self.coefficients)
         validity = Validity(mesh, under, sources.lights, sources.deposits)
-        return replace(added(of_lights), warnings=notes, validity=validity), tuple(good), found
+        solution = replace(
+            added(of_lights),
+            warnings=notes,
+            validity=validity,
+            residual=max((result.residual for result in solved), default=0.0),
+            iterations=max((result.iterations for result in solved), default=0),
+        )
+        return solution, tuple(good), found
 
     def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
         """Fitted ones for what is spread evenly, the mesh's own for what is not."""
@@ -302,6 +307,16 @@ class Equations:
     solver: Solver
     absorbing: FloatArray
     fitting: Fitting | None
+
+
+def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
+    """Solve for the columns of (n, k) loads, each by equations of its own: (n, k), and what that took."""
+    parts, solved = np.zeros(loads.shape), []
+    for some in dict.fromkeys(equations):
+        columns = [i for i, each in enumerate(equations) if each is some]
+        solved.append(some.solver.solve(loads[:, columns]))
+        parts[:, columns] = solved[-1].x
+    return parts, solved
 
 
 @dataclass(frozen=True, eq=False)

@@ -76,6 +76,10 @@ INNER_DEVIATION = 0.03
 THINNEST = 0.002
 # A region whose inner ones leave it less than this share of its volume is filled by them.
 LEFT = 1e-6
+NOT_INSTALLED = (
+    "pytetwild, which fills surfaces with tetrahedra, is not installed, and pip has no wheel of it for Intel Macs; "
+    "give tetrahedra in place of the surface, or build it: pip install pytetwild."
+)
 MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
 # Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
 DEBRIS = 1e-3
@@ -131,7 +135,7 @@ def tetrahedralize(
         If `edge_length`, `deviation`, `epsilon`, `stop_energy` or `time_limit` is not positive, or an inner surface
         bounds no region of the body, see `check_regions`.
     RunError
-        If the mesher crashes, takes too long, or returns something that is not this body.
+        If the mesher is not installed, crashes, takes too long, or returns something that is not this body.
 
     Notes
     -----
@@ -146,6 +150,8 @@ def tetrahedralize(
     ):
         if value is not None and not 0 < value < math.inf:
             raise InputError(f"{name} is {value:g}; give a number greater than 0.")
+    if importlib.util.find_spec("pytetwild") is None:
+        raise RunError(f"{surface.name}: {NOT_INSTALLED}")
     if deviation is None and epsilon is None:
         check_thickness(surface)
     size = surface.diagonal

@@ -182,7 +182,7 @@ def exitances_of_ball(medium: Medium, radius: float, edges: FloatArray) -> list[
     inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
 
     def solved(diffusion: FloatArray) -> Solved:
-        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, escape), 1).solve(load[:, None])[:, 0]
+        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, escape), 1).solve(load).x
         at = fluence[mesh.tetrahedra]
         slope = (inverse @ (at[:, 1:] - at[:, :1])[..., None])[..., 0]
         return fluence, at.mean(axis=1), np.linalg.norm(slope, axis=1)
