@@ -18,6 +18,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.errors import InputError, RunError
+from tetlux.meshing.pinches import parts_of
 from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
@@ -428,7 +429,8 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
             "others; give a smaller deviation, or leave it out."
         )
-    wanted = len(first)
+    parted = parts_of(surface.points, surface.faces)
+    wanted = max(len(first), 0 if parted is None else int(parted.max()) + 1)
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:
         raise _NotTheBodyError(
