@@ -276,7 +276,7 @@ def _part(mesh: TetMesh, shell: _Shell) -> TetMesh:
     if len(tetrahedra) == 0:
         raise _NotTheBodyError(
             f"{shell.surface.name}: the mesh lost it, since it is too small beside the body; "
-            "give a smaller deviation, or leave it out."
+            "leave it out, or make it larger."
         )
     return TetMesh(*compact(mesh.points, tetrahedra), mesh.unit)
 
@@ -352,8 +352,8 @@ def _run_pytetwild(
                 return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
     except subprocess.TimeoutExpired as error:
         raise RunError(
-            f"{name}: the mesher was stopped after {time_limit:g} s; give a surface with fewer triangles, "
-            "a larger deviation, or a longer time limit."
+            f"{name}: the mesher was stopped after {time_limit:g} s; leave out thin parts and the smallest "
+            "regions, or simplify the surface in a mesh editor."
         ) from error
     except OSError as error:
         raise RunError(f"{name}: the mesher could not be run ({error.strerror or error}); {MAKE_ROOM}") from error
@@ -389,12 +389,10 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: I
     if tags is not None:
         tetrahedra, tags = tetrahedra[tags >= 0], tags[tags >= 0]
     if len(tetrahedra) == 0 or not np.isfinite(points).all():
-        raise RunError(
-            f"{surface.name}: the mesher returned no tetrahedra; give a shorter edge length or a cleaner surface."
-        )
+        raise RunError(f"{surface.name}: the mesher returned no tetrahedra; repair the surface in a mesh editor.")
     volumes = tetrahedron_volumes(points, tetrahedra)
     if (volumes < 0).any():
-        raise RunError(f"{surface.name}: the mesher returned inverted tetrahedra; try a shorter edge length.")
+        raise RunError(f"{surface.name}: the mesher returned inverted tetrahedra; repair the surface in a mesh editor.")
     keep = volumes > 0
     lump = bodies(len(points), tetrahedra)
     share = np.bincount(lump, volumes) / volumes.sum()
@@ -417,7 +415,7 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
         if not lowest <= change <= slack:
             raise _NotTheBodyError(
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
-                f"the mesher's deviation of {deviation:.3g} {surface.unit}: give a smaller deviation."
+                f"{deviation:.3g} {surface.unit}: make them thicker, or leave them out."
             )
     of_surface = bodies(len(surface.points), surface.faces)
     # The first vertices of each body: a small one may be gone without a trace in the sums.
@@ -427,7 +425,7 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     if not surface.overlaps and (astray > LOST * deviation).any():
         raise _NotTheBodyError(
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
-            "others; give a smaller deviation, or leave it out."
+            "others; leave it out, or make it larger."
         )
     parted = parts_of(surface.points, surface.faces)
     wanted = max(len(first), 0 if parted is None else int(parted.max()) + 1)
@@ -435,5 +433,5 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     if parts > wanted:
         raise _NotTheBodyError(
             f"{surface.name}: the mesh fell into {parts} parts where the surface has {wanted}; "
-            "give a smaller deviation, or thicken the narrowest part."
+            "thicken the narrowest part."
         )
