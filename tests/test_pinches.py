@@ -176,13 +176,13 @@ def test_pinched_surfaces_are_decimated(surface: Surface, share: float) -> None:
 @pytest.mark.parametrize("place", [middle_of_an_edge(), BALL.points[3]], ids=["edge", "vertex"])
 def test_balls_that_touch_are_meshed_at_once(place: FloatArray, monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[int] = []
-    run = mesher._run_pytetwild
+    run = mesher.run_pytetwild
 
     def counted(points: FloatArray, faces: IntArray, **rest: float) -> tuple[FloatArray, IntArray]:
         given.append(len(faces))
         return run(points, faces, **rest)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(mesher, "_run_pytetwild", counted)
+    monkeypatch.setattr(mesher, "run_pytetwild", counted)
     surface = merged(BALL, mirrored(BALL, place))
     mesh = tetrahedralize(surface, cache=False)
     assert len(given) == 1
