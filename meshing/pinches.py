@@ -170,7 +170,8 @@ def _angles(points: FloatArray, faces: IntArray, ends: IntArray, sides: IntArray
     _, first, number = np.unique(edge, return_index=True, return_inverse=True)
     ahead = across[first][number]
     aside = np.cross(along, ahead)
-    return np.arctan2(np.einsum("ij,ij->i", across, aside), np.einsum("ij,ij->i", across, ahead)) % (2.0 * np.pi)
+    turn = np.arctan2(np.einsum("ij,ij->i", across, aside), np.einsum("ij,ij->i", across, ahead))
+    return np.asarray(turn % (2.0 * np.pi))
 
 
 def _matched(up: list[bool], gap: list[float], sides: list[int]) -> IntArray:
