@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetlux.meshing import Surface, box, mesher, sphere, surface_from_arrays, tetrahedralize
+from tetlux.meshing import Surface, box, child_mesher, mesher, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.pinches import parts_of, pull_apart
@@ -176,7 +176,7 @@ def test_pinched_surfaces_are_decimated(surface: Surface, share: float) -> None:
 @pytest.mark.parametrize("place", [middle_of_an_edge(), BALL.points[3]], ids=["edge", "vertex"])
 def test_balls_that_touch_are_meshed_at_once(place: FloatArray, monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[int] = []
-    run = mesher.run_pytetwild
+    run = child_mesher.run_pytetwild
 
     def counted(points: FloatArray, faces: IntArray, **rest: float) -> tuple[FloatArray, IntArray]:
         given.append(len(faces))
