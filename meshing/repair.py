@@ -6,6 +6,7 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.pinches import mend_parts
 from tetlux.meshing.proximity import winding_number
 from tetlux.meshing.surface import UNITS, Surface, signed_volume, triangle_areas
 
@@ -70,6 +71,13 @@ def surface_from_arrays(
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
     points, faces = _closed(points, faces, name, repairs, warnings)
     faces, nested = _oriented(points, faces, name, repairs, warnings)
+    points, faces = compact(points, mend_parts(points, faces, bodies(len(points), faces), repairs))
+    crowded = int((Edges(faces).triangles > 2).sum())
+    if crowded:
+        warnings.append(
+            f"{crowded} {'edge is' if crowded == 1 else 'edges are'} shared by more than two triangles: parts of the "
+            "body touch there, and no light passes where they share an edge only."
+        )
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     if 2.0 * signed_volume(points, faces) <= FLAT * diagonal * float(triangle_areas(points, faces)[1].sum()):
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")
@@ -92,7 +100,7 @@ def surface_from_arrays(
             "move it to the origin where it was made, and write it again."
         )
     # Walls between bodies that touch count on both sides.
-    overlaps = nested or bool(crossing) or bool((Edges(faces).triangles > 2).any())
+    overlaps = nested or bool(crossing) or crowded > 0
     return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings), overlaps)
 
 
@@ -223,14 +231,12 @@ def _closed(
         points, faces = np.concatenate(centres), np.concatenate(fans)
         repairs.append(f"closed {len(loops)} small {'hole' if len(loops) == 1 else 'holes'}.")
         edges = Edges(faces)
-    odd, crowded = int((edges.triangles % 2).sum()), int((edges.triangles > 2).sum())
+    odd = int((edges.triangles % 2).sum())
     if odd:
         raise InputError(
             f"{name}: the surface is open: {odd} edges belong to an odd number of triangles; "
             "repair it in a mesh editor."
         )
-    if crowded:
-        warnings.append(f"{crowded} edges are shared by more than two triangles (touching parts).")
     return points, faces
 
 
