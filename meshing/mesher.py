@@ -1,5 +1,6 @@
 """From a closed surface to tetrahedra: pytetwild (fTetWild) behind a guard."""
 
+import importlib.util
 import math
 import time
 from collections.abc import Sequence
