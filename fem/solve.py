@@ -1,18 +1,25 @@
 """From a body, a medium and lights to a `Solution`: mesh, solve, estimate, refine."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from threading import Timer
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.labelled import (
+    GivenMedia,
+    channels_by_label,
+    one_label,
+    warnings_for_cavities,
+    warnings_for_labels,
+)
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
@@ -22,6 +29,7 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
 from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.conformity import check_conformity
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.refine import refine
@@ -52,7 +60,7 @@ SLOW = 8.0
 @overload
 def solve(
     body: Surface | TetMesh,
-    medium: AnyMedium,
+    medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -70,7 +78,7 @@ def solve(
 @overload
 def solve(
     body: Surface | TetMesh,
-    medium: Sequence[AnyMedium],
+    medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -87,7 +95,7 @@ def solve(
 
 def solve(
     body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
@@ -103,14 +111,15 @@ def solve(
     """Solve for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
-    tolerance; a `TetMesh` is used as it is.
+    tolerance; a `TetMesh` is used as it is, with a medium for each label of its tetrahedra if it has several.
 
     Parameters
     ----------
     body : Surface or TetMesh
-    medium : Medium, VaryingMedium, or sequence of these
-        Of the body. Several are channels (wavelengths, or red, green and blue): all are solved on one mesh that is
-        fine enough for every one of them.
+    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
+        Of the body, or of each label of a mesh, by its number or name. Several are channels (wavelengths, or red, green
+        and blue): all are solved on one mesh that is fine enough for every one of them. The media of a label may be a
+        list of channels too.
     lights : sequence of Light
         At least one; they add up.
     regions : sequence of Region
@@ -137,7 +146,7 @@ def solve(
     Returns
     -------
     Solution or list of Solution
-        One for each channel, if `medium` is a sequence.
+        One for each channel, if `medium` is a sequence, or one of its labels has a sequence.
 
     Raises
     ------
@@ -152,7 +161,7 @@ def solve(
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """
-    channels = [medium] if isinstance(medium, AnyMedium) else list(medium)
+    channels, several = _channels(body, mesh, medium)
     solutions = solve_each(
         body,
         channels,
@@ -167,12 +176,24 @@ def solve(
         cache=cache,
         report=report,
     )
-    return solutions[0] if isinstance(medium, AnyMedium) else solutions
+    return solutions if several else solutions[0]
+
+
+def _channels(
+    body: Surface | TetMesh, mesh: TetMesh | None, medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia]
+) -> tuple[list[AnyMedium | MediaByLabel], bool]:
+    """The media of each channel, and whether they are given as channels."""
+    if isinstance(medium, AnyMedium):
+        return [medium], False
+    if not isinstance(medium, Mapping):
+        return list(medium), True
+    several = not all(isinstance(each, AnyMedium) for each in medium.values())
+    return list(channels_by_label(_labelled(body, mesh), medium)), several
 
 
 def solve_each(
     body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
@@ -191,7 +212,7 @@ def solve_each(
     ----------
     body, regions, tolerance, mesh, mass, subtract, limit, most_tetrahedra, cache, report
         As in `solve`.
-    medium : Medium, VaryingMedium, or sequence of these
+    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
         That of all scenes, or of each.
     scenes : sequence of sequences of Light
         The lights of one scene add up; each scene has a solution of its own.
@@ -220,20 +241,23 @@ def solve_each(
         mesh = body
     watch = Stopwatch()
     with watch.stage("surface"):
+        if isinstance(body, TetMesh):
+            body.remembered(check_conformity, lambda: check_conformity(body))
         surface = body.surface if isinstance(body, TetMesh) else body
+        media, labels = _media(body, mesh, medium, regions, len(scenes))
         inner = tuple(region.surface for region in regions)
-        media = media_of(medium, regions, len(scenes))
         if mesh is None:
             check_regions(surface, inner)
         else:
-            _check_mesh(mesh, surface, len(inner))
+            _check_mesh(mesh, surface, None if labels else len(inner))
         for each in dict.fromkeys(media):
             check_media(surface, each)
+        region_of = partial(region_at, regions=inner) if mesh is None or not labels else mesh.region_at
         sources = [
-            sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
+            sources_of(lights, surface, dict(zip(labels, each, strict=True)) if labels else each, subtract, region_of)
             for lights, each in zip(scenes, media, strict=True)
         ]
-    work = _Work(surface, inner, media, sources, mass, limit, watch)
+    work = _Work(surface, inner, media, labels, sources, mass, limit, watch)
     given = mesh is not None
     size = len(set(media)), sum(map(len, scenes))
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
@@ -251,7 +275,13 @@ def solve_each(
     found = []
     for scene, step in sorted(steps.items()):
         warnings = _warnings(step.solution, sources[scene], tolerance, where)
-        warnings += warnings_for_regions(inner, media[scene])
+        if labels:
+            warnings += warnings_for_labels(step.solution.mesh, dict(zip(labels, media[scene], strict=True)))
+        else:
+            warnings += warnings_for_regions(inner, media[scene])
+        if given:
+            warnings = [*step.solution.mesh.repairs, *step.solution.mesh.warnings, *warnings]
+            warnings += warnings_for_cavities(step.solution)
         found.append(replace(step.solution, warnings=warnings))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
@@ -272,11 +302,12 @@ def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What is solved for: a body, and the media and lights of each scene."""
+    """What is solved for: a body, and the media and lights of each scene; media are of labels if there are any."""
 
     surface: Surface
     inner: tuple[Surface, ...]
     media: list[tuple[AnyMedium, ...]]
+    labels: tuple[int, ...]
     sources: list[Sources]
     mass: Mass
     limit: bool
@@ -287,9 +318,14 @@ class _Work:
         assembly = Assembly(mesh)
         systems = {}
         for media in dict.fromkeys(self.media):
-            regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
+            medium: AnyMedium | MediaByLabel = media[0]
+            regions: tuple[Region, ...] = ()
+            if self.labels:
+                medium = dict(zip(self.labels, media, strict=True))
+            else:
+                regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
             expected = self.media.count(media)
-            systems[media] = System(mesh, media[0], self.surface, self.mass, expected, regions, assembly, self.limit)
+            systems[media] = System(mesh, medium, self.surface, self.mass, expected, regions, assembly, self.limit)
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
@@ -324,13 +360,49 @@ def _refined(
         pending, least = [], np.inf
 
 
-def _check_mesh(mesh: TetMesh, surface: Surface, regions: int) -> None:
-    """Refuse a mesh that is not of this body."""
+def _check_mesh(mesh: TetMesh, surface: Surface, regions: int | None) -> None:
+    """Refuse a mesh that is not of this body, or has other regions than so many, if they have no labels."""
     if mesh.unit != surface.unit:
         raise InputError(f"the mesh is in {mesh.unit} and the surface in {surface.unit}; give both in one unit.")
-    have = int(mesh.regions.max(initial=0))
+    if regions is None:
+        return
+    if regions == 0:
+        one_label(mesh)
+        return
+    have = max(mesh.region_volumes)
     if have != regions:
         raise InputError(f"the mesh has {have} regions and {regions} are given; give those that it was made of.")
+
+
+def _labelled(body: Surface | TetMesh, mesh: TetMesh | None) -> TetMesh:
+    """The mesh that labels are of."""
+    found = body if isinstance(body, TetMesh) else mesh
+    if found is None:
+        raise InputError(
+            "media by label go with a mesh of labelled tetrahedra; give a surface one medium, and regions."
+        )
+    return found
+
+
+def _media(
+    body: Surface | TetMesh,
+    mesh: TetMesh | None,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    regions: Sequence[Region],
+    scenes: int,
+) -> tuple[list[tuple[AnyMedium, ...]], tuple[int, ...]]:
+    """The media of each scene, and the labels that they are of, none if they are of a body and its regions."""
+    some = medium if isinstance(medium, AnyMedium | Mapping) else next(iter(medium), None)
+    if not isinstance(some, Mapping):
+        return media_of(medium, regions, scenes), ()  # type: ignore[arg-type]
+    if len(regions) > 0:
+        raise InputError("regions are surfaces within a body of one medium; leave them out where media are by label.")
+    channels = channels_by_label(_labelled(body, mesh), medium)  # type: ignore[arg-type]
+    if len(channels) == 1 and scenes > 1 and isinstance(medium, Mapping):
+        channels *= scenes
+    if len(channels) != scenes:
+        raise InputError(f"there are media for {len(channels)} channels and {scenes} scenes; give one for each.")
+    return [tuple(each.values()) for each in channels], tuple(channels[0])
 
 
 def media_of(

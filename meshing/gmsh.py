@@ -1,0 +1,289 @@
+"""Gmsh's own files, versions 2.2 and 4.1, text and binary (Gmsh reference manual, section "Gmsh file formats").
+
+Unlike meshio this reads files in which only some entities have a physical group.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.raw import RawMesh
+
+PHYSICAL, ENTITY = "gmsh:physical", "gmsh:geometrical"
+# Element types: what meshio calls them, and how many nodes they have. Corners come first in all of them.
+_POINTS = {15: ("vertex", 1)}
+_LINES = {kind: ("line", nodes) for kind, nodes in {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}.items()}
+_TRIANGLES = {
+    kind: ("triangle", nodes) for kind, nodes in {2: 3, 9: 6, 20: 9, 21: 10, 22: 12, 23: 15, 24: 15, 25: 21}.items()
+}
+_QUADS = {kind: ("quad", nodes) for kind, nodes in {3: 4, 10: 9, 16: 8, 36: 16, 37: 25}.items()}
+_TETRAHEDRA = {kind: ("tetra", nodes) for kind, nodes in {4: 4, 11: 10, 29: 20, 30: 35, 31: 56}.items()}
+_HEXAHEDRA = {kind: ("hexahedron", nodes) for kind, nodes in {5: 8, 12: 27, 17: 20, 92: 64, 93: 125}.items()}
+_WEDGES = {kind: ("wedge", nodes) for kind, nodes in {6: 6, 13: 18, 18: 15, 90: 40, 91: 75}.items()}
+_PYRAMIDS = {kind: ("pyramid", nodes) for kind, nodes in {7: 5, 14: 14, 19: 13, 118: 30}.items()}
+_KINDS = {**_POINTS, **_LINES, **_TRIANGLES, **_QUADS, **_TETRAHEDRA, **_HEXAHEDRA, **_WEDGES, **_PYRAMIDS}
+# Node numbers up to this many times the number of nodes are looked up in a table, others by bisection.
+SPARSE = 20
+
+
+def is_gmsh(path: Path) -> bool:
+    """Whether a file begins as gmsh's do."""
+    with path.open("rb") as file:
+        return file.read(256).lstrip().startswith((b"$MeshFormat", b"$Comments", b"$NOD"))
+
+
+def read_gmsh(path: Path) -> RawMesh:
+    """Read a gmsh file.
+
+    Physical groups are the array `PHYSICAL`; if there are none, the numbers of volumes are the array `ENTITY`.
+
+    Raises
+    ------
+    InputError
+        If it is of another version, or an element is of an unknown type.
+    ValueError, IndexError, KeyError
+        If it is damaged.
+    """
+    sections = _sections(path.read_bytes())
+    if "MeshFormat" not in sections:
+        raise InputError("it is of gmsh's version 1; save it as version 4.1 or 2.2.")
+    head = sections["MeshFormat"].split(maxsplit=3)
+    version, binary = head[0].decode(), int(head[1]) == 1
+    if version not in ("2", "2.0", "2.1", "2.2", "4.1"):
+        raise InputError(f"it is of gmsh's version {version}; save it as version 4.1 or 2.2.")
+    big = binary and head[3][:4] == b"\0\0\0\1"
+    words = _Binary(big) if binary else _Text()
+    modern = version == "4.1"
+    groups = _entity_groups(words, sections.get("Entities")) if modern else {}
+    tags, points = (_nodes_4 if modern else _nodes_2)(words, sections["Nodes"])
+    elements = (_elements_4 if modern else _elements_2)(words, sections["Elements"])
+    find = _numbering(tags)
+    blocks = [(block.kind, find(block.nodes)) for block in elements]
+    names = _names(sections.get("PhysicalNames", b""))
+    if modern:
+        several = sum(len(found) > 1 for (dimension, _), found in groups.items() if dimension == 3)
+        physical = [
+            np.full(len(b.nodes), next(iter(groups.get((b.dimension, int(b.entity[0])), [])), 0))
+            if len(b.nodes)
+            else b.entity
+            for b in elements
+        ]
+    else:
+        several, physical = 0, [block.physical for block in elements]
+    notes = ()
+    if several:
+        notes = (f"{several} volumes are in several physical groups; the first of each is its label.",)
+    solid = [i for i, block in enumerate(elements) if block.kind == "tetra"]
+    grouped = any(physical[i].any() for i in solid)
+    arrays = {PHYSICAL: physical} if grouped else {ENTITY: [block.entity for block in elements]}
+    return RawMesh(points, blocks, arrays, {PHYSICAL: names}, notes)
+
+
+def _sections(content: bytes) -> dict[str, bytes]:
+    """What stands between ``$Name`` and ``$EndName``, the first of each name."""
+    found: dict[str, bytes] = {}
+    place = 0
+    while (start := content.find(b"$", place)) >= 0:
+        line = content.find(b"\n", start)
+        if line < 0:
+            break
+        name = content[start + 1 : line].strip().decode("ascii", "replace")
+        end = content.find(b"$End" + name.encode(), line)
+        if end < 0:
+            raise ValueError(f"section {name} has no end")
+        found.setdefault(name, content[line + 1 : end])
+        place = end + 4 + len(name)
+    return found
+
+
+def _names(section: bytes) -> dict[int, str]:
+    """Names of the physical groups of volumes."""
+    found = {}
+    for line in section.decode("utf-8", "replace").splitlines()[1:]:
+        dimension, number, name = line.split(maxsplit=2)
+        if int(dimension) == 3:
+            found[int(number)] = name.strip().strip('"')
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Elements:
+    """Elements of one kind: their entity and physical group (m,), and nodes (m, k)."""
+
+    kind: str
+    dimension: int
+    entity: IntArray
+    physical: IntArray
+    nodes: IntArray
+
+
+class _Text:
+    """Numbers of text, which are all alike."""
+
+    def start(self, section: bytes) -> None:
+        self._values = np.array(section.split(), dtype=np.float64)
+        self._place = 0
+
+    def take(self, count: int, kind: str) -> npt.NDArray[Any]:
+        found = self._values[self._place : self._place + count]
+        if count < 0 or len(found) < count:
+            raise ValueError("the section is too short")
+        self._place += count
+        return found if kind == "d" else found.astype(np.int64)
+
+    @property
+    def rest(self) -> IntArray:
+        return self._values[self._place :].astype(np.int64)
+
+
+class _Binary:
+    """Numbers of bytes: ``i`` of 4, ``u`` and ``d`` of 8."""
+
+    def __init__(self, big: bool) -> None:
+        order = ">" if big else "<"
+        self._types = {"i": np.dtype(order + "i4"), "u": np.dtype(order + "i8"), "d": np.dtype(order + "f8")}
+
+    def start(self, section: bytes) -> None:
+        self._section, self._place = section, 0
+
+    def line(self) -> int:
+        """A whole number that stands in a line of text."""
+        end = self._section.index(b"\n", self._place)
+        number, self._place = int(self._section[self._place : end]), end + 1
+        return number
+
+    def take(self, count: int, kind: str) -> npt.NDArray[Any]:
+        of_kind = self._types[kind]
+        if count < 0 or self._place + count * of_kind.itemsize > len(self._section):
+            raise ValueError("the section is too short")
+        found = np.frombuffer(self._section, of_kind, count, self._place)
+        self._place += count * of_kind.itemsize
+        return found.astype(np.float64 if kind == "d" else np.int64)
+
+    @property
+    def rest(self) -> IntArray:
+        return self.take((len(self._section) - self._place) // 4, "i")
+
+
+def _count(words: _Text | _Binary) -> int:
+    """The number of entries that version 2 begins a section with."""
+    return words.line() if isinstance(words, _Binary) else int(words.take(1, "i")[0])
+
+
+def _entity_groups(words: _Text | _Binary, section: bytes | None) -> dict[tuple[int, int], list[int]]:
+    """Physical groups of each entity, by its dimension and number."""
+    found: dict[tuple[int, int], list[int]] = {}
+    if section is None:
+        return found
+    words.start(section)
+    for dimension, count in enumerate(words.take(4, "u").tolist()):
+        for _ in range(count):
+            number = int(words.take(1, "i")[0])
+            words.take(3 if dimension == 0 else 6, "d")
+            # A group is negative where the entity is turned round in it.
+            found[dimension, number] = np.abs(words.take(int(words.take(1, "u")[0]), "i")).tolist()
+            if dimension > 0:
+                words.take(int(words.take(1, "u")[0]), "i")
+    return found
+
+
+def _nodes_4(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArray]:
+    words.start(section)
+    tags: list[IntArray] = []
+    points: list[FloatArray] = []
+    for _ in range(int(words.take(4, "u")[0])):
+        dimension, _, parametric = words.take(3, "i").tolist()
+        count = int(words.take(1, "u")[0])
+        tags.append(words.take(count, "u"))
+        width = 3 + (dimension if parametric else 0)
+        points.append(words.take(width * count, "d").reshape(count, width)[:, :3])
+    return np.concatenate(tags), np.vstack(points)
+
+
+def _elements_4(words: _Text | _Binary, section: bytes) -> list[_Elements]:
+    words.start(section)
+    found = []
+    for _ in range(int(words.take(4, "u")[0])):
+        dimension, entity, kind = words.take(3, "i").tolist()
+        count = int(words.take(1, "u")[0])
+        name, nodes = _kind(kind)
+        each = words.take((1 + nodes) * count, "u").reshape(count, 1 + nodes)[:, 1:]
+        found.append(_Elements(name, dimension, np.full(count, entity), np.zeros(count, np.int64), each))
+    return found
+
+
+def _nodes_2(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArray]:
+    words.start(section)
+    count = _count(words)
+    if isinstance(words, _Text):
+        table = words.take(4 * count, "d").reshape(count, 4)
+        return table[:, 0].astype(np.int64), np.ascontiguousarray(table[:, 1:])
+    # A whole number of 4 bytes and three of 8, row by row.
+    raw = words.take(7 * count, "i").astype(np.int32).reshape(count, 7)
+    return raw[:, 0].astype(np.int64), np.ascontiguousarray(raw[:, 1:]).view(np.float64)
+
+
+def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
+    """Elements of version 2, each with a head of its own in text, and with one for several in binary."""
+    words.start(section)
+    count = _count(words)
+    flat = words.rest
+    numbers: Sequence[int] = flat.tolist()
+    binary = isinstance(words, _Binary)
+    places: dict[tuple[int, int], list[int]] = {}
+    place, done = 0, 0
+    while done < count:
+        if binary:
+            kind, follow, tags = numbers[place : place + 3]
+            place += 3
+        else:
+            (kind, tags), follow = numbers[place + 1 : place + 3], 1
+            place += 3
+        width = tags + _kind(kind)[1] + (1 if binary else 0)
+        if follow < 1 or tags < 0:
+            raise ValueError("a block of no elements")
+        # Where the tags begin.
+        first = place + (1 if binary else 0)
+        places.setdefault((kind, tags), []).extend(range(first, first + width * follow, width))
+        place += width * follow
+        done += follow
+    found = []
+    for (kind, tags), starts in places.items():
+        name, nodes = _kind(kind)
+        rows = flat[np.array(starts)[:, None] + np.arange(tags + nodes)]
+        none = np.zeros(len(rows), dtype=np.int64)
+        physical, entity = (rows[:, i] if tags > i else none for i in (0, 1))
+        found.append(_Elements(name, 0, entity, np.abs(physical), rows[:, tags:]))
+    return found
+
+
+def _kind(number: int) -> tuple[str, int]:
+    if number not in _KINDS:
+        raise InputError(
+            f"it holds elements of gmsh's type {number}, which is not read; mesh the body with tetrahedra."
+        )
+    return _KINDS[number]
+
+
+def _numbering(tags: IntArray) -> Any:
+    """From numbers of nodes to their places, -1 for those that do not exist."""
+    if tags.min(initial=0) < 0:
+        raise ValueError("a negative number of a node")
+    most = int(tags.max(initial=0))
+    if most > SPARSE * len(tags) + 1000:
+        order = np.argsort(tags)
+
+        def search(nodes: IntArray) -> IntArray:
+            places = order[np.searchsorted(tags, nodes, sorter=order).clip(max=len(order) - 1)]
+            return np.where(tags[places] == nodes, places, -1)
+
+        return search
+    table = np.full(most + 2, -1)
+    table[tags] = np.arange(len(tags))
+    return lambda nodes: table[np.where((nodes < 0) | (nodes > most), most + 1, nodes)]
