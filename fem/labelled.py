@@ -1,7 +1,7 @@
 """Meshes whose tetrahedra have labels, with a medium for each label, and what a user should know of them."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -75,6 +75,9 @@ def channels_by_label(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -
         if label in named:
             raise InputError(f"label {mesh.named([label])} is given a medium twice; give it one.")
         named[label] = medium
+    for label, each in named.items():
+        if not isinstance(each, AnyMedium | Sequence) or isinstance(each, str):
+            raise InputError(f"label {mesh.named([label])} is given {each!r}; give it a Medium.")
     check_labels(mesh, named)
     counts = {label: len(each) for label, each in named.items() if not isinstance(each, AnyMedium)}
     count = next(iter(counts.values()), 1)
@@ -83,14 +86,13 @@ def channels_by_label(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -
             raise InputError(
                 f"label {mesh.named([label])} has {own} media for {count} channels; give one, or one for each."
             )
-    outer = _outermost(mesh)
-    order = [outer, *(label for label in named if label != outer)]
+    order = outermost_first(mesh, named)
     channels: list[MediaByLabel] = []
     for channel in range(count):
         of_label = {label: named[label] for label in order}
         channels.append({label: m if isinstance(m, AnyMedium) else m[channel] for label, m in of_label.items()})
-    for each in channels:
-        _check_kinds(each)
+    for of_labels in channels:
+        _check_kinds(of_labels)
     return channels
 
 
@@ -116,10 +118,11 @@ def _check_kinds(media: MediaByLabel) -> None:
             raise InputError(f"label {label} is given {medium!r}; give it a Medium.")
 
 
-def _outermost(mesh: TetMesh) -> int:
-    """The label that has the largest part of the boundary."""
-    labels, place = np.unique(mesh.regions[mesh.boundary_cells], return_inverse=True)
-    return int(labels[np.bincount(place, mesh.boundary_areas).argmax()])
+def outermost_first(mesh: TetMesh, labels: Iterable[int]) -> list[int]:
+    """Labels in their order, but first the one that has the largest part of the boundary."""
+    there, place = np.unique(mesh.regions[mesh.boundary_cells], return_inverse=True)
+    outer = int(there[np.bincount(place, mesh.boundary_areas).argmax()])
+    return [outer, *(label for label in labels if label != outer)]
 
 
 def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from threading import Timer
 from typing import Any, overload
 
@@ -28,7 +27,7 @@ from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.conformity import check_conformity
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
@@ -58,7 +57,7 @@ SLOW = 8.0
 
 
 @overload
-def solve(
+def solve(  # type: ignore[overload-overlap]  # a list of channels may be among media by label
     body: Surface | TetMesh,
     medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
@@ -181,11 +180,13 @@ def solve(
 
 def _channels(
     body: Surface | TetMesh, mesh: TetMesh | None, medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia]
-) -> tuple[list[AnyMedium | MediaByLabel], bool]:
+) -> tuple[list[AnyMedium | GivenMedia], bool]:
     """The media of each channel, and whether they are given as channels."""
     if isinstance(medium, AnyMedium):
         return [medium], False
     if not isinstance(medium, Mapping):
+        if not isinstance(medium, Sequence):
+            raise InputError(f"the medium is {medium!r}; give a Medium, a list of channels, or media by label.")
         return list(medium), True
     several = not all(isinstance(each, AnyMedium) for each in medium.values())
     return list(channels_by_label(_labelled(body, mesh), medium)), several
@@ -241,23 +242,13 @@ def solve_each(
         mesh = body
     watch = Stopwatch()
     with watch.stage("surface"):
-        if isinstance(body, TetMesh):
-            body.remembered(check_conformity, lambda: check_conformity(body))
-        surface = body.surface if isinstance(body, TetMesh) else body
-        media, labels = _media(body, mesh, medium, regions, len(scenes))
-        inner = tuple(region.surface for region in regions)
-        if mesh is None:
-            check_regions(surface, inner)
-        else:
-            _check_mesh(mesh, surface, None if labels else len(inner))
-        for each in dict.fromkeys(media):
-            check_media(surface, each)
-        region_of = partial(region_at, regions=inner) if mesh is None or not labels else mesh.region_at
+        scene = _scene(body, mesh, medium, regions, len(scenes))
+        surface, inner, media = scene.surface, scene.inner, scene.media
         sources = [
-            sources_of(lights, surface, dict(zip(labels, each, strict=True)) if labels else each, subtract, region_of)
-            for lights, each in zip(scenes, media, strict=True)
+            sources_of(lights, surface, each, subtract, scene.region_of)
+            for lights, each in zip(scenes, scene.by_label(), strict=True)
         ]
-    work = _Work(surface, inner, media, labels, sources, mass, limit, watch)
+    work = _Work(scene, sources, mass, limit, watch)
     given = mesh is not None
     size = len(set(media)), sum(map(len, scenes))
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
@@ -270,19 +261,11 @@ def solve_each(
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     check_memory(len(mesh.tetrahedra), *size)
     steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
-    if given:
-        where = "on the mesh given"
     found = []
-    for scene, step in sorted(steps.items()):
-        warnings = _warnings(step.solution, sources[scene], tolerance, where)
-        if labels:
-            warnings += warnings_for_labels(step.solution.mesh, dict(zip(labels, media[scene], strict=True)))
-        else:
-            warnings += warnings_for_regions(inner, media[scene])
-        if given:
-            warnings = [*step.solution.mesh.repairs, *step.solution.mesh.warnings, *warnings]
-            warnings += warnings_for_cavities(step.solution)
-        found.append(replace(step.solution, warnings=warnings))
+    for number, step in sorted(steps.items()):
+        warnings = _warnings(step.solution, sources[number], tolerance, "on the mesh given" if given else where)
+        warnings += scene.warnings(number, step.solution, given=given)
+        found.append(replace(step.solution, warnings=list(dict.fromkeys(warnings))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
 
@@ -301,31 +284,108 @@ def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Work:
-    """What is solved for: a body, and the media and lights of each scene; media are of labels if there are any."""
+class _Scene:
+    """A body and its media.
+
+    Attributes
+    ----------
+    surface : Surface
+    inner : tuple of Surface
+        Of its regions.
+    media : list of tuple of medium
+        In each scene: those of the body and of its regions, or those of labels.
+    labels : tuple of int
+        Of a mesh, if media are by label.
+    mesh : TetMesh, optional
+        That is used as it is.
+    """
 
     surface: Surface
     inner: tuple[Surface, ...]
     media: list[tuple[AnyMedium, ...]]
     labels: tuple[int, ...]
+    mesh: TetMesh | None
+
+    def by_label(self) -> list[MediaByLabel]:
+        """The media of each scene by label, or by the number of the region."""
+        numbers = self.labels or range(len(self.inner) + 1)
+        return [dict(zip(numbers, each, strict=True)) for each in self.media]
+
+    def region_of(self, points: FloatArray) -> IntArray:
+        """The labels, or the numbers of the regions, of points (q, 3), (q,)."""
+        if self.labels and self.mesh is not None:
+            return self.mesh.region_at(points)
+        return region_at(points, self.inner)
+
+    def system_on(
+        self, mesh: TetMesh, media: tuple[AnyMedium, ...], mass: Mass, assembly: Assembly, *, limit: bool
+    ) -> System:
+        """The equations of the media of a scene on a mesh."""
+        expected = self.media.count(media)
+        if self.labels:
+            labelled = dict(zip(self.labels, media, strict=True))
+            return System(mesh, labelled, self.surface, mass, expected, (), assembly, limit)
+        regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
+        return System(mesh, media[0], self.surface, mass, expected, regions, assembly, limit)
+
+    def warnings(self, number: int, solution: Solution, *, given: bool) -> list[str]:
+        """What a user should know of its parts in one of the scenes, and of a mesh that was given."""
+        if self.labels:
+            found = warnings_for_labels(solution.mesh, self.by_label()[number])
+        else:
+            found = warnings_for_regions(self.inner, self.media[number])
+        if not given:
+            return found
+        return [*found, *solution.mesh.repairs, *solution.mesh.warnings, *warnings_for_cavities(solution)]
+
+
+def _scene(
+    body: Surface | TetMesh,
+    mesh: TetMesh | None,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    regions: Sequence[Region],
+    scenes: int,
+) -> _Scene:
+    """A body and its media, checked."""
+    if isinstance(body, TetMesh):
+        body.remembered(check_conformity, lambda: check_conformity(body))
+    surface = body.surface if isinstance(body, TetMesh) else body
+    for number, region in enumerate(regions, 1):
+        if not isinstance(region, Region):
+            raise InputError(f"region {number} is {type(region).__name__}(...); give Region(surface, medium).")
+    media, labels = _media(body, mesh, medium, regions, scenes)
+    inner = tuple(region.surface for region in regions)
+    if mesh is None:
+        check_regions(surface, inner)
+    else:
+        _check_mesh(mesh, surface, None if labels else len(inner))
+    for each in dict.fromkeys(media):
+        check_media(surface, each)
+    return _Scene(surface, inner, media, labels, mesh)
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What is solved for: a body, the media and lights of each scene, and how."""
+
+    scene: _Scene
     sources: list[Sources]
     mass: Mass
     limit: bool
     watch: Stopwatch
 
+    @property
+    def media(self) -> list[tuple[AnyMedium, ...]]:
+        """The media of each scene."""
+        return self.scene.media
+
     def solver_on(self, mesh: TetMesh) -> Callable[[int, Step | None], Step]:
         """What solves for one scene on a mesh, given its solution on the mesh before; scenes share what they can."""
         assembly = Assembly(mesh)
-        systems = {}
-        for media in dict.fromkeys(self.media):
-            medium: AnyMedium | MediaByLabel = media[0]
-            regions: tuple[Region, ...] = ()
-            if self.labels:
-                medium = dict(zip(self.labels, media, strict=True))
-            else:
-                regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
-            expected = self.media.count(media)
-            systems[media] = System(mesh, medium, self.surface, self.mass, expected, regions, assembly, self.limit)
+        systems = {
+            media: self.scene.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            for media in dict.fromkeys(self.media)
+        }
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
@@ -348,7 +408,7 @@ def _refined(
         fine_enough = not marked.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with work.watch.stage("mesh"):
-                finer = refine(mesh, marked, work.surface, work.inner)
+                finer = refine(mesh, marked, work.scene.surface, work.scene.inner)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, work.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
@@ -392,8 +452,11 @@ def _media(
     scenes: int,
 ) -> tuple[list[tuple[AnyMedium, ...]], tuple[int, ...]]:
     """The media of each scene, and the labels that they are of, none if they are of a body and its regions."""
-    some = medium if isinstance(medium, AnyMedium | Mapping) else next(iter(medium), None)
-    if not isinstance(some, Mapping):
+    each = [medium] if isinstance(medium, AnyMedium | Mapping) else list(medium)
+    kinds = {isinstance(one, Mapping) for one in each}
+    if len(kinds) > 1:
+        raise InputError("some channels have a medium and some have media by label; give all of them alike.")
+    if True not in kinds:
         return media_of(medium, regions, scenes), ()  # type: ignore[arg-type]
     if len(regions) > 0:
         raise InputError("regions are surfaces within a body of one medium; leave them out where media are by label.")

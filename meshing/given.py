@@ -96,11 +96,14 @@ def mesh_from_arrays(
     >>> mesh.labels, mesh.regions, mesh.repairs
     ({7: 'skin'}, array([7]), ('nodes are numbered from 1.',))
     """
-    given = _mended(_numbered(points, tetrahedra, numbered_from))
-    regions = None if labels is None else _labels(labels, len(np.asarray(tetrahedra)))[given.cells]
+    numbered = _numbered(points, tetrahedra, numbered_from)
+    regions = None if labels is None else whole_numbers(labels, len(numbered.corners))
+    if labels is not None and regions is None:
+        raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
+    given = _mended(numbered)
     mesh = _as_mesh(given, unit)
     if regions is not None:
-        mesh = replace(mesh, regions=regions, labels=dict(names or {}))
+        mesh = replace(mesh, regions=regions[given.cells], labels=dict(names or {}))
     return replace(mesh, warnings=check_conformity(mesh))
 
 
@@ -215,14 +218,12 @@ def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
     return given.only(first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once.")
 
 
-def _labels(labels: npt.ArrayLike, count: int) -> IntArray:
-    """Labels as integers, one for each tetrahedron."""
-    array = np.asarray(labels)
-    if array.shape != (count,):
-        array = array.reshape(-1) if array.size == count else array
-    if array.shape != (count,) or array.dtype.kind not in "iuf":
-        raise InputError(f"its labels are an array of shape {array.shape}; give an integer for each tetrahedron.")
-    whole = array.dtype.kind != "f" or (np.isfinite(array).all() and (array == np.round(array)).all())
-    if not whole or np.abs(array.astype(np.float64)).max(initial=0.0) >= 2**31:
-        raise InputError("its labels are no integers, or too large ones; give an integer for each tetrahedron.")
-    return array.astype(np.int64)
+def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:
+    """Values as integers, if there are so many and they are whole and below 2^31, whatever their type; else None."""
+    array = np.asarray(values)
+    if array.size != count or array.ndim > 2 or array.shape[:1] != (count,) or array.dtype.kind not in "iuf":
+        return None
+    numbers = array.reshape(-1).astype(np.float64)
+    if not (np.isfinite(numbers).all() and (numbers == np.round(numbers)).all()) or np.abs(numbers).max() >= 2**31:
+        return None
+    return numbers.astype(np.int64)

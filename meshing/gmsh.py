@@ -76,7 +76,7 @@ def read_gmsh(path: Path) -> RawMesh:
         ]
     else:
         several, physical = 0, [block.physical for block in elements]
-    notes = ()
+    notes: tuple[str, ...] = ()
     if several:
         notes = (f"{several} volumes are in several physical groups; the first of each is its label.",)
     solid = [i for i, block in enumerate(elements) if block.kind == "tetra"]

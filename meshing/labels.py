@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.given import whole_numbers
 from tetlux.meshing.gmsh import ENTITY, PHYSICAL
 from tetlux.meshing.raw import RawMesh
 
@@ -38,6 +39,9 @@ KNOWN = (
     "id",
     ENTITY,
 )
+ORDER = {name.lower(): i for i, name in enumerate(KNOWN)}
+# An array of an unknown name that holds more different numbers than this numbers the cells, or the like.
+MOST_LABELS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +75,8 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
         if values is None:
             raise InputError(f'the values of "{name}" are no whole numbers, one for each tetrahedron.')
         return Labels(values, _names(raw, name, values))
-    candidates = {each: values for each in raw.arrays if (values := _whole(raw, each)) is not None}
-    order = {known.lower(): i for i, known in enumerate(KNOWN)}
-    likely = sorted((each for each in candidates if each.lower() in order), key=lambda each: order[each.lower()])
+    candidates = _candidates(raw)
+    likely = sorted((each for each in candidates if each.lower() in ORDER), key=lambda each: ORDER[each.lower()])
     if not likely and raw.sets:
         return _labels_of_sets(raw)
     chosen = likely[0] if likely else next(iter(candidates)) if len(candidates) == 1 else None
@@ -97,21 +100,23 @@ def _notes(chosen: str, values: IntArray, candidates: list[str]) -> tuple[str, .
     others = " and ".join(f'"{each}"' for each in candidates if each != chosen)
     if others:
         return (f'labels are the array "{chosen}"; {others} may be labels too.',)
-    return () if chosen.lower() in map(str.lower, KNOWN) else (f'labels are the array "{chosen}".',)
+    return () if chosen.lower() in ORDER else (f'labels are the array "{chosen}".',)
+
+
+def _candidates(raw: RawMesh) -> dict[str, IntArray]:
+    """Arrays that may be labels, with their values: those that hold few different whole numbers, or are known."""
+    found = {}
+    for name in raw.arrays:
+        values = _whole(raw, name)
+        if values is not None and (name.lower() in ORDER or len(np.unique(values)) <= MOST_LABELS):
+            found[name] = values
+    return found
 
 
 def _whole(raw: RawMesh, name: str) -> IntArray | None:
     """Values of an array if they are whole numbers, one for each tetrahedron."""
     values = raw.values(name)
-    if values.ndim == 2 and values.shape[1] == 1:
-        values = values[:, 0]
-    if values.ndim != 1 or values.dtype.kind not in "iuf":
-        return None
-    if values.dtype.kind == "f" and not (np.isfinite(values).all() and (values == np.round(values)).all()):
-        return None
-    if len(values) and np.abs(values.astype(np.float64)).max() >= 2**31:
-        return None
-    return values.astype(np.int64)
+    return whole_numbers(values, len(values))
 
 
 def _names(raw: RawMesh, name: str, values: IntArray) -> dict[int, str]:
@@ -120,7 +125,7 @@ def _names(raw: RawMesh, name: str, values: IntArray) -> dict[int, str]:
 
 
 def _labels_of_sets(raw: RawMesh) -> Labels:
-    """Labels by named sets of cells, numbered from 1 in their order; the smallest set that holds a tetrahedron counts."""
+    """Labels by named sets of cells, numbered from 1 in their order; of several the smallest set counts."""
     sizes = [len(raw.blocks[i][1]) for i in raw.tetrahedra]
     members = {name: _members(parts, raw.tetrahedra, sizes) for name, parts in raw.sets.items()}
     solid = {name: inside for name, inside in members.items() if inside.any()}

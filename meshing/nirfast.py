@@ -47,14 +47,15 @@ def read_nirfast(files: dict[str, Path]) -> RawMesh:
         raise InputError("it is a mesh of triangles in a plane; give a mesh of tetrahedra.")
     if nodes.shape[1] not in (3, 4) or elements.shape[1] < 4:
         raise InputError(
-            f"{files['.node'].name} has {nodes.shape[1]} columns and {files['.elem'].name} {elements.shape[1]}; a mark and "
-            "three coordinates, and four node numbers are read."
+            f"{files['.node'].name} has {nodes.shape[1]} columns and {files['.elem'].name} {elements.shape[1]}; give a "
+            "mark and three coordinates for each node, and four node numbers for each tetrahedron."
         )
     cells = elements[:, :4].astype(np.int64)
     # NIRFAST counts from 1; some who write its files count from 0.
     cells -= 0 if (cells == 0).any() else 1
     cells[cells >= len(nodes)] = -1
-    arrays, notes = {}, ()
+    arrays: dict[str, list[FloatArray]] = {}
+    notes: tuple[str, ...] = ()
     if ".region" in files:
         regions, notes = _regions(_table(files[".region"])[:, 0], cells, len(nodes))
         arrays = {REGION: [regions]}

@@ -51,8 +51,9 @@ def refine(
         If `mesh` has more regions than there are inner surfaces, unless there are none.
     """
     points, tetrahedra, parents = _bisected(mesh, marked)
-    regions = {"regions": mesh.regions[parents]} if mesh.regions.any() else {}
-    fine = TetMesh(points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings, **regions)
+    fine = TetMesh(points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
+    if mesh.regions.any():
+        fine = replace(fine, regions=mesh.regions[parents])
     if surface is None:
         return fine
     return moved_to_surface(fine, surface, regions, first=len(mesh.points))

@@ -398,7 +398,7 @@ class TetMesh:
         return self.tree.locate(np.asarray(queries, dtype=float).reshape(-1, 3))
 
     def region_at(self, queries: FloatArray) -> IntArray:
-        """The region of the tetrahedron that holds each point (q, 3), or of the nearest one for points outside, (q,)."""
+        """The region of the tetrahedron that holds each point (q, 3), or of the one nearest to it, (q,)."""
         cells, _ = self.locate(queries)
         outside = np.flatnonzero(cells < 0)
         if len(outside):
