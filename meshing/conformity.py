@@ -41,6 +41,21 @@ def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
     return int((np.maximum(*covered) > 1).sum())
 
 
+def check_overlap(corners: IntArray, nodes: int) -> None:
+    """Refuse tetrahedra that have a face in common and lie on the same side of it.
+
+    Raises
+    ------
+    InputError
+    """
+    overlapped = doubly_covered_faces(corners, nodes)
+    if overlapped:
+        raise InputError(
+            f"tetrahedra overlap: {overlapped:,} of their faces have several tetrahedra on one side, as when some are "
+            "given twice; give each part of the volume once."
+        )
+
+
 def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
     """Refuse a mesh that counts a volume twice, or has parts that touch but have no nodes in common.
 
@@ -53,12 +68,12 @@ def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
     ------
     InputError
     """
-    overlapped = doubly_covered_faces(mesh.tetrahedra, len(mesh.points))
-    if overlapped:
-        raise InputError(
-            f"tetrahedra overlap: {overlapped:,} of their faces have several tetrahedra on one side, as when some are "
-            "given twice; give each part of the volume once."
-        )
+    check_overlap(mesh.tetrahedra, len(mesh.points))
+    return check_facets(mesh)
+
+
+def check_facets(mesh: TetMesh) -> tuple[str, ...]:
+    """The part of `check_conformity` that looks at the boundary."""
     against, inside = _covered_facets(mesh)
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:

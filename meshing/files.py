@@ -4,7 +4,6 @@ import contextlib
 import io
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ import numpy as np
 from tetlux.meshing import nirfast
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.given import mesh_from_arrays, oriented
+from tetlux.meshing.given import Given, checked_mesh, oriented
 from tetlux.meshing.gmsh import is_gmsh, read_gmsh
 from tetlux.meshing.gmsh_write import write_gmsh
 from tetlux.meshing.labels import REGION, labels_of
@@ -99,13 +98,18 @@ def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels:
         raw = _read(path)
         corners, notes = raw.corners()
         found = labels_of(raw, labels)
-        mesh = mesh_from_arrays(
-            scale * raw.points, corners, labels=found.values, names=found.names, unit=unit, numbered_from=0
+        given = Given(
+            scale * raw.points,
+            corners,
+            found.values,
+            found.names,
+            repairs=notes,
+            warnings=(*raw.notes, *found.notes),
         )
+        return checked_mesh(given, unit)[0]
     except InputError as error:
         said = str(error)
         raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from error
-    return replace(mesh, repairs=(*notes, *mesh.repairs), warnings=(*raw.notes, *found.notes, *mesh.warnings))
 
 
 def _read(path: Path) -> RawMesh:
@@ -127,7 +131,7 @@ def _read(path: Path) -> RawMesh:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # whatever a damaged file makes its reader run into
-        raise InputError(f"{path} is not a readable {suffix} mesh; export it again.") from error
+        raise InputError(f"{path} is not a readable {suffix[1:].upper()} mesh; export it again.") from error
     data = read_with_meshio(path, MESHIO[suffix])
     arrays = {name: list(values) for name, values in data.cell_data.items()}
     points = np.asarray(data.points, dtype=np.float64)
@@ -152,7 +156,7 @@ def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":
         package = error.name or "another package"
         raise InputError(f"{path} needs {package}, which is not installed; save it as .vtu or .msh.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
-        raise InputError(f"{path} is not a readable {path.suffix.lower()} mesh; export it again.") from error
+        raise InputError(f"{path} is not a readable {path.suffix[1:].upper()} mesh; export it again.") from error
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:

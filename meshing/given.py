@@ -1,7 +1,7 @@
 """Tetrahedra made elsewhere, mended where that is safe and checked before they become a `TetMesh`."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.conformity import check_conformity, doubly_covered_faces
+from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
 
@@ -96,22 +96,56 @@ def mesh_from_arrays(
     >>> mesh.labels, mesh.regions, mesh.repairs
     ({7: 'skin'}, array([7]), ('nodes are numbered from 1.',))
     """
-    numbered = _numbered(points, tetrahedra, numbered_from)
-    regions = None if labels is None else whole_numbers(labels, len(numbered.corners))
-    if labels is not None and regions is None:
+    given = Given(points, tetrahedra, labels, names or {}, numbered_from)
+    return checked_mesh(given, unit)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Arrays as `mesh_from_arrays` takes them, and what is to be said of how they were read."""
+
+    points: npt.ArrayLike
+    tetrahedra: npt.ArrayLike
+    labels: npt.ArrayLike | None = None
+    names: Mapping[int, str] = field(default_factory=dict)
+    numbered_from: int | None = 0
+    repairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
+    """The mesh that arrays make, and the number that each of its nodes was given with, (k,).
+
+    Raises
+    ------
+    InputError
+        As `mesh_from_arrays`.
+    """
+    numbered = _numbered(given.points, given.tetrahedra, given.numbered_from)
+    regions = None if given.labels is None else whole_numbers(given.labels, len(numbered.corners))
+    if given.labels is not None and regions is None:
         raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
-    given = _mended(numbered)
-    mesh = _as_mesh(given, unit)
-    if regions is not None:
-        mesh = replace(mesh, regions=regions[given.cells], labels=dict(names or {}))
-    return replace(mesh, warnings=check_conformity(mesh))
+    mended = _without_copies(_turned(_without_flat(_joined(numbered))))
+    mesh = TetMesh(
+        mended.points,
+        mended.corners,
+        unit,
+        labels=dict(given.names),
+        repairs=(*given.repairs, *mended.repairs),
+        warnings=given.warnings,
+        **({} if regions is None else {"regions": regions[mended.cells]}),
+    )
+    found = check_facets(mesh)
+    if found:
+        mesh = replace(mesh, warnings=(*given.warnings, *found))
+    # So that it is not checked again when it is solved on.
+    mesh.remembered(check_conformity, lambda: found)
+    return mesh, mended.nodes
 
 
 def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
     """`mesh_from_arrays` without labels, and the number that each of the mesh's nodes was given with, (k,)."""
-    given = _mended(_numbered(points, cells))
-    mesh = _as_mesh(given, unit)
-    return replace(mesh, warnings=check_conformity(mesh)), given.nodes
+    return checked_mesh(Given(points, cells), unit)
 
 
 def unjoined(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
@@ -124,15 +158,7 @@ def unjoined(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> t
         The number that each of its nodes was given with.
     """
     given = _turned(_numbered(points, cells))
-    return _as_mesh(given, unit), given.nodes
-
-
-def _as_mesh(given: _Tetrahedra, unit: str) -> TetMesh:
-    return TetMesh(given.points, given.corners, unit, repairs=given.repairs)
-
-
-def _mended(given: _Tetrahedra) -> _Tetrahedra:
-    return _without_copies(_turned(_without_flat(_joined(given))))
+    return TetMesh(given.points, given.corners, unit), given.nodes
 
 
 def _numbered(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
@@ -215,7 +241,9 @@ def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
         return given
     first = np.zeros(len(given.corners), dtype=bool)
     first[np.unique(np.sort(given.corners, axis=1), axis=0, return_index=True)[1]] = True
-    return given.only(first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once.")
+    found = given.only(first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once.")
+    check_overlap(found.corners, len(found.points))
+    return found
 
 
 def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:

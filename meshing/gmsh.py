@@ -6,7 +6,7 @@ Unlike meshio this reads files in which only some entities have a physical group
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -62,20 +62,13 @@ def read_gmsh(path: Path) -> RawMesh:
     modern = version == "4.1"
     groups = _entity_groups(words, sections.get("Entities")) if modern else {}
     tags, points = (_nodes_4 if modern else _nodes_2)(words, sections["Nodes"])
-    elements = (_elements_4 if modern else _elements_2)(words, sections["Elements"])
+    found = _elements_4(words, sections["Elements"], groups) if modern else _elements_2(words, sections["Elements"])
+    elements = _in_order(found)
     find = _numbering(tags)
     blocks = [(block.kind, find(block.nodes)) for block in elements]
+    physical = [block.physical for block in elements]
     names = _names(sections.get("PhysicalNames", b""))
-    if modern:
-        several = sum(len(found) > 1 for (dimension, _), found in groups.items() if dimension == 3)
-        physical = [
-            np.full(len(b.nodes), next(iter(groups.get((b.dimension, int(b.entity[0])), [])), 0))
-            if len(b.nodes)
-            else b.entity
-            for b in elements
-        ]
-    else:
-        several, physical = 0, [block.physical for block in elements]
+    several = sum(len(found) > 1 for (dimension, _), found in groups.items() if dimension == 3)
     notes: tuple[str, ...] = ()
     if several:
         notes = (f"{several} volumes are in several physical groups; the first of each is its label.",)
@@ -114,10 +107,12 @@ def _names(section: bytes) -> dict[int, str]:
 
 @dataclass(frozen=True, eq=False)
 class _Elements:
-    """Elements of one kind: their entity and physical group (m,), and nodes (m, k)."""
+    """Elements of one kind: their number, entity and physical group (m,), and nodes (m, k)."""
+
+    columns: ClassVar = ("number", "entity", "physical", "nodes")
 
     kind: str
-    dimension: int
+    number: IntArray
     entity: IntArray
     physical: IntArray
     nodes: IntArray
@@ -206,15 +201,29 @@ def _nodes_4(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArr
     return np.concatenate(tags), np.vstack(points)
 
 
-def _elements_4(words: _Text | _Binary, section: bytes) -> list[_Elements]:
+def _elements_4(words: _Text | _Binary, section: bytes, groups: dict[tuple[int, int], list[int]]) -> list[_Elements]:
     words.start(section)
     found = []
     for _ in range(int(words.take(4, "u")[0])):
         dimension, entity, kind = words.take(3, "i").tolist()
         count = int(words.take(1, "u")[0])
         name, nodes = _kind(kind)
-        each = words.take((1 + nodes) * count, "u").reshape(count, 1 + nodes)[:, 1:]
-        found.append(_Elements(name, dimension, np.full(count, entity), np.zeros(count, np.int64), each))
+        rows = words.take((1 + nodes) * count, "u").reshape(count, 1 + nodes)
+        group = next(iter(groups.get((dimension, entity), [])), 0)
+        found.append(_Elements(name, rows[:, 0], np.full(count, entity), np.full(count, group), rows[:, 1:]))
+    return found
+
+
+def _in_order(blocks: list[_Elements]) -> list[_Elements]:
+    """Elements of each kind together, by their numbers."""
+    kinds: dict[tuple[str, int], list[_Elements]] = {}
+    for block in blocks:
+        kinds.setdefault((block.kind, block.nodes.shape[1]), []).append(block)
+    found = []
+    for (kind, _), same in kinds.items():
+        columns = [np.concatenate([getattr(each, name) for each in same]) for name in _Elements.columns]
+        order = np.argsort(columns[0], kind="stable")
+        found.append(_Elements(kind, *(column[order] for column in columns)))
     return found
 
 
@@ -256,10 +265,12 @@ def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
     found = []
     for (kind, tags), starts in places.items():
         name, nodes = _kind(kind)
-        rows = flat[np.array(starts)[:, None] + np.arange(tags + nodes)]
+        first = np.array(starts)
+        rows = flat[first[:, None] + np.arange(tags + nodes)]
         none = np.zeros(len(rows), dtype=np.int64)
         physical, entity = (rows[:, i] if tags > i else none for i in (0, 1))
-        found.append(_Elements(name, 0, entity, np.abs(physical), rows[:, tags:]))
+        number = flat[first - (1 if binary else 3)]
+        found.append(_Elements(name, number, entity, np.abs(physical), rows[:, tags:]))
     return found
 
 

@@ -79,7 +79,7 @@ class TetMesh:
             # Zeros that take no memory.
             object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(t)))
         elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu":
-            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many regions, an integer for each.")
+            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, all integers.")
         bad = int((self.volumes <= 0).sum())
         if bad:
             raise InputError(f"{bad} of {len(t)} tetrahedra are inverted or flat; orient and clean the mesh.")
