@@ -28,7 +28,7 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step, System
 from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.conformity import check_conformity
+from tetlux.meshing.conformity import conformity_of
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.refine import refine
@@ -298,6 +298,8 @@ class _Scene:
         Of a mesh, if media are by label.
     mesh : TetMesh, optional
         That is used as it is.
+    checked : bool
+        Whether the mesh is the body itself, and had to be looked at.
     """
 
     surface: Surface
@@ -305,6 +307,7 @@ class _Scene:
     media: list[tuple[AnyMedium, ...]]
     labels: tuple[int, ...]
     mesh: TetMesh | None
+    checked: bool
 
     def by_label(self) -> list[MediaByLabel]:
         """The media of each scene by label, or by the number of the region."""
@@ -336,7 +339,9 @@ class _Scene:
             found = warnings_for_regions(self.inner, self.media[number])
         if not given:
             return found
-        return [*found, *solution.mesh.repairs, *solution.mesh.warnings, *warnings_for_cavities(solution)]
+        mesh = solution.mesh
+        said = [*mesh.repairs, *mesh.warnings, *(conformity_of(mesh) if self.checked else ())]
+        return [*found, *said, *warnings_for_cavities(solution)]
 
 
 def _scene(
@@ -348,7 +353,7 @@ def _scene(
 ) -> _Scene:
     """A body and its media, checked."""
     if isinstance(body, TetMesh):
-        body.remembered(check_conformity, lambda: check_conformity(body))
+        conformity_of(body)
     surface = body.surface if isinstance(body, TetMesh) else body
     for number, region in enumerate(regions, 1):
         if not isinstance(region, Region):
@@ -361,7 +366,7 @@ def _scene(
         _check_mesh(mesh, surface, None if labels else len(inner))
     for each in dict.fromkeys(media):
         check_media(surface, each)
-    return _Scene(surface, inner, media, labels, mesh)
+    return _Scene(surface, inner, media, labels, mesh, isinstance(body, TetMesh))
 
 
 @dataclass(frozen=True, eq=False)
@@ -437,6 +442,8 @@ def _check_mesh(mesh: TetMesh, surface: Surface, regions: int | None) -> None:
 def _labelled(body: Surface | TetMesh, mesh: TetMesh | None) -> TetMesh:
     """The mesh that labels are of."""
     found = body if isinstance(body, TetMesh) else mesh
+    if isinstance(body, TetMesh):
+        conformity_of(body)
     if found is None:
         raise InputError(
             "media by label go with a mesh of labelled tetrahedra; give a surface one medium, and regions."

@@ -72,6 +72,11 @@ def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
     return check_facets(mesh)
 
 
+def conformity_of(mesh: TetMesh) -> tuple[str, ...]:
+    """`check_conformity`, once for each mesh."""
+    return mesh.remembered(check_conformity, lambda: check_conformity(mesh))
+
+
 def check_facets(mesh: TetMesh) -> tuple[str, ...]:
     """The part of `check_conformity` that looks at the boundary."""
     against, inside = _covered_facets(mesh)

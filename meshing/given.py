@@ -197,12 +197,15 @@ def _used(points: FloatArray, corners: IntArray, nodes: IntArray) -> tuple[Float
 def _joined(given: _Tetrahedra) -> _Tetrahedra:
     """One node for all that lie at one place."""
     points, corners = given.points, given.corners
-    edges = points[corners[:, EDGES]]
-    lengths = np.linalg.norm(edges[:, :, 1] - edges[:, :, 0], axis=2)
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    shortest = float(lengths[lengths > SAME_PLACE * diagonal].min(initial=diagonal))
-    near = min(SAME_PLACE * diagonal, OF_SHORTEST_EDGE * shortest)
+    near = SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    if len(pairs) == 0:
+        return given
+    # Nodes of a tetrahedron that small are not one node.
+    starts, ends = points[corners[:, EDGES]].transpose(2, 0, 1, 3)
+    lengths = np.linalg.norm(ends - starts, axis=2)
+    shortest = float(lengths.min(initial=near / OF_SHORTEST_EDGE, where=lengths > 0.0))
+    pairs = pairs[np.linalg.norm(np.diff(points[pairs], axis=1)[:, 0], axis=1) <= OF_SHORTEST_EDGE * shortest]
     if len(pairs) == 0:
         return given
     size = len(points)

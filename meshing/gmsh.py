@@ -161,6 +161,12 @@ class _Binary:
         self._place += count * of_kind.itemsize
         return found.astype(np.float64 if kind == "d" else np.int64)
 
+    def numbered_points(self, count: int) -> tuple[IntArray, FloatArray]:
+        """Rows of a number of 4 bytes and three of 8."""
+        row = np.dtype([("number", self._types["i"]), ("place", self._types["d"], 3)])
+        found = np.frombuffer(self._section, row, count, self._place)
+        return found["number"].astype(np.int64), found["place"].astype(np.float64)
+
     @property
     def rest(self) -> IntArray:
         return self.take((len(self._section) - self._place) // 4, "i")
@@ -233,9 +239,7 @@ def _nodes_2(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArr
     if isinstance(words, _Text):
         table = words.take(4 * count, "d").reshape(count, 4)
         return table[:, 0].astype(np.int64), np.ascontiguousarray(table[:, 1:])
-    # A whole number of 4 bytes and three of 8, row by row.
-    raw = words.take(7 * count, "i").astype(np.int32).reshape(count, 7)
-    return raw[:, 0].astype(np.int64), np.ascontiguousarray(raw[:, 1:]).view(np.float64)
+    return words.numbered_points(count)
 
 
 def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
@@ -255,8 +259,8 @@ def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
             (kind, tags), follow = numbers[place + 1 : place + 3], 1
             place += 3
         width = tags + _kind(kind)[1] + (1 if binary else 0)
-        if follow < 1 or tags < 0:
-            raise ValueError("a block of no elements")
+        if follow < 1 or tags < 0 or place + width * follow > len(numbers):
+            raise ValueError("a block of no elements, or of more than there are")
         # Where the tags begin.
         first = place + (1 if binary else 0)
         places.setdefault((kind, tags), []).extend(range(first, first + width * follow, width))
@@ -265,11 +269,11 @@ def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
     found = []
     for (kind, tags), starts in places.items():
         name, nodes = _kind(kind)
-        first = np.array(starts)
-        rows = flat[first[:, None] + np.arange(tags + nodes)]
+        begin = np.array(starts)
+        rows = flat[begin[:, None] + np.arange(tags + nodes)]
         none = np.zeros(len(rows), dtype=np.int64)
         physical, entity = (rows[:, i] if tags > i else none for i in (0, 1))
-        number = flat[first - (1 if binary else 3)]
+        number = flat[begin - (1 if binary else 3)]
         found.append(_Elements(name, number, entity, np.abs(physical), rows[:, tags:]))
     return found
 

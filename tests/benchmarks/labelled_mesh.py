@@ -24,7 +24,7 @@ LIMIT = 6.0
 
 
 def labelled_cube(cubes: int) -> TetMesh:
-    """A cube whose upper face is z = 0: label 1 to a depth of 5, 2 to one of 10, 3 below, and an island of 4 in that."""
+    """A cube below z = 0: label 1 to a depth of 5, 2 to one of 10, 3 below, and an island of 4 in that."""
     points, tetrahedra, places = cube_of_cubes(cubes, 1.0)
     depth = cubes - places[:, 2]
     labels = np.select([depth <= 5, depth <= 10], [1, 2], 3)
