@@ -1,6 +1,8 @@
 """Whether tetrahedra fill a body without gaps and overlaps: each face between two of them, or on the boundary."""
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.blocks import grouped
@@ -82,7 +84,10 @@ def check_facets(mesh: TetMesh) -> tuple[str, ...]:
     against, inside = _covered_facets(mesh)
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:
-        return ()
+        parts = _parts(mesh)
+        return (
+            () if parts == 1 else (f"the mesh is {parts} parts without a common node; no light passes between them.",)
+        )
     figure = f"{area:.3g} {mesh.unit}²"
     if area <= MOST_INSIDE * mesh.area:
         return (f"{figure} of the mesh's boundary face each other inside it; no light passes there.",)
@@ -96,6 +101,15 @@ def check_facets(mesh: TetMesh) -> tuple[str, ...]:
         "light would pass there; mesh the parts together, so that they share the nodes between them (in gmsh with "
         "BooleanFragments or Coherence), or give doubled nodes to mesh_from_arrays, which joins them."
     )
+
+
+def _parts(mesh: TetMesh) -> int:
+    """How many parts it has that have no node in common."""
+    size = len(mesh.points)
+    used = np.unique(mesh.tetrahedra).size
+    links = coo_array((np.ones(len(mesh.edges), dtype=bool), mesh.edges.T), shape=(size, size))
+    # A node that no tetrahedron uses is a part of its own.
+    return int(connected_components(links, directed=False)[0]) - (size - used)
 
 
 def _covered_facets(mesh: TetMesh) -> tuple[BoolArray, BoolArray]:

@@ -103,6 +103,7 @@ def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels:
             corners,
             found.values,
             found.names,
+            numbered_from=None,
             repairs=notes,
             warnings=(*raw.notes, *found.notes),
         )
@@ -115,7 +116,7 @@ def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels:
 def _read(path: Path) -> RawMesh:
     suffix = path.suffix.lower()
     named = nirfast.nirfast_files(path) if suffix in nirfast.SUFFIXES or not is_file(path) else {}
-    beside = suffix == ".node" and ".elem" not in named and is_file(path)
+    beside = suffix == ".node" and ".elem" not in named and is_file(path.with_suffix(".ele"))
     try:
         if named and not beside and (suffix in nirfast.SUFFIXES or ".elem" in named):
             return nirfast.read_nirfast(named)

@@ -244,7 +244,9 @@ def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
         return given
     first = np.zeros(len(given.corners), dtype=bool)
     first[np.unique(np.sort(given.corners, axis=1), axis=0, return_index=True)[1]] = True
-    found = given.only(first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once.")
+    found = given.only(
+        first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once, as the first of each."
+    )
     check_overlap(found.corners, len(found.points))
     return found
 

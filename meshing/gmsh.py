@@ -130,11 +130,17 @@ class _Text:
         if count < 0 or len(found) < count:
             raise ValueError("the section is too short")
         self._place += count
-        return found if kind == "d" else found.astype(np.int64)
+        return found if kind == "d" else self._whole(found)
 
     @property
     def rest(self) -> IntArray:
-        return self._values[self._place :].astype(np.int64)
+        return self._whole(self._values[self._place :])
+
+    @staticmethod
+    def _whole(values: FloatArray) -> IntArray:
+        if not (np.abs(values) < 2.0**53).all():
+            raise ValueError("a whole number is none, or too large")
+        return values.astype(np.int64)
 
 
 class _Binary:

@@ -76,6 +76,9 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
             raise InputError(f'the values of "{name}" are no whole numbers, one for each tetrahedron.')
         return Labels(values, _names(raw, name, values))
     candidates = _candidates(raw)
+    odd = " and ".join(f'"{each}"' for each in raw.arrays if each.lower() in ORDER and each not in candidates)
+    not_whole = (f"its array {odd} holds no whole numbers, one for each tetrahedron, and is not taken for labels.",)
+    notes = not_whole if odd else ()
     likely = sorted((each for each in candidates if each.lower() in ORDER), key=lambda each: ORDER[each.lower()])
     if not likely and raw.sets:
         return _labels_of_sets(raw)
@@ -83,11 +86,11 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
     if chosen is None:
         several = " and ".join(f'"{each}"' for each in candidates)
         note = f"its arrays {several} may be labels; choose one of them, or all tetrahedra are of label 0."
-        return Labels(notes=(note,) if several else ())
+        return Labels(notes=(*notes, note) if several else notes)
     values = candidates[chosen]
     if chosen == ENTITY and len(np.unique(values)) == 1:
         return Labels(notes=("it has no physical groups of volumes; all tetrahedra are of label 0.",))
-    return Labels(values, _names(raw, chosen, values), _notes(chosen, values, list(candidates)))
+    return Labels(values, _names(raw, chosen, values), (*notes, *_notes(chosen, values, list(candidates))))
 
 
 def _notes(chosen: str, values: IntArray, candidates: list[str]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ def nirfast_files(path: Path) -> dict[str, Path]:
     wanted = {f"{stem}{suffix}".lower(): suffix for suffix in SUFFIXES}
     try:
         beside = sorted(path.parent.iterdir())
-    except OSError:
+    except (OSError, ValueError):  # a name may be none that a folder can have
         return {}
     found = {wanted[file.name.lower()]: file for file in beside if file.name.lower() in wanted and is_file(file)}
     exact = {suffix: path.parent / f"{stem}{suffix}" for suffix in SUFFIXES}

@@ -97,7 +97,9 @@ def test_tetrahedra_given_several_times_count_once(copies: int) -> None:
     many = np.vstack([TETRAHEDRA] * copies)
     mesh = mesh_from_arrays(POINTS, many)
     assert mesh.volume == pytest.approx(8000.0)
-    assert mesh.repairs == (f"{384 * (copies - 1)} tetrahedra that are given more than once were counted once.",)
+    assert mesh.repairs == (
+        f"{384 * (copies - 1)} tetrahedra that are given more than once were counted once, as the first of each.",
+    )
     # Two files in one: the nodes are there as often.
     points = np.vstack([POINTS] * copies)
     numbers = TETRAHEDRA + len(POINTS) * np.arange(copies)[:, None, None]
@@ -124,7 +126,10 @@ def test_what_overlaps_is_refused() -> None:
         mesh_from_arrays(corners, [[0, 1, 2, 3], [0, 1, 2, 4]])
     # Bodies apart from each other do not.
     apart = np.vstack([POINTS, POINTS + np.array([25.0, 0, 0])])
-    assert mesh_from_arrays(apart, np.vstack([TETRAHEDRA, TETRAHEDRA + len(POINTS)])).volume == pytest.approx(16000.0)
+    mesh = mesh_from_arrays(apart, np.vstack([TETRAHEDRA, TETRAHEDRA + len(POINTS)]))
+    assert mesh.volume == pytest.approx(16000.0)
+    assert mesh.warnings == ("the mesh is 2 parts without a common node; no light passes between them.",)
+    assert mesh.warnings[0] in solve(mesh, TISSUE, LIGHT, tolerance=0.9).warnings
 
 
 def test_flat_tetrahedra_are_left_out_where_that_leaves_no_gap() -> None:

@@ -147,6 +147,10 @@ def test_which_array_is_the_labels(tmp_path: Path) -> None:
         InputError, match='it holds no array "tissue" of cell values; the arrays there are: numbers, la'
     ):
         read_mesh(path, labels="tissue")
+    with_values(path, region=LABELS + 0.5)
+    assert read_mesh(path).warnings == (
+        'its array "region" holds no whole numbers, one for each tetrahedron, and is not taken for labels.',
+    )
     with_values(path, odd=LABELS)
     assert read_mesh(path).warnings == ('labels are the array "odd".',)
     with_values(path, odd=LABELS, even=LABELS)
@@ -212,8 +216,18 @@ def test_nirfast_files_that_are_wrong(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"4 columns and head\.v2\.elem 3; give a mark and three coordinates"):
         read_mesh(stem)
     Path(f"{stem}.elem").unlink()
+    for suffix in (".region", ".node"):
+        with pytest.raises(InputError, match=r"needs the \.elem file of the same name beside it"):
+            read_mesh(Path(f"{stem}{suffix}"))
     with pytest.raises(InputError, match=r"needs the \.elem file of the same name beside it"):
         read_mesh(Path(f"{stem}.region"))
+
+
+def test_numbers_from_one_are_recognised(tmp_path: Path) -> None:
+    meshio.Mesh(POINTS, [("tetra", TETRAHEDRA + 1)], cell_data={"region": [LABELS]}).write(tmp_path / "a.vtu")
+    mesh = read_mesh(tmp_path / "a.vtu")
+    assert halves(mesh)
+    assert mesh.repairs == ("nodes are numbered from 1.",)
 
 
 def test_other_cells(tmp_path: Path) -> None:
