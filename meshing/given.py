@@ -254,7 +254,7 @@ def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
 def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:
     """Values as integers, if there are so many and they are whole and below 2^31, whatever their type; else None."""
     array = np.asarray(values)
-    if array.size != count or array.ndim > 2 or array.shape[:1] != (count,) or array.dtype.kind not in "iuf":
+    if array.size != count or array.ndim > 2 or array.shape[:1] != (count,) or array.dtype.kind not in "biuf":
         return None
     numbers = array.reshape(-1).astype(np.float64)
     if not (np.isfinite(numbers).all() and (numbers == np.round(numbers)).all()) or np.abs(numbers).max() >= 2**31:
