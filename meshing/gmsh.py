@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.gmsh_numbers import BinaryNumbers, TextNumbers
 from tetlux.meshing.raw import RawMesh
 
+Numbers = TextNumbers | BinaryNumbers
 PHYSICAL, ENTITY = "gmsh:physical", "gmsh:geometrical"
 # Element types: what meshio calls them, and how many nodes they have. Corners come first in all of them.
 _POINTS = {15: ("vertex", 1)}
@@ -58,7 +59,7 @@ def read_gmsh(path: Path) -> RawMesh:
     if version not in ("2", "2.0", "2.1", "2.2", "4.1"):
         raise InputError(f"it is of gmsh's version {version}; save it as version 4.1 or 2.2.")
     big = binary and head[3][:4] == b"\0\0\0\1"
-    words = _Binary(big) if binary else _Text()
+    words = BinaryNumbers(big) if binary else TextNumbers()
     modern = version == "4.1"
     groups = _entity_groups(words, sections.get("Entities")) if modern else {}
     tags, points = (_nodes_4 if modern else _nodes_2)(words, sections["Nodes"])
@@ -118,72 +119,12 @@ class _Elements:
     nodes: IntArray
 
 
-class _Text:
-    """Numbers of text, which are all alike."""
-
-    def start(self, section: bytes) -> None:
-        self._values = np.array(section.split(), dtype=np.float64)
-        self._place = 0
-
-    def take(self, count: int, kind: str) -> npt.NDArray[Any]:
-        found = self._values[self._place : self._place + count]
-        if count < 0 or len(found) < count:
-            raise ValueError("the section is too short")
-        self._place += count
-        return found if kind == "d" else self._whole(found)
-
-    @property
-    def rest(self) -> IntArray:
-        return self._whole(self._values[self._place :])
-
-    @staticmethod
-    def _whole(values: FloatArray) -> IntArray:
-        if not (np.abs(values) < 2.0**53).all():
-            raise ValueError("a whole number is none, or too large")
-        return values.astype(np.int64)
-
-
-class _Binary:
-    """Numbers of bytes: ``i`` of 4, ``u`` and ``d`` of 8."""
-
-    def __init__(self, big: bool) -> None:
-        order = ">" if big else "<"
-        self._types = {"i": np.dtype(order + "i4"), "u": np.dtype(order + "i8"), "d": np.dtype(order + "f8")}
-
-    def start(self, section: bytes) -> None:
-        self._section, self._place = section, 0
-
-    def line(self) -> int:
-        """A whole number that stands in a line of text."""
-        end = self._section.index(b"\n", self._place)
-        number, self._place = int(self._section[self._place : end]), end + 1
-        return number
-
-    def take(self, count: int, kind: str) -> npt.NDArray[Any]:
-        of_kind = self._types[kind]
-        if count < 0 or self._place + count * of_kind.itemsize > len(self._section):
-            raise ValueError("the section is too short")
-        found = np.frombuffer(self._section, of_kind, count, self._place)
-        self._place += count * of_kind.itemsize
-        return found.astype(np.float64 if kind == "d" else np.int64)
-
-    def numbered_points(self, count: int) -> tuple[IntArray, FloatArray]:
-        """Rows of a number of 4 bytes and three of 8."""
-        row = np.dtype([("number", self._types["i"]), ("place", self._types["d"], 3)])
-        found = np.frombuffer(self._section, row, count, self._place)
-        return found["number"].astype(np.int64), found["place"].astype(np.float64)
-
-    @property
-    def rest(self) -> IntArray:
-        return self.take((len(self._section) - self._place) // 4, "i")
-
-
-def _count(words: _Text | _Binary) -> int:
+def _count(words: Numbers) -> int:
     """The number of entries that version 2 begins a section with."""
-    return words.line() if isinstance(words, _Binary) else int(words.take(1, "i")[0])
+    return words.line() if isinstance(words, BinaryNumbers) else int(words.take(1, "i")[0])
 
 
-def _entity_groups(words: _Text | _Binary, section: bytes | None) -> dict[tuple[int, int], list[int]]:
+def _entity_groups(words: Numbers, section: bytes | None) -> dict[tuple[int, int], list[int]]:
     """Physical groups of each entity, by its dimension and number."""
     found: dict[tuple[int, int], list[int]] = {}
     if section is None:
@@ -200,7 +141,7 @@ def _entity_groups(words: _Text | _Binary, section: bytes | None) -> dict[tuple[
     return found
 
 
-def _nodes_4(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArray]:
+def _nodes_4(words: Numbers, section: bytes) -> tuple[IntArray, FloatArray]:
     words.start(section)
     tags: list[IntArray] = []
     points: list[FloatArray] = []
@@ -213,7 +154,7 @@ def _nodes_4(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArr
     return np.concatenate(tags), np.vstack(points)
 
 
-def _elements_4(words: _Text | _Binary, section: bytes, groups: dict[tuple[int, int], list[int]]) -> list[_Elements]:
+def _elements_4(words: Numbers, section: bytes, groups: dict[tuple[int, int], list[int]]) -> list[_Elements]:
     words.start(section)
     found = []
     for _ in range(int(words.take(4, "u")[0])):
@@ -239,22 +180,22 @@ def _in_order(blocks: list[_Elements]) -> list[_Elements]:
     return found
 
 
-def _nodes_2(words: _Text | _Binary, section: bytes) -> tuple[IntArray, FloatArray]:
+def _nodes_2(words: Numbers, section: bytes) -> tuple[IntArray, FloatArray]:
     words.start(section)
     count = _count(words)
-    if isinstance(words, _Text):
+    if isinstance(words, TextNumbers):
         table = words.take(4 * count, "d").reshape(count, 4)
         return table[:, 0].astype(np.int64), np.ascontiguousarray(table[:, 1:])
     return words.numbered_points(count)
 
 
-def _elements_2(words: _Text | _Binary, section: bytes) -> list[_Elements]:
+def _elements_2(words: Numbers, section: bytes) -> list[_Elements]:
     """Elements of version 2, each with a head of its own in text, and with one for several in binary."""
     words.start(section)
     count = _count(words)
     flat = words.rest
     numbers: Sequence[int] = flat.tolist()
-    binary = isinstance(words, _Binary)
+    binary = isinstance(words, BinaryNumbers)
     places: dict[tuple[int, int], list[int]] = {}
     place, done = 0, 0
     while done < count:

@@ -384,7 +384,9 @@ def traps() -> Iterator[tuple[str, bytes]]:
         ),
     ):
         for place in ("surface", "spot", "environment", "array", "volume", "images", "mesh"):
-            data = copy.deepcopy(RIGHT[{"surface": 1, "spot": 1, "environment": 1, "images": 4, "mesh": 5}.get(place, 3)])
+            data = copy.deepcopy(
+                RIGHT[{"surface": 1, "spot": 1, "environment": 1, "images": 4, "mesh": 5}.get(place, 3)]
+            )
             if place == "surface":
                 data["surface"]["file"] = file
             elif place == "spot":
