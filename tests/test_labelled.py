@@ -43,7 +43,7 @@ def test_an_island_within_a_shell() -> None:
     assert solution.power.absorbed == pytest.approx(0.3434, abs=5e-5)
     assert solution.mesh is HEAD
     assert solution.power.balance_error == pytest.approx(0.0, abs=1e-12)
-    # Neither is 0.4 with one medium throughout.
+    # The default: lumped mass, no fluence below zero.
     assert absorbed(HEAD, {0: TISSUE, 1: FLUID}) == pytest.approx(0.33397, abs=1e-4)
 
 
