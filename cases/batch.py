@@ -49,10 +49,28 @@ def check_all(requests: Sequence[str]) -> int:
         if len(first.channels) > 1:
             runs += f"channels {', '.join(first.channel_names)}; "
         size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
-        print(f"{request}: right; {runs}{len(surface.faces):,} triangles, {size} {surface.unit}")
-        for note in (*first.repairs, *surface.warnings, *first.region_warnings):
+        print(f"{request}: right; {runs}{_size(first)}, {size} {surface.unit}")
+        for note in (*_labels(first), *first.repairs, *surface.warnings, *first.region_warnings):
             print(f"  {note}")
     return 2 if wrong else 0
+
+
+def _size(case: Case) -> str:
+    if case.mesh is None:
+        return f"{len(case.surface.faces):,} triangles"
+    return f"{len(case.mesh.points):,} nodes, {len(case.mesh.tetrahedra):,} tetrahedra"
+
+
+def _labels(case: Case) -> list[str]:
+    """What a mesh that is given consists of, and what is to be known of it."""
+    if case.mesh is None:
+        return []
+    mesh = case.mesh
+    lines = []
+    for label, volume in mesh.region_volumes.items():
+        count = int((mesh.regions == label).sum())
+        lines.append(f"label {mesh.named([label])}: {count:,} tetrahedra, {volume:.4g} {mesh.unit}³")
+    return [*lines, *mesh.warnings]
 
 
 def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:

@@ -1,33 +1,31 @@
 """`Case`: one run, ready to be solved; and how a case file becomes a list of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tetlux.cases.body import Body, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
-from tetlux.cases.document import Document, Key, read_document
-from tetlux.cases.lighting import BODY, keys_of, light_names, light_of
-from tetlux.cases.media import media_of
+from tetlux.cases.document import Document, read_document
+from tetlux.cases.lighting import keys_of, light_names, light_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
 from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
-from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.paths import exists
 from tetlux.meshing.read import SUFFIXES
-from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +36,17 @@ class Channel:
     ----------
     name : str
     medium : Medium or VaryingMedium
-        Of the body.
+        Of the body, or of the outermost label of a mesh.
     lights : mapping of str to Light
         Those that are not dark in it, by name.
+    media : Medium, VaryingMedium, or mapping of int to these
+        The medium, or that of each label of a mesh.
     """
 
     name: str
     medium: AnyMedium
     lights: Mapping[str, Light]
+    media: AnyMedium | MediaByLabel
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,8 @@ class Case:
         From where the surface is seen, unit.
     reading_seconds : float
         Spent on reading and checking the surface.
+    mesh : TetMesh, optional
+        Tetrahedra that are used as they are; `surface` is then their boundary.
     comparison : Comparison, optional
         Closed forms to hold the run against.
     """
@@ -88,6 +91,7 @@ class Case:
     camera: Vector | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
+    mesh: TetMesh | None = None
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -96,8 +100,8 @@ class Case:
 
     @property
     def repairs(self) -> tuple[str, ...]:
-        """What was mended when its surfaces were read."""
-        return self._of_surfaces("repairs")
+        """What was mended when its surfaces, or its mesh, were read."""
+        return self.mesh.repairs if self.mesh else self._of_surfaces("repairs")
 
     @property
     def region_warnings(self) -> tuple[str, ...]:
@@ -117,7 +121,8 @@ class Case:
     @property
     def is_simple(self) -> bool:
         """Whether it is of one channel and one medium, the same everywhere."""
-        return len(self.channels) == 1 and not self.regions and isinstance(self.channels[0].medium, Medium)
+        channel = self.channels[0]
+        return len(self.channels) == 1 and not self.regions and self.mesh is None and isinstance(channel.medium, Medium)
 
     @property
     def medium(self) -> Medium:
@@ -177,24 +182,19 @@ def load_cases(path: Path) -> list[Case]:
 
 def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:
     reader.seconds = 0.0
-    with document.at(("surface",)):
-        surface = reader.surface(spec.surface, spec.unit)
-        check_thickness(surface)
     channels = channel_names(document, spec)
-    media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
-    with document.at(("surface",)):
-        for medium in media:
-            check_size(surface, base_of(medium))
-    region_names, regions = _regions(document, spec, surface, media, reader)
+    body = body_of(document, spec, len(channels), reader)
+    surface, media = body.surface, body.media
     names = light_names(spec)
     check_different(document, "lights", names)
     _check_value_names(document, channels, names)
-    lights, deposits = _lights(document, spec, names, surface, media, region_names, channels, reader)
+    lights, deposits = _lights(document, spec, names, body, channels, reader)
     with document.at(("compare",)):
         comparison = None
         if spec.compare:
-            if len(media) > 1 or regions or not isinstance(media[0], Medium):
+            if len(media) > 1 or body.regions or not isinstance(media[0], Medium):
                 raise InputError("closed forms are those of one channel and one even medium; leave compare out.")
+            assert spec.surface is not None
             comparison = comparison_for(spec.surface, media[0], deposits, spec.compare)
     check_different(document, "detectors", [detector.name for detector in spec.detectors])
     sensors = []
@@ -208,9 +208,10 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
         name=name,
         source=document.path,
         surface=surface,
-        channels=tuple(map(Channel, channels, media, lights)),
+        channels=tuple(map(Channel, channels, media, lights, body.by_label or media)),
         light_names=names,
-        regions=regions,
+        regions=body.regions,
+        mesh=body.mesh,
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         sensors=tuple(sensors),
@@ -220,51 +221,27 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     )
 
 
-def _regions(
-    document: Document, spec: CaseSpec, surface: Surface, media: tuple[AnyMedium, ...], reader: Reader
-) -> tuple[tuple[str, ...], tuple[Region, ...]]:
-    """Names of the regions, and the regions."""
-    names = tuple(region.name or f"region_{i}" for i, region in enumerate(spec.regions, 1))
-    check_different(document, "regions", names)
-    if BODY in names:
-        raise document.error(("regions", names.index(BODY)), f'"{BODY}" is what is outside all regions; rename it.')
-    regions = []
-    for i, region in enumerate(spec.regions):
-        key: Key = ("regions", i)
-        with document.at((*key, "surface")):
-            inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
-        own = media_of(document, (*key, "medium"), region.medium, inner, len(media), reader)
-        with document.at((*key, "medium")):
-            for outside, inside in zip(media, own, strict=True):
-                check_media(surface, [base_of(outside), base_of(inside)])
-        regions.append(Region(inner, own))
-    with document.at(("regions",)):
-        check_regions(surface, [region.surface for region in regions])
-    return names, tuple(regions)
-
-
 def _lights(
     document: Document,
     spec: CaseSpec,
     names: tuple[str, ...],
-    surface: Surface,
-    media: tuple[AnyMedium, ...],
-    regions: tuple[str, ...],
+    body: Body,
     channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
     """The lights of each channel by name, and what those of the first leave in the body."""
+    media = body.media
     lights: list[dict[str, Light]] = [{} for _ in media]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
         with document.at(("lights", i), keys_of(light_spec, reader)):
             for channel, medium in enumerate(media):
-                light = light_of(light_spec, channel, len(media), regions, reader)
+                light = light_of(light_spec, channel, len(media), body.parts, reader)
                 if light is None:
                     continue
                 lights[channel][names[i]] = light
-                uniform = not regions and isinstance(medium, Medium)
-                deposit = light.deposit_in(surface, base_of(medium), uniform=uniform)
+                uniform = body.is_uniform and isinstance(medium, Medium)
+                deposit = light.deposit_in(body.surface, base_of(medium), uniform=uniform)
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):

@@ -120,6 +120,7 @@ def scene_of(case: Case, *, quick: bool = False) -> Scene:
     shape = spec_of(case).surface
     surface, medium = case.surface, case.medium
     deposits = [light.deposit_in(surface, medium) for light in case.lights]
+    assert shape is not None
     samples = Samples(*surface_samples(surface, *lit_points(deposits, medium)))
     measured = _in_closed_form(shape, medium, deposits, samples)
     if measured is None:

@@ -59,8 +59,8 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
     try:
         with claimed(out, case.name) as folder:
             solutions = solve_each(
-                case.surface,
-                [channel.medium for channel in case.channels],
+                case.mesh or case.surface,
+                [channel.media for channel in case.channels],
                 [list(channel.lights.values()) for channel in case.channels],
                 regions=case.regions,
                 tolerance=case.tolerance,
@@ -132,7 +132,8 @@ def _warnings(results: Results) -> list[str]:
     names, solutions = results.case.channel_names, results.solutions
     told: dict[str, list[str]] = {}
     for name, solution in zip(names, solutions, strict=True):
-        for warning in solution.warnings:
+        # What was mended is said when the case is read.
+        for warning in (each for each in solution.warnings if each not in results.case.repairs):
             told.setdefault(results.case.named(warning), []).append(name)
     return [
         *results.case.region_warnings,

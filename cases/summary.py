@@ -15,6 +15,7 @@ from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.libraries import installed_versions
+from tetlux.meshing.tetmesh import TetMesh
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
@@ -41,6 +42,7 @@ def summarize(
             "area": mesh.area,
             "surface_deviation": surface_deviation(mesh, case.surface),
             "min_quality": float(mesh.quality.min()),
+            **({"labels": _labels(case.mesh)} if case.mesh else {}),
         },
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
@@ -72,6 +74,12 @@ def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several
         lights = lights_in(list(channel.lights), solution)
         figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
     return figures
+
+
+def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
+    """Labels of a mesh that was given, their names if they have any, and their volumes."""
+    volumes = mesh.region_volumes.items()
+    return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
 
 
 def _power(power: Power) -> dict[str, float]:

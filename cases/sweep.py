@@ -56,7 +56,8 @@ def _assign(document: Document, data: dict[str, Any], key: str, value: object) -
     holder: Any = data
     try:
         for part in parts[:-1]:
-            holder = holder[part]
+            # The number of an item of a list, or of a label, which may be written as a word.
+            holder = holder[str(part) if isinstance(holder, dict) and part not in holder else part]
         holder[parts[-1]] = value
     except (KeyError, IndexError, TypeError) as error:
         raise document.error(

@@ -42,6 +42,8 @@ def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
         context = first.get("ctx", {})
         if first["type"] == "unknown_key":
             key = (*key, context["key"])
+        if first["type"] == "body":
+            key = () if "name" in context else ("mesh",)
         raise document.error(key, _sentence(first["type"], first["msg"], first.get("input"), key)) from failure
 
 
@@ -59,7 +61,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale"):
+    if kind in ("unknown_key", "one_of", "scale", "body"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"

@@ -1,6 +1,6 @@
 """What the media of a body are on each tetrahedron of a mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,8 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import TetMesh
 
 AnyMedium = Medium | VaryingMedium
+# Media by the regions or labels of a mesh that they fill: the body's own, or the outermost, first.
+MediaByLabel = Mapping[int, AnyMedium]
 # Barycentric coordinates of the points of a rule that is exact for quadratics, each of the same weight.
 _WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
 
@@ -85,23 +87,37 @@ def at_cells(value: float | FloatArray, cells: IntArray) -> FloatArray:
     return np.full(len(cells), value) if np.ndim(value) == 0 else np.asarray(value)[cells]
 
 
-def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
-    """Coefficients of a mesh whose region i is of medium i.
+def by_label(media: MediaByLabel | Sequence[AnyMedium]) -> MediaByLabel:
+    """Media by label: those of a sequence are of the body, and of its regions 1, 2, ..."""
+    return media if isinstance(media, Mapping) else dict(enumerate(media))
+
+
+def coefficients_on(mesh: TetMesh, media: MediaByLabel | Sequence[AnyMedium]) -> Coefficients:
+    """Coefficients of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    media : mapping of int to medium, or sequence of medium
+        By label; of a sequence medium i is that of region i. One medium is that of the whole mesh.
 
     Raises
     ------
     InputError
-        If a coefficient that varies is not known, or not sensible, somewhere on the mesh; or if the mesh has other
-        regions than there are media. One medium is that of the whole mesh.
+        If a coefficient that varies is not known, or not sensible, somewhere on the mesh; or if labels and media do not
+        go together.
     """
-    outer = base_of(media[0])
-    if len(media) == 1 and isinstance(media[0], Medium):
-        return coefficients_of(media[0])
-    regions = mesh.regions if len(media) > 1 else np.zeros_like(mesh.regions)
-    _check_regions(np.bincount(regions, minlength=len(media)), len(media))
+    labelled = by_label(media)
+    outer = next(iter(labelled.values()))
+    if len(labelled) == 1 and isinstance(outer, Medium):
+        return coefficients_of(outer)
+    if isinstance(media, Mapping):
+        check_labels(mesh, media)
+    elif len(media) > 1:
+        _check_regions(mesh, len(media))
     values = np.empty((4, len(mesh.tetrahedra)))
-    for region, medium in enumerate(media):
-        inside = np.flatnonzero(regions == region)
+    for label, medium in labelled.items():
+        inside = np.flatnonzero(mesh.regions == label) if len(labelled) > 1 else np.arange(len(mesh.tetrahedra))
         if isinstance(medium, Medium):
             values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington])[:, None]
             continue
@@ -112,15 +128,38 @@ def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
         peaked, forward = medium.delta_eddington(reduced)
         values[:, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
     each: list[FloatArray] = list(values)
-    return Coefficients(each[0], each[1], each[2], each[3], outer)
+    return Coefficients(each[0], each[1], each[2], each[3], base_of(outer))
 
 
-def _check_regions(sizes: IntArray, media: int) -> None:
-    """Refuse a mesh whose regions, by their numbers of tetrahedra, are not those that media are given for."""
-    if len(sizes) > media:
-        raise InputError(f"the mesh has {len(sizes) - 1} regions, and {media - 1} have a medium; give one for each.")
+def check_labels(mesh: TetMesh, labels: Iterable[int]) -> None:
+    """Refuse labels of a mesh that have no medium, and media of labels that it does not have.
+
+    Raises
+    ------
+    InputError
+    """
+    given = dict.fromkeys(labels)
+    without = [label for label in mesh.region_volumes if label not in given]
+    if without:
+        several = len(without) > 1
+        raise InputError(
+            f"the mesh's {'labels' if several else 'label'} {mesh.named(without)} {'have' if several else 'has'} no "
+            "medium; give one for each."
+        )
+    none = [label for label in given if label not in mesh.region_volumes]
+    if none:
+        raise InputError(
+            f"the mesh has no label {' and '.join(map(str, none))}; its labels are {mesh.named(mesh.region_volumes)}."
+        )
+
+
+def _check_regions(mesh: TetMesh, media: int) -> None:
+    """Refuse a mesh whose regions are not those that media are given for."""
+    most = max(mesh.region_volumes)
+    if most >= media:
+        raise InputError(f"the mesh has {most} regions, and {media - 1} have a medium; give one for each.")
     for region in range(1, media):
-        if sizes[region] == 0:
+        if region not in mesh.region_volumes:
             raise InputError(f"the mesh has no region {region}; make one that has, or leave the region out.")
 
 

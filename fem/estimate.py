@@ -192,7 +192,8 @@ def _averaging(mesh: TetMesh) -> Callable[[FloatArray], FloatArray]:
     """
     groups = mesh.tetrahedra
     if mesh.regions.any():
-        keys = groups * (int(mesh.regions.max()) + 1) + mesh.regions[:, None]
+        first = int(mesh.regions.min())
+        keys = groups * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
         groups = np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
     starts = np.arange(0, groups.size + 1, 4)
     shape = (int(groups.max()) + 1, len(groups))

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of, by_label
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
@@ -55,7 +55,7 @@ class Sources:
 def sources_of(
     lights: Sequence[Light],
     surface: Surface,
-    media: Sequence[AnyMedium],
+    media: MediaByLabel | Sequence[AnyMedium],
     subtract: Subtract,
     region_of: Callable[[FloatArray], IntArray] | None = None,
 ) -> Sources:
@@ -65,8 +65,8 @@ def sources_of(
     ----------
     lights : sequence of Light
     surface : Surface
-    media : sequence of Medium or VaryingMedium
-        Of the body, and of its regions.
+    media : sequence of Medium or VaryingMedium, or mapping of int to these
+        Of the body, and of its regions; or by label, that of the outermost first.
     subtract : {"half-space", "free-space", "nothing"}
     region_of : callable, optional
         The regions that points lie in, if there are several.
@@ -81,7 +81,9 @@ def sources_of(
     check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    uniform = len(media) == 1 and isinstance(media[0], Medium)
+    labelled = by_label(media)
+    outer = next(iter(labelled.values()))
+    uniform = len(labelled) == 1 and isinstance(outer, Medium)
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
@@ -89,9 +91,9 @@ def sources_of(
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract == "half-space"
     for number, light in enumerate(lights):
-        deposit = light.deposit_in(surface, base_of(media[0]), uniform=uniform)
+        deposit = light.deposit_in(surface, base_of(outer), uniform=uniform)
         find = _charges_in_one_medium if uniform else _charges_in_several
-        known, rest, found = find(deposit, surface, media, region_of, images=images, most=left)
+        known, rest, found = find(deposit, surface, labelled, region_of, images=images, most=left)
         left -= sum(len(some.positions) for some in found)
         charges += found
         owners += [number] * len(found)
@@ -121,10 +123,10 @@ _RegionOf = Callable[[FloatArray], IntArray] | None
 
 
 def _charges_in_one_medium(
-    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], _: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, surface: Surface, media: MediaByLabel, _: _RegionOf, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
-    medium = base_of(media[0])
+    medium = base_of(next(iter(media.values())))
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
     if len(deposit.starts):
@@ -138,10 +140,11 @@ def _charges_in_one_medium(
 
 
 def _charges_in_several(
-    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], region_of: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, surface: Surface, media: MediaByLabel, region_of: _RegionOf, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh."""
-    places = np.zeros(len(deposit.points), dtype=np.int64) if region_of is None else region_of(deposit.points)
+    outer = next(iter(media))
+    places = np.full(len(deposit.points), outer) if region_of is None else region_of(deposit.points)
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
         medium, inside = media[region], places == region
@@ -151,7 +154,7 @@ def _charges_in_several(
                 deposit.powers[inside],
                 surface,
                 medium,
-                images=images and region == 0,
+                images=images and region == outer,
                 most=most,
                 region=region,
             )

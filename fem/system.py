@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, at_surface, coefficients_on
+from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, at_surface, by_label, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
@@ -20,7 +20,7 @@ from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -45,8 +45,8 @@ class System:
     Parameters
     ----------
     mesh : TetMesh
-    medium : Medium or VaryingMedium
-        Of the body.
+    medium : Medium, VaryingMedium, or mapping of int to these
+        Of the body; or the medium of each label of the mesh, that of the outermost first.
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
     mass : {"lumped", "consistent"}
@@ -63,7 +63,7 @@ class System:
     """
 
     mesh: TetMesh
-    medium: AnyMedium
+    medium: AnyMedium | MediaByLabel
     surface: Surface | None = None
     mass: Mass = "lumped"
     expected: int = 1
@@ -72,9 +72,11 @@ class System:
     limit: bool = True
 
     @property
-    def media(self) -> tuple[AnyMedium, ...]:
-        """Those of the body and of its regions."""
-        return (self.medium, *(only_medium(region) for region in self.regions))
+    def media(self) -> MediaByLabel | tuple[AnyMedium, ...]:
+        """Those of the body and of its regions, or those of labels."""
+        if isinstance(self.medium, AnyMedium):
+            return (self.medium, *(only_medium(region) for region in self.regions))
+        return self.medium
 
     @cached_property
     def coefficients(self) -> Coefficients:
@@ -132,7 +134,7 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
+            sources = sources_of(lights, self.body, self.media, subtract, self.mesh.region_at)
         solution, *_ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
@@ -216,7 +218,7 @@ class System:
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        under = at_surface(self.medium, mesh, self.coefficients)
+        under = at_surface(next(iter(by_label(self.media).values())), mesh, self.coefficients)
         validity = Validity(mesh, under, sources.lights, sources.deposits)
         solution = replace(
             added(of_lights),
@@ -278,11 +280,6 @@ class System:
         held = np.bincount(self.mesh.regions, self.mesh.volumes, minlength=len(self.regions) + 1)
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
         return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
-
-    def _region_of(self, points: FloatArray) -> IntArray:
-        """The regions that points inside lie in, (q,)."""
-        cells, _ = self.mesh.locate(points)
-        return np.asarray(np.where(cells >= 0, self.mesh.regions[cells], 0))
 
     def _losing(self, equations: "Equations") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""

@@ -128,16 +128,21 @@ def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]
     outer, *inner = map(base_of, media)
     found = []
     for number, (surface, medium) in enumerate(zip(surfaces, inner, strict=True), 1):
-        across = 4.0 * surface.volume / surface.area / medium.mean_free_path
-        if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
-            found.append(
-                f"region {number}: it is {across:.2g} of its mean free paths thick and scatters much less than what is "
-                "around it; light does not diffuse through such a void, and what comes through or past it is only a "
-                "guess."
-            )
-        elif medium.albedo < LOW_ALBEDO:
-            found.append(
-                f"region {number}: the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
-                "is good for; light that is absorbed there is only roughly right."
-            )
+        found += warning_for_part(f"region {number}", 4.0 * surface.volume / surface.area, medium, outer)
     return found
+
+
+def warning_for_part(name: str, chord: float, medium: Medium, outer: Medium) -> list[str]:
+    """A sentence on a part of a body that diffusion is not good for, by its mean chord and its medium, or none."""
+    across = chord / medium.mean_free_path
+    if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
+        return [
+            f"{name}: it is {across:.2g} of its mean free paths thick and scatters much less than what is around it; "
+            "light does not diffuse through such a void, and what comes through or past it is only a guess."
+        ]
+    if medium.albedo < LOW_ALBEDO:
+        return [
+            f"{name}: the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for; "
+            "light that is absorbed there is only roughly right."
+        ]
+    return []

@@ -224,7 +224,8 @@ def test_every_case_that_ships_is_right() -> None:
 def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert set(schema["required"]) == {"surface", "medium", "lights"}
+    assert set(schema["required"]) == {"lights"}
+    assert {"surface", "medium", "mesh"} <= set(schema["properties"])
     assert "sigma_s_prime" in schema["$defs"]["MediumSpec"]["properties"]
 
 
