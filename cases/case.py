@@ -16,11 +16,14 @@ from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
 from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.medium import Medium
+from tetlux.fem.partition import SurfacePartition
 from tetlux.fem.region import Region
-from tetlux.fem.validity import check_media, check_size
+from tetlux.fem.solve import media_of as media_of_scenes
+from tetlux.fem.validity import check_size, check_together
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
@@ -182,14 +185,16 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
         check_thickness(surface)
     channels = channel_names(document, spec)
     media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
-    with document.at(("surface",)):
-        for medium in media:
-            check_size(surface, base_of(medium))
     region_names, regions = _regions(document, spec, surface, media, reader)
     names = light_names(spec)
     check_different(document, "lights", names)
     _check_value_names(document, channels, names)
-    lights, deposits = _lights(document, spec, names, surface, media, region_names, channels, reader)
+    partition = SurfacePartition([region.surface for region in regions])
+    bodies = [Body(surface, each, partition) for each in media_of_scenes(media, regions, len(media))]
+    with document.at(("surface",)):
+        for body in bodies:
+            check_size(body)
+    lights, deposits = _lights(document, spec, names, bodies, region_names, channels, reader)
     with document.at(("compare",)):
         comparison = None
         if spec.compare:
@@ -200,7 +205,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     sensors = []
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
-            sensors.append(sensor_of(detector, surface, base_of(media[0])))
+            sensors.append(sensor_of(detector, surface, bodies[0].outer))
     if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
         with document.at(("camera", "position")):
             raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
@@ -236,7 +241,7 @@ def _regions(
         own = media_of(document, (*key, "medium"), region.medium, inner, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
-                check_media(surface, [base_of(outside), base_of(inside)])
+                check_together((outside, inside))
         regions.append(Region(inner, own))
     with document.at(("regions",)):
         check_regions(surface, [region.surface for region in regions])
@@ -247,24 +252,22 @@ def _lights(
     document: Document,
     spec: CaseSpec,
     names: tuple[str, ...],
-    surface: Surface,
-    media: tuple[AnyMedium, ...],
+    bodies: list[Body],
     regions: tuple[str, ...],
     channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
     """The lights of each channel by name, and what those of the first leave in the body."""
-    lights: list[dict[str, Light]] = [{} for _ in media]
+    lights: list[dict[str, Light]] = [{} for _ in bodies]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
         with document.at(("lights", i), keys_of(light_spec, reader)):
-            for channel, medium in enumerate(media):
-                light = light_of(light_spec, channel, len(media), regions, reader)
+            for channel in range(len(bodies)):
+                light = light_of(light_spec, channel, len(bodies), regions, reader)
                 if light is None:
                     continue
                 lights[channel][names[i]] = light
-                uniform = not regions and isinstance(medium, Medium)
-                deposit = light.deposit_in(surface, base_of(medium), uniform=uniform)
+                deposit = light.deposit_in(bodies[channel])
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):

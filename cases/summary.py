@@ -89,7 +89,7 @@ def _validity(validity: Validity) -> dict[str, float]:
     """How far diffusion itself is to be trusted; means and shares are of the surface's area."""
     valid = np.maximum(1.0 - validity.of_facets, 0.0)
     return {
-        "albedo": validity.medium.albedo,
+        "albedo": validity.albedo,
         "least_thickness_in_mean_free_paths": float(validity.thickness.min()),
         "share_thin": validity.mean(validity.thickness < THIN),
         "share_near_light": validity.mean(validity.distances(validity.middles) < NEAR),

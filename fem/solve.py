@@ -3,19 +3,20 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from threading import Timer
 from typing import overload
 
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.memory import check_memory, limited_by_memory
-from tetlux.fem.region import Region
+from tetlux.fem.partition import SurfacePartition
+from tetlux.fem.region import Region, check_list_of_regions
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
@@ -25,7 +26,7 @@ from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.refine import refine
-from tetlux.meshing.regions import check_regions, region_at
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -221,19 +222,19 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         surface = body.surface if isinstance(body, TetMesh) else body
+        check_list_of_regions(regions)
         inner = tuple(region.surface for region in regions)
         media = media_of(medium, regions, len(scenes))
         if mesh is None:
             check_regions(surface, inner)
         else:
             _check_mesh(mesh, surface, len(inner))
-        for each in dict.fromkeys(media):
-            check_media(surface, each)
-        sources = [
-            sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
-            for lights, each in zip(scenes, media, strict=True)
-        ]
-    work = _Work(surface, inner, media, sources, mass, limit, watch)
+        bodies = {each: Body(surface, each, SurfacePartition(inner)) for each in media}
+        for each in bodies.values():
+            check_media(each)
+        sources = [sources_of(lights, bodies[each], subtract) for lights, each in zip(scenes, media, strict=True)]
+    free_paths = [bodies[each].shortest_mean_free_path for each in media]
+    work = _Work(surface, inner, media, free_paths, sources, mass, limit, watch)
     given = mesh is not None
     size = len(set(media)), sum(map(len, scenes))
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
@@ -241,7 +242,7 @@ def solve_each(
         with watch.stage("mesh"):
             with _told_if_slow(report):
                 mesh = tetrahedralize(surface, inner, cache=cache)
-            lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
+            lit = lit_points([deposit for each in sources for deposit in each.deposits])
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     check_memory(len(mesh.tetrahedra), *size)
@@ -272,11 +273,12 @@ def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What is solved for: a body, and the media and lights of each scene."""
+    """What is solved for: a body, and the media, their shortest mean free path and the lights of each scene."""
 
     surface: Surface
     inner: tuple[Surface, ...]
     media: list[tuple[AnyMedium, ...]]
+    free_paths: list[float]
     sources: list[Sources]
     mass: Mass
     limit: bool
@@ -298,7 +300,7 @@ def _refined(
 ) -> dict[int, Step]:
     """Solutions of all scenes on one mesh, refined until it is fine enough or has as many tetrahedra as it may."""
     # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
-    order = sorted(range(len(work.media)), key=lambda scene: base_of(work.media[scene][0]).mean_free_path)
+    order = sorted(range(len(work.media)), key=work.free_paths.__getitem__)
     first, *pending = order
     solve_on = work.solver_on(mesh)
     steps = best = {first: solve_on(first, None)}
@@ -374,10 +376,9 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
 
 def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
     """What a user should know of a solution, and where refinement stopped."""
-    warnings, medium = list(solution.surface.warnings), solution.medium
+    warnings = list(solution.surface.warnings)
     if solution.validity is not None:
         warnings += warnings_for(solution.surface, solution.validity)
-        medium = solution.validity.medium
     warnings += [*sources.warnings, *solution.warnings]
     if not solution.error_estimate <= tolerance:
         warnings.append(
@@ -418,9 +419,10 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str
     warnings += _shallow(solution)
     brightest = float(np.max(solution.transmitted_irradiance))
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
+        shallowest = 1.0 / solution.validity.steepest if solution.validity else np.nan
         warnings.append(
             "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-            f"{1 / medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
             "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
         )
     return list(dict.fromkeys(warnings))

@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, at_surface, coefficients_on
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium, Coefficients, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
@@ -15,12 +16,13 @@ from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
+from tetlux.fem.partition import MeshPartition
 from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -132,7 +134,7 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
+            sources = sources_of(lights, Body(self.body, self.media, MeshPartition(self.mesh)), subtract)
         solution, *_ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
@@ -218,8 +220,7 @@ class System:
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        under = at_surface(self.medium, mesh, self.coefficients)
-        validity = Validity(mesh, under, sources.lights, sources.deposits)
+        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
         return replace(added(of_lights), warnings=notes, validity=validity), tuple(good), found
 
     def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
@@ -273,11 +274,6 @@ class System:
         held = np.bincount(self.mesh.regions, self.mesh.volumes, minlength=len(self.regions) + 1)
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
         return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
-
-    def _region_of(self, points: FloatArray) -> IntArray:
-        """The regions that points inside lie in, (q,)."""
-        cells, _ = self.mesh.locate(points)
-        return np.asarray(np.where(cells >= 0, self.mesh.regions[cells], 0))
 
     def _losing(self, equations: "Equations") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""

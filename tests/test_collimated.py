@@ -8,6 +8,7 @@ import pytest
 from tests.benchmarks.scenes import lit_ball, turbid
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Medium, Solution, System, solve
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import slab_plane, sphere_light
 from tetlux.fem.fresnel import reflectance
@@ -141,7 +142,7 @@ def test_van_de_hulsts_slab() -> None:
 
 
 def on_mesh(light: CollimatedBeam, mesh: TetMesh, medium: Medium) -> Deposit:
-    return light.deposit_in(mesh.surface, medium).on(mesh, mesh.surface, coefficients_of(medium))
+    return light.deposit_in(Body(mesh.surface, (medium,))).on(mesh, mesh.surface, coefficients_of(medium))
 
 
 OPAQUE = Medium(sigma_a=1.0, sigma_s_prime=20.0, eta=1.0)

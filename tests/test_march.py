@@ -9,6 +9,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
 from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
@@ -418,7 +419,7 @@ def test_beams_know_where_they_begin(
 ) -> None:
     """Also those that are reflected inside: the boundary's index is 1.4."""
     coefficients = coefficients_of(CLEAR) if uniform else several(ball_mesh, CLEAR)
-    light = LIGHTS[name].deposit_in(ball, CLEAR, uniform=uniform)
+    light = LIGHTS[name].deposit_in(Body(ball, (CLEAR,) if uniform else (CLEAR, CLEAR)))
     deposit = light.on(ball_mesh, ball, coefficients)
     assert deposit.cells is not None
     known = np.flatnonzero(deposit.cells >= 0)

@@ -7,6 +7,8 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Medium, PencilBeam, PointSource
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.lights.deposit import Light
@@ -24,7 +26,12 @@ FORWARD = Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4)
 
 
 def validity_of(mesh: TetMesh, medium: Medium, *lights: Light, surface: Surface | None = None) -> Validity:
-    return Validity(mesh, medium, lights, [light.deposit_in(surface or mesh.surface, medium) for light in lights])
+    return Validity(
+        mesh,
+        coefficients_of(medium),
+        lights,
+        [light.deposit_in(Body(surface or mesh.surface, (medium,))) for light in lights],
+    )
 
 
 @dataclass(frozen=True)
