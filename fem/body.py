@@ -125,8 +125,8 @@ class Body:
         """
         medium, none = self.only_medium, np.zeros(len(starts))
         if medium is not None:
-            each = (np.full(len(starts), value) for value in _constants(medium))
-            return OpticalPaths(np.arange(len(starts)), none, lengths, *each)
+            sigma_a, reduced, scattering = (np.full(len(starts), value) for value in _constants(medium))
+            return OpticalPaths(np.arange(len(starts)), none, lengths, sigma_a, reduced, scattering)
         varying = np.array([not isinstance(medium, Medium) for medium in self.media])
         pieces = self.partition.pieces(starts, directions, none if begins is None else begins, lengths)
         return paths_of(pieces, starts, directions, varying, self._local)

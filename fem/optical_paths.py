@@ -54,7 +54,9 @@ class OpticalPaths:
     @property
     def totals(self) -> FloatArray:
         """Optical depth, the integral of sigma_t', along each path, (r,)."""
-        return np.bincount(self.rays, (self.sigma_a + self.reduced) * (self.leave - self.enter))
+        return np.asarray(
+            np.bincount(self.rays, (self.sigma_a + self.reduced) * (self.leave - self.enter)), dtype=float
+        )
 
     def place(self, depths: FloatArray, *, peaked: bool = False) -> FloatArray:
         """How far along each path a given optical depth (r,) is reached, (r,), unit.
@@ -133,9 +135,8 @@ def paths_of(
         upper = np.cumsum(counts)[halved] - 1
         lower = upper - 1
         middle = 0.5 * (enter + leave)[halved]
-        rays, enter, leave, regions, uneven = (
-            np.repeat(each, counts) for each in (rays, enter, leave, regions, uneven)
-        )
+        rays, regions = np.repeat(rays, counts), np.repeat(regions, counts)
+        enter, leave, uneven = (np.repeat(each, counts) for each in (enter, leave, uneven))
         means = np.repeat(means, counts, axis=1)
         leave[lower], enter[upper] = middle, middle
         new = np.concatenate([lower, upper])

@@ -400,9 +400,8 @@ def several(mesh: TetMesh, medium: Medium) -> Coefficients:
     """Coefficients that differ from tetrahedron to tetrahedron."""
     scattering, cosine = medium.delta_eddington
     shares = 0.5 + np.random.default_rng(7).random(len(mesh.tetrahedra))
-    return Coefficients(
-        medium.sigma_a * shares, medium.sigma_t_prime * shares, scattering * shares, cosine * shares**0, medium
-    )
+    values = medium.sigma_a * shares, medium.sigma_t_prime * shares, scattering * shares, cosine * shares**0
+    return Coefficients(*values, medium.mean_cosine, medium)
 
 
 CLEAR = Medium(sigma_a=0.01, sigma_s=0.2, g=0.5, eta=1.4)

@@ -223,8 +223,8 @@ def _paths(rays: Rays, body: Body) -> OpticalPaths:
     """What thin beams meet from the surface to their way out."""
     begins, lengths = body.ways_out(rays.starts, rays.directions)
     paths = body.paths(rays.starts, rays.directions, lengths, begins)
-    short = np.flatnonzero(paths.totals < 2.0) if body.surface.overlaps else []
-    if len(short) == 0:
+    short = np.flatnonzero(body.surface.overlaps & (paths.totals < 2.0)).tolist()
+    if not short:
         return paths
     # A triangle inside the body is no way out.
     for ray in short:
