@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.case import Channel
+from tetlux.cases.lighting import BODY
 from tetlux.cases.results import Results, lights_in
-from tetlux.fem.coefficients import base_of
+from tetlux.fem.coefficients import Coefficients, at_cells, coefficients_on
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.solution import Power, Solution
+from tetlux.fem.solve import media_of
 from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
+from tetlux.meshing.tetmesh import TetMesh
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "pyvista", "trimesh")
 
@@ -25,9 +28,17 @@ def summarize(
     """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
     case, mesh = results.case, results.solutions[0].mesh
     several = len(case.light_names) > 1
+    names = (BODY, *(region.surface.name for region in case.regions))
+    each = media_of([channel.medium for channel in case.channels], case.regions, len(case.channels))
     channels = [
-        _channel(channel, solution, results.exitance(channel.name), several)
-        for channel, solution in zip(case.channels, results.solutions, strict=True)
+        _channel(
+            channel,
+            solution,
+            results.exitance(channel.name),
+            several,
+            _media(mesh, coefficients_on(mesh, media), names),
+        )
+        for channel, solution, media in zip(case.channels, results.solutions, each, strict=True)
     ]
     return {
         "case": case.name,
@@ -52,12 +63,16 @@ def summarize(
     }
 
 
-def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several: bool) -> dict[str, Any]:
-    medium, estimate = base_of(channel.medium), solution.error_estimate
+def _channel(
+    channel: Channel, solution: Solution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
+) -> dict[str, Any]:
+    estimate = solution.error_estimate
     figures: dict[str, Any] = {
         "name": channel.name,
-        "sigma_tr": medium.sigma_tr,
-        "albedo": medium.albedo,
+        # Those of the body outside of its regions.
+        "sigma_tr": media[0]["sigma_tr"],
+        "albedo": media[0]["albedo"],
+        "media": media,
         "power": _power(solution.power),
         "exitance": {
             "min": float(exitance.min()),
@@ -72,6 +87,27 @@ def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several
         lights = lights_in(list(channel.lights), solution)
         figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
     return figures
+
+
+def _media(mesh: TetMesh, coefficients: Coefficients, names: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Coefficients of the body outside of its regions and of each region; means over the volume where they vary."""
+    found = []
+    for region, name in enumerate(names):
+        cells = np.flatnonzero(mesh.regions == region)
+        weights = mesh.volumes[cells] / mesh.volumes[cells].sum()
+        sigma_a, total = (
+            float(weights @ at_cells(each, cells)) for each in (coefficients.sigma_a, coefficients.sigma_t_prime)
+        )
+        found.append(
+            {
+                "name": name,
+                "sigma_a": sigma_a,
+                "sigma_s_prime": total - sigma_a,
+                "sigma_tr": math.sqrt(3.0 * sigma_a * total),
+                "albedo": 1.0 - sigma_a / total,
+            }
+        )
+    return found
 
 
 def _power(power: Power) -> dict[str, float]:

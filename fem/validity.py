@@ -121,7 +121,8 @@ def _of_distance(validity: Validity) -> list[str]:
         error = validity.mean(near * close) / validity.mean(close)
         assumed = ""
         if validity.unknown_cosine(middles)[close].any():
-            assumed = " (isotropic scattering, g = 0, is assumed where sigma_s_prime alone is given; sigma_s and g say)"
+            # A point stands for a beam half as well where scattering is isotropic, so the figure hangs on it.
+            assumed = " (g = 0 assumed, as sigma_s_prime alone is given: give sigma_s and g instead)"
         found.append(
             f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
             f"diffusion itself is off by about {error:.0%}, whatever the mesh{assumed}."
