@@ -111,6 +111,6 @@ class _SweepNotes:
         runs = self._runs[case.source]
         for warning, names in self._found.items():
             where = f"all {runs} runs" if len(names) == runs else f"{len(names)} of {runs} runs"
-            few = f" ({', '.join(names)})" if len(names) <= FEW else ""
+            few = f" ({', '.join(names)})" if len(names) <= FEW and len(names) < runs else ""
             print(f"note, in {where}{few}: {warning}", flush=True)
         self._found = {}

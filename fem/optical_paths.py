@@ -11,8 +11,8 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # A coefficient that varies is taken at the ends and quarters of each piece. Pieces are halved until the range of these
 # values over a piece, as optical depth and by the share of light that gets there, is this much at most, or so often.
-# Held against closed forms, an optical depth is then right to 6e-4 of itself where coefficients are linear or exponential
-# along the path, and to 1e-3 behind a step from 0.4 to 2.
+# Held against closed forms, an optical depth is then right to 6e-4 of itself where coefficients are linear or
+# exponential along the path, and to 1e-3 behind a step from 0.4 to 2.
 UNEVEN = 2e-3
 HALVINGS = 24
 # Pieces at which halving stops all the same.

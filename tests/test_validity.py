@@ -170,6 +170,11 @@ def test_what_is_said(ball_mesh: TetMesh) -> None:
     (near,) = sentences(fine, FORWARD, PENCIL)
     assert "within 2 mean free paths of where light enters" in near
     assert "off by about 1" in near
+    assert "assumed" not in near
+    # The same medium, of which it is not known how forward it scatters: the worst is expected, and that is said.
+    (unknown,) = sentences(fine, Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4), PENCIL)
+    assert "off by about 3" in unknown
+    assert "g = 0 assumed, as sigma_s_prime alone is given" in unknown
     dark = sentences(fine, Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4), PENCIL)
     assert "reduced albedo is 0.667" in dark[0]
     assert any("fades too fast at this absorption" in sentence for sentence in dark)
