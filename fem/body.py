@@ -128,7 +128,9 @@ class Body:
             sigma_a, reduced, scattering = (np.full(len(starts), value) for value in _constants(medium))
             return OpticalPaths(np.arange(len(starts)), none, lengths, sigma_a, reduced, scattering)
         varying = np.array([not isinstance(medium, Medium) for medium in self.media])
-        pieces = self.partition.pieces(starts, directions, none if begins is None else begins, lengths)
+        # One medium is that of the whole body, whatever regions its mesh has.
+        partition = self.partition if len(self.media) > 1 else SurfacePartition()
+        pieces = partition.pieces(starts, directions, none if begins is None else begins, lengths)
         return paths_of(pieces, starts, directions, varying, self._local)
 
     def _local(self, region: int, points: FloatArray) -> FloatArray:

@@ -109,6 +109,9 @@ def test_the_base_of_a_medium_that_varies_does_not_matter(name: str) -> None:
         assert_same(one, upper_is_region(DENSE, CLEAR, light))
 
 
+Depth = Callable[[FloatArray, FloatArray], FloatArray]
+
+
 def deposited(media: tuple[AnyMedium, ...], light: Light, *surfaces: Surface) -> tuple[FloatArray, FloatArray]:
     deposit = light.deposit_in(Body(plate(0.0, 8.0), media, SurfacePartition(surfaces)))
     return deposit.points, deposit.powers
@@ -158,9 +161,11 @@ def test_optical_depth_in_coefficients_that_vary() -> None:
     cosines = np.linspace(0.3, 1.0, 8)
     directions = np.column_stack([np.sqrt(1.0 - cosines**2), 0.0 * cosines, -cosines])
     starts, lengths = np.zeros((8, 3)), np.full(8, 10.0)
+    linear: Depth = lambda x, c: 0.2 * x + 0.15 * c * x**2  # noqa: E731
+    exponential: Depth = lambda x, c: 6.0 / c * -np.expm1(-0.5 * c * x)  # noqa: E731
     for sigma, depth in (
-        (lambda p: 0.2 - 0.3 * p[:, 2], lambda x, c: 0.2 * x + 0.15 * c * x**2),
-        (lambda p: 3.0 * np.exp(0.5 * p[:, 2]), lambda x, c: 6.0 / c * -np.expm1(-0.5 * c * x)),
+        (lambda p: 0.2 - 0.3 * p[:, 2], linear),
+        (lambda p: 3.0 * np.exp(0.5 * p[:, 2]), exponential),
     ):
         body = Body(surface, (VaryingMedium(base=base, sigma_s_prime=sigma),))
         paths = body.paths(starts, directions, lengths)

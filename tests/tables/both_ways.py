@@ -207,7 +207,8 @@ def scenes(wanted: list[str]) -> Iterator[tuple[str, str]]:
 
 def main(wanted: list[str]) -> int:
     """Print the table; 1 if ways of writing a scene disagree."""
-    started, failed, count, known = time.perf_counter(), 0, 0, {}
+    started, failed, count = time.perf_counter(), 0, 0
+    known: dict[str, Written] = {}
     print("| body | light | ways | exited | absorbed | exitance | agree |\n|---|---|---|---|---|---|---|")
     for body, light in scenes(wanted):
         written = known.get(body) or BODIES[body]()
