@@ -94,9 +94,9 @@ def _media(mesh: TetMesh, coefficients: Coefficients, names: tuple[str, ...]) ->
     found = []
     for region, name in enumerate(names):
         cells = np.flatnonzero(mesh.regions == region)
-        weights = mesh.volumes[cells] / mesh.volumes[cells].sum()
         sigma_a, total = (
-            float(weights @ at_cells(each, cells)) for each in (coefficients.sigma_a, coefficients.sigma_t_prime)
+            _mean(at_cells(each, cells), mesh.volumes[cells])
+            for each in (coefficients.sigma_a, coefficients.sigma_t_prime)
         )
         found.append(
             {
@@ -108,6 +108,11 @@ def _media(mesh: TetMesh, coefficients: Coefficients, names: tuple[str, ...]) ->
             }
         )
     return found
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    """Weighted mean, without rounding where all values are alike."""
+    return float(values[0] if np.ptp(values) == 0 else weights @ values / weights.sum())
 
 
 def _power(power: Power) -> dict[str, float]:
