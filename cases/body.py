@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from tetlux.cases.channels import check_different
 from tetlux.cases.document import Document, Key
@@ -9,10 +10,13 @@ from tetlux.cases.lighting import BODY
 from tetlux.cases.media import media_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec, MeshSpec
-from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of, check_labels
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.labelled import label_of, outermost_first
+from tetlux.fem.partition import MeshPartition, SurfacePartition
 from tetlux.fem.region import Region
-from tetlux.fem.validity import check_media, check_size
+from tetlux.fem.scene import media_of as media_of_scenes
+from tetlux.fem.validity import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.regions import check_regions
@@ -21,7 +25,7 @@ from tetlux.meshing.tetmesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class CaseBody:
     """What a case is solved on.
 
     Attributes
@@ -51,8 +55,17 @@ class Body:
         """Whether it is of one medium in each channel."""
         return not self.regions and all(len(media) == 1 for media in self.by_label)
 
+    @cached_property
+    def of_channels(self) -> list[Body]:
+        """What light falls on in each channel."""
+        if self.mesh is not None:
+            return [Body(self.surface, media, MeshPartition(self.mesh)) for media in self.by_label]
+        partition = SurfacePartition([region.surface for region in self.regions])
+        each = media_of_scenes(self.media, self.regions, len(self.media))
+        return [Body(self.surface, media, partition) for media in each]
 
-def body_of(document: Document, spec: CaseSpec, channels: int, reader: Reader) -> Body:
+
+def body_of(document: Document, spec: CaseSpec, channels: int, reader: Reader) -> CaseBody:
     """The body of a case.
 
     Raises
@@ -68,12 +81,13 @@ def body_of(document: Document, spec: CaseSpec, channels: int, reader: Reader) -
         surface = reader.surface(spec.surface, spec.unit)
         check_thickness(surface)
     media = media_of(document, ("medium",), spec.medium, surface.points, surface.unit, channels, reader)
-    with document.at(("surface",)):
-        for medium in media:
-            check_size(surface, base_of(medium))
     names, regions = _regions(document, spec, surface, media, reader)
     parts = {name: number for number, name in enumerate((BODY, *names))} if regions else {BODY: None}
-    return Body(surface, media, parts, regions)
+    body = CaseBody(surface, media, parts, regions)
+    with document.at(("surface",)):
+        for each in body.of_channels:
+            check_size(each)
+    return body
 
 
 def _regions(
@@ -92,14 +106,14 @@ def _regions(
         own = media_of(document, (*key, "medium"), region.medium, inner.points, inner.unit, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
-                check_media(surface, [base_of(outside), base_of(inside)])
+                check_together((outside, inside))
         regions.append(Region(inner, own))
     with document.at(("regions",)):
         check_regions(surface, [region.surface for region in regions])
     return names, tuple(regions)
 
 
-def _of_mesh(document: Document, spec: MeshSpec, unit: str, channels: int, reader: Reader) -> Body:
+def _of_mesh(document: Document, spec: MeshSpec, unit: str, channels: int, reader: Reader) -> CaseBody:
     with document.at(("mesh",)):
         mesh = reader.mesh(spec, unit)
     media: dict[int, tuple[AnyMedium, ...]] = {}
@@ -115,8 +129,10 @@ def _of_mesh(document: Document, spec: MeshSpec, unit: str, channels: int, reade
         check_labels(mesh, media)
         order = outermost_first(mesh, media)
         by_label = tuple({label: media[label][channel] for label in order} for channel in range(channels))
-        for each in by_label:
-            check_media(mesh.surface, [base_of(medium) for medium in each.values()])
     parts: dict[str, int | None] = {str(label): label for label in order}
     parts |= {name: label for label, name in mesh.labels.items() if label in media}
-    return Body(mesh.surface, media[order[0]], parts, mesh=mesh, by_label=by_label)
+    body = CaseBody(mesh.surface, media[order[0]], parts, mesh=mesh, by_label=by_label)
+    with document.at(("mesh", "labels")):
+        for each in body.of_channels:
+            check_media(each)
+    return body

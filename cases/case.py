@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.body import Body, body_of
+from tetlux.cases.body import CaseBody, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, read_document
@@ -200,7 +200,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     sensors = []
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
-            sensors.append(sensor_of(detector, surface, base_of(media[0])))
+            sensors.append(sensor_of(detector, surface, body.of_channels[0].outer))
     if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
         with document.at(("camera", "position")):
             raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
@@ -225,23 +225,22 @@ def _lights(
     document: Document,
     spec: CaseSpec,
     names: tuple[str, ...],
-    body: Body,
+    body: CaseBody,
     channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
     """The lights of each channel by name, and what those of the first leave in the body."""
-    media = body.media
-    lights: list[dict[str, Light]] = [{} for _ in media]
+    bodies = body.of_channels
+    lights: list[dict[str, Light]] = [{} for _ in bodies]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
         with document.at(("lights", i), keys_of(light_spec, reader)):
-            for channel, medium in enumerate(media):
-                light = light_of(light_spec, channel, len(media), body.parts, reader)
+            for channel, of_channel in enumerate(bodies):
+                light = light_of(light_spec, channel, len(bodies), body.parts, reader)
                 if light is None:
                     continue
                 lights[channel][names[i]] = light
-                uniform = body.is_uniform and isinstance(medium, Medium)
-                deposit = light.deposit_in(body.surface, base_of(medium), uniform=uniform)
+                deposit = light.deposit_in(of_channel)
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):

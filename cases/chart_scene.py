@@ -10,6 +10,7 @@ from tetlux.cases.chart_measure import relative_error, surface_samples
 from tetlux.cases.compare import are_points, comparison_for
 from tetlux.cases.document import read_document
 from tetlux.cases.schema import CaseSpec, SurfaceSpec
+from tetlux.fem.body import Body
 from tetlux.fem.grading import lit_points
 from tetlux.fem.lights import Deposit
 from tetlux.fem.medium import Medium
@@ -85,7 +86,7 @@ class Scene:
     @property
     def lit(self) -> tuple[FloatArray, FloatArray]:
         """See `tetlux.fem.grading.lit_points`."""
-        return lit_points(self.deposits, self.case.medium)
+        return lit_points(self.deposits)
 
     @property
     def sources(self) -> list[tuple[FloatArray, float]]:
@@ -119,9 +120,9 @@ def scene_of(case: Case, *, quick: bool = False) -> Scene:
         raise RunError("a chart is of one channel and one even medium; leave lists, regions and fields out.")
     shape = spec_of(case).surface
     surface, medium = case.surface, case.medium
-    deposits = [light.deposit_in(surface, medium) for light in case.lights]
+    deposits = [light.deposit_in(Body(surface, (medium,))) for light in case.lights]
     assert shape is not None
-    samples = Samples(*surface_samples(surface, *lit_points(deposits, medium)))
+    samples = Samples(*surface_samples(surface, *lit_points(deposits)))
     measured = _in_closed_form(shape, medium, deposits, samples)
     if measured is None:
         # A surface is more than its triangles where these stand for a curve.

@@ -28,7 +28,14 @@ SUMMARY = "summary.json"
 ALL_FILES = (*FILES.values(), READINGS, *COMPARISON, SUMMARY)
 
 
-def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: bool = True) -> Path:
+def run_case(
+    case: Case,
+    out: Path,
+    report: Report = lambda _: None,
+    *,
+    cache: bool = True,
+    note: Report | None = None,
+) -> Path:
     """Solve a case and write its results.
 
     They are written into a folder beside the final one, which they replace when all are complete: where there is a
@@ -43,6 +50,8 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
         Called with a line of text as each stage ends.
     cache : bool
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
+    note : callable, optional
+        Called with each warning; if not given they are reported.
 
     Returns
     -------
@@ -77,7 +86,10 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
     for warning in warnings:
-        report(f"note: {warning}")
+        if note is None:
+            report(f"note: {warning}")
+        else:
+            note(warning)
     return target
 
 

@@ -10,6 +10,7 @@ from tetlux.cases.chart_scene import Samples, on_true_sphere
 from tetlux.cases.stress_meshes import ball_of_layers, spoiled
 from tetlux.cases.stress_shapes import SHAPES
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
+from tetlux.fem.body import Body
 from tetlux.fem.exact import concentric, slab, sphere, sphere_light
 from tetlux.fem.grading import lit_points
 from tetlux.meshing import shapes
@@ -74,8 +75,8 @@ def in_range(decay: float) -> Medium:
 
 
 def _samples(surface: Surface, medium: Medium, light: Light) -> Samples:
-    deposit = light.deposit_in(surface, medium)
-    return Samples(*surface_samples(surface, *lit_points([deposit], medium)))
+    deposit = light.deposit_in(Body(surface, (medium,)))
+    return Samples(*surface_samples(surface, *lit_points([deposit])))
 
 
 def _on_ball(
@@ -103,7 +104,7 @@ def point_in_ball(medium: Medium, radius: float, depth: float, mesh: TetMesh | N
 def ball_in_diffuse_light(medium: Medium, radius: float, mesh: TetMesh | None = None) -> Scene:
     """A ball that 1 W/unit² of diffuse light falls on from everywhere."""
     surface, light = shapes.sphere(radius), DiffuseLight(1.0)
-    passed = light.deposit_in(surface, medium).transmitted_irradiance
+    passed = light.deposit_in(Body(surface, (medium,))).transmitted_irradiance
     value = passed * sphere_light.diffuse_exitance(medium, radius=radius)
     truth = _on_ball(surface, medium, light, radius, lambda _: value)
     # 4 E_t/(1 - 2 C1), with E_t = eta² (1 - 2 C1).
@@ -146,7 +147,7 @@ def diffuse_by_core(absorption: float, radius: float) -> Scene:
     """A ball of radius 10 and albedo .99 with a core, by its radius and its absorption times its scattering."""
     shell, core = turbid(0.99), Medium(sigma_a=absorption, sigma_s_prime=1.0, eta=INDEX)
     surface, light, outer = shapes.sphere(10.0), DiffuseLight(1.0), 10.0
-    passed = light.deposit_in(surface, shell).transmitted_irradiance
+    passed = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
     value = passed * concentric.diffuse_exitance(core, shell, core_radius=radius, radius=outer)
     truth = _on_ball(surface, shell, light, outer, lambda _: value)
     regions = (Region(shapes.sphere(radius), core),)
@@ -182,7 +183,7 @@ def by_peak_and_index(g: float, eta: float) -> Scene:
     medium = Medium(sigma_a=0.01, sigma_s=0.99 / (1.0 - g), g=g, eta=eta)
     surface = shapes.sphere(radius)
     light = PencilBeam((0.0, 0.0, 2.0 * radius), (0.0, 0.0, -1.0), deposit="line")
-    deposit = light.deposit_in(surface, medium)
+    deposit = light.deposit_in(Body(surface, (medium,)))
     passed = deposit.incident - deposit.specular
     samples = on_true_sphere(_samples(surface, medium, light), np.zeros(3), radius)
     away = np.hypot(*samples.points[:, :2].T) > medium.mean_free_path
@@ -230,7 +231,7 @@ def two_balls(
     light = DiffuseLight(1.0) if of == "diffuse" else Emission(1.0, region=1)
     surface = shapes.sphere(radius)
     if of == "diffuse":
-        passed = DiffuseLight(1.0).deposit_in(surface, shell).transmitted_irradiance
+        passed = DiffuseLight(1.0).deposit_in(Body(surface, (shell,))).transmitted_irradiance
         value = passed * concentric.diffuse_exitance(core, shell, core_radius=inner, radius=radius)
     else:
         value = concentric.glow_exitance(core, shell, core_radius=inner, radius=radius)

@@ -1,7 +1,7 @@
 """What the media of a body are on each tetrahedron of a mesh."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +29,8 @@ class Coefficients:
     scattering, cosine : float or (m,) ndarray
         Scattering coefficient (1/unit) and mean cosine with the forward peak taken out, see
         `Medium.delta_eddington`.
+    mean_cosine : float or (m,) ndarray
+        Mean cosine of the scattering angle; nan where sigma_s' alone is given.
     outer : Medium
         The medium whose index and boundary the whole body shares.
     """
@@ -37,6 +39,7 @@ class Coefficients:
     sigma_t_prime: float | FloatArray
     scattering: float | FloatArray
     cosine: float | FloatArray
+    mean_cosine: float | FloatArray
     outer: Medium
 
     @property
@@ -63,7 +66,7 @@ class Coefficients:
 def coefficients_of(medium: Medium) -> Coefficients:
     """Coefficients of a body of one medium."""
     scattering, cosine = medium.delta_eddington
-    return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, medium)
+    return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, known_cosine(medium), medium)
 
 
 def apart(one: Coefficients, other: Coefficients) -> float:
@@ -115,20 +118,22 @@ def coefficients_on(mesh: TetMesh, media: MediaByLabel | Sequence[AnyMedium]) ->
         check_labels(mesh, media)
     elif len(media) > 1:
         _check_regions(mesh, len(media))
-    values = np.empty((4, len(mesh.tetrahedra)))
+    values = np.empty((5, len(mesh.tetrahedra)))
     for label, medium in labelled.items():
         inside = np.flatnonzero(mesh.regions == label) if len(labelled) > 1 else np.arange(len(mesh.tetrahedra))
         if isinstance(medium, Medium):
-            values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington])[:, None]
+            found = [medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington, known_cosine(medium)]
+            values[:, inside] = np.array(found)[:, None]
             continue
         # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
         points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
         at = medium.at(points.reshape(-1, 3))
         absorption, reduced = (value.reshape(-1, 4).mean(axis=1) for value in at)
         peaked, forward = medium.delta_eddington(reduced)
-        values[:, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
+        values[:4, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
+        values[4, inside] = known_cosine(medium.base)
     each: list[FloatArray] = list(values)
-    return Coefficients(each[0], each[1], each[2], each[3], base_of(outer))
+    return Coefficients(each[0], each[1], each[2], each[3], each[4], base_of(outer))
 
 
 def check_labels(mesh: TetMesh, labels: Iterable[int]) -> None:
@@ -163,18 +168,11 @@ def _check_regions(mesh: TetMesh, media: int) -> None:
             raise InputError(f"the mesh has no region {region}; make one that has, or leave the region out.")
 
 
-def at_surface(medium: AnyMedium, mesh: TetMesh, coefficients: Coefficients) -> Medium:
-    """One medium for what is under the surface: the body's own, or the mean of one that varies."""
-    if isinstance(medium, Medium):
-        return medium
-    cells, areas = mesh.boundary_cells, mesh.boundary_areas / mesh.area
-    sigma_a, total = (float(areas @ at_cells(v, cells)) for v in (coefficients.sigma_a, coefficients.sigma_t_prime))
-    base, scattering = medium.base, total - sigma_a
-    if base.sigma_s is None:
-        return replace(base, sigma_a=sigma_a, sigma_s_prime=scattering)
-    return replace(base, sigma_a=sigma_a, sigma_s=base.sigma_s * scattering / base.reduced_scattering)
+def known_cosine(medium: Medium) -> float:
+    """Mean cosine of a medium's scattering angle, nan if sigma_s' alone is given."""
+    return medium.mean_cosine if medium.sigma_s is not None else np.nan
 
 
 def base_of(medium: AnyMedium) -> Medium:
-    """The medium itself, or what stands for one that varies."""
+    """The medium itself, or that of the index, the boundary and the shape of scattering of one that varies."""
     return medium if isinstance(medium, Medium) else medium.base

@@ -24,6 +24,23 @@ class Region:
     medium: AnyMedium | Sequence[AnyMedium]
 
 
+def check_list_of_regions(regions: Sequence[Region]) -> None:
+    """Refuse what is no list of regions.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(regions, Sequence):
+        raise InputError(f"regions are given in a list, and {type(regions).__name__} is none; write [Region(...)].")
+    for region in regions:
+        if not isinstance(region, Region):
+            raise InputError(
+                f"a {type(region).__name__} is given where a region is wanted; write Region(surface, medium), with the "
+                "closed surface that bounds it."
+            )
+
+
 def only_medium(region: Region) -> AnyMedium:
     """The one medium of a region."""
     if isinstance(region.medium, AnyMedium):

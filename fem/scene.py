@@ -4,16 +4,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, MediaByLabel
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.labelled import GivenMedia, channels_by_label, one_label, warnings_for_cavities, warnings_for_labels
-from tetlux.fem.region import Region
+from tetlux.fem.partition import MeshPartition, SurfacePartition
+from tetlux.fem.region import Region, check_list_of_regions
 from tetlux.fem.solution import Solution
 from tetlux.fem.system import System
 from tetlux.fem.validity import check_media, warnings_for_regions
-from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.conformity import conformity_of
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.regions import check_regions, region_at
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -33,6 +34,8 @@ class Scene:
         Of a mesh, if media are by label.
     mesh : TetMesh, optional
         That is used as it is.
+    bodies : list of Body
+        What light falls on in each scene; scenes of the same media have the same.
     checked : bool
         Whether the mesh is the body itself, and had to be looked at.
     """
@@ -42,18 +45,8 @@ class Scene:
     media: list[tuple[AnyMedium, ...]]
     labels: tuple[int, ...]
     mesh: TetMesh | None
+    bodies: list[Body]
     checked: bool
-
-    def by_label(self) -> list[MediaByLabel]:
-        """The media of each scene by label, or by the number of the region."""
-        numbers = self.labels or range(len(self.inner) + 1)
-        return [dict(zip(numbers, each, strict=True)) for each in self.media]
-
-    def region_of(self, points: FloatArray) -> IntArray:
-        """The labels, or the numbers of the regions, of points (q, 3), (q,)."""
-        if self.labels and self.mesh is not None:
-            return self.mesh.region_at(points)
-        return region_at(points, self.inner)
 
     def system_on(
         self, mesh: TetMesh, media: tuple[AnyMedium, ...], mass: Mass, assembly: Assembly, *, limit: bool
@@ -69,7 +62,7 @@ class Scene:
     def warnings(self, number: int, solution: Solution, *, given: bool) -> list[str]:
         """What a user should know of its parts in one of the scenes, and of a mesh that was given."""
         if self.labels:
-            found = warnings_for_labels(solution.mesh, self.by_label()[number])
+            found = warnings_for_labels(solution.mesh, self.bodies[number].by_label)
         else:
             found = warnings_for_regions(self.inner, self.media[number])
         if not given:
@@ -90,18 +83,21 @@ def scene_of(
     if isinstance(body, TetMesh):
         conformity_of(body)
     surface = body.surface if isinstance(body, TetMesh) else body
-    for number, region in enumerate(regions, 1):
-        if not isinstance(region, Region):
-            raise InputError(f"region {number} is {type(region).__name__}(...); give Region(surface, medium).")
+    check_list_of_regions(regions)
     media, labels = _media(body, mesh, medium, regions, scenes)
     inner = tuple(region.surface for region in regions)
     if mesh is None:
         check_regions(surface, inner)
     else:
         _check_mesh(mesh, surface, None if labels else len(inner))
+    bodies = {}
     for each in dict.fromkeys(media):
-        check_media(surface, each)
-    return Scene(surface, inner, media, labels, mesh, isinstance(body, TetMesh))
+        if labels and mesh is not None:
+            bodies[each] = Body(surface, dict(zip(labels, each, strict=True)), MeshPartition(mesh))
+        else:
+            bodies[each] = Body(surface, each, SurfacePartition(inner))
+        check_media(bodies[each])
+    return Scene(surface, inner, media, labels, mesh, [bodies[each] for each in media], isinstance(body, TetMesh))
 
 
 def channels_of(
@@ -157,7 +153,7 @@ def _media(
     if len(kinds) > 1:
         raise InputError("some channels have a medium and some have media by label; give all of them alike.")
     if True not in kinds:
-        return _media_of(medium, regions, scenes), ()  # type: ignore[arg-type]
+        return media_of(medium, regions, scenes), ()  # type: ignore[arg-type]
     if len(regions) > 0:
         raise InputError("regions are surfaces within a body of one medium; leave them out where media are by label.")
     channels = channels_by_label(_labelled(body, mesh), medium)  # type: ignore[arg-type]
@@ -168,7 +164,7 @@ def _media(
     return [tuple(each.values()) for each in channels], tuple(channels[0])
 
 
-def _media_of(
+def media_of(
     medium: AnyMedium | Sequence[AnyMedium], regions: Sequence[Region], scenes: int
 ) -> list[tuple[AnyMedium, ...]]:
     """The media of the body and its regions in each scene.

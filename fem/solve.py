@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.labelled import GivenMedia
@@ -224,8 +224,7 @@ def solve_each(
         scene = scene_of(body, mesh, medium, regions, len(scenes))
         surface, inner, media = scene.surface, scene.inner, scene.media
         sources = [
-            sources_of(lights, surface, each, subtract, scene.region_of)
-            for lights, each in zip(scenes, scene.by_label(), strict=True)
+            sources_of(lights, its_body, subtract) for lights, its_body in zip(scenes, scene.bodies, strict=True)
         ]
     work = _Work(scene, sources, mass, limit, watch)
     given = mesh is not None
@@ -235,7 +234,7 @@ def solve_each(
         with watch.stage("mesh"):
             with _told_if_slow(report):
                 mesh = tetrahedralize(surface, inner, cache=cache)
-            lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
+            lit = lit_points([deposit for each in sources for deposit in each.deposits])
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     check_memory(len(mesh.tetrahedra), *size)
@@ -292,7 +291,8 @@ def _refined(
 ) -> dict[int, Step]:
     """Solutions of all scenes on one mesh, refined until it is fine enough or has as many tetrahedra as it may."""
     # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
-    order = sorted(range(len(work.media)), key=lambda scene: base_of(work.media[scene][0]).mean_free_path)
+    bodies = work.scene.bodies
+    order = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     first, *pending = order
     solve_on = work.solver_on(mesh)
     steps = best = {first: solve_on(first, None)}
@@ -336,10 +336,9 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
 
 def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
     """What a user should know of a solution, and where refinement stopped."""
-    warnings, medium = list(solution.surface.warnings), solution.medium
+    warnings = list(solution.surface.warnings)
     if solution.validity is not None:
         warnings += warnings_for(solution.surface, solution.validity)
-        medium = solution.validity.medium
     warnings += [*sources.warnings, *solution.warnings]
     if not solution.error_estimate <= tolerance:
         warnings.append(
@@ -380,9 +379,10 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str
     warnings += _shallow(solution)
     brightest = float(np.max(solution.transmitted_irradiance))
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
+        shallowest = 1.0 / solution.validity.steepest if solution.validity else np.nan
         warnings.append(
             "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-            f"{1 / medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
             "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
         )
     return list(dict.fromkeys(warnings))

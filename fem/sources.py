@@ -1,17 +1,16 @@
 """What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of, by_label
+from tetlux.fem.body import Body
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
-from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -54,22 +53,16 @@ class Sources:
 
 def sources_of(
     lights: Sequence[Light],
-    surface: Surface,
-    media: MediaByLabel | Sequence[AnyMedium],
+    body: Body,
     subtract: Subtract,
-    region_of: Callable[[FloatArray], IntArray] | None = None,
 ) -> Sources:
     """Let lights fall into a body.
 
     Parameters
     ----------
     lights : sequence of Light
-    surface : Surface
-    media : sequence of Medium or VaryingMedium, or mapping of int to these
-        Of the body, and of its regions; or by label, that of the outermost first.
+    body : Body
     subtract : {"half-space", "free-space", "nothing"}
-    region_of : callable, optional
-        The regions that points lie in, if there are several.
 
     Raises
     ------
@@ -81,9 +74,6 @@ def sources_of(
     check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    labelled = by_label(media)
-    outer = next(iter(labelled.values()))
-    uniform = len(labelled) == 1 and isinstance(outer, Medium)
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
@@ -91,9 +81,13 @@ def sources_of(
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract == "half-space"
     for number, light in enumerate(lights):
-        deposit = light.deposit_in(surface, base_of(outer), uniform=uniform)
-        find = _charges_in_one_medium if uniform else _charges_in_several
-        known, rest, found = find(deposit, surface, labelled, region_of, images=images, most=left)
+        deposit = light.deposit_in(body)
+        if body.only_medium is not None:
+            known, rest, found = _charges_in_one_medium(
+                deposit, body.surface, body.only_medium, images=images, most=left
+            )
+        else:
+            known, rest, found = _charges_in_several(deposit, body, images=images, most=left)
         left -= sum(len(some.positions) for some in found)
         charges += found
         owners += [number] * len(found)
@@ -119,14 +113,10 @@ def check_list(lights: Sequence[Light]) -> None:
             raise InputError(f"{light!r} is no light; give lights such as PencilBeam or DiffuseLight.")
 
 
-_RegionOf = Callable[[FloatArray], IntArray] | None
-
-
 def _charges_in_one_medium(
-    deposit: Deposit, surface: Surface, media: MediaByLabel, _: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
-    medium = base_of(next(iter(media.values())))
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
     if len(deposit.starts):
@@ -140,21 +130,27 @@ def _charges_in_one_medium(
 
 
 def _charges_in_several(
-    deposit: Deposit, surface: Surface, media: MediaByLabel, region_of: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, body: Body, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
-    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh."""
-    outer = next(iter(media))
-    places = np.full(len(deposit.points), outer) if region_of is None else region_of(deposit.points)
+    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh.
+
+    What is subtracted solves the equation of the region's medium and no other, so it ends where the region does. Images
+    serve where that region is also what bounds the body nearest to the source.
+    """
+    if len(deposit.points) == 0:
+        return deposit, deposit, []
+    places = body.region_at(deposit.points)
+    outermost = body.region_at(body.just_inside(deposit.points)) == places
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
-        medium, inside = media[region], places == region
+        medium, inside = body.by_label[region], places == region
         if isinstance(medium, Medium) and most > 0:
             some = charges_of(
                 deposit.points[inside],
                 deposit.powers[inside],
-                surface,
+                body.surface,
                 medium,
-                images=images and region == outer,
+                images=images & outermost[inside],
                 most=most,
                 region=region,
             )

@@ -136,7 +136,7 @@ def charges_of(
     surface: Surface,
     medium: Medium,
     *,
-    images: bool,
+    images: bool | BoolArray,
     most: int = MOST_CHARGES,
     region: int | None = None,
 ) -> Charges | None:
@@ -150,8 +150,8 @@ def charges_of(
         W.
     surface : Surface
     medium : Medium
-    images : bool
-        Without them it is the sources in free space.
+    images : bool or (s,) ndarray of bool
+        Of which sources there are images; without them it is the sources in free space.
     most : int
         How many charges can be afforded.
     region : int, optional
@@ -165,19 +165,20 @@ def charges_of(
     positions, strengths, count = [points], [powers], len(points)
     feet, normals = surface.project(points)
     depths = np.linalg.norm(feet - points, axis=1)
-    for foot, normal, depth, power in zip(feet, normals, depths.tolist(), powers.tolist(), strict=True):
+    mirrored = np.broadcast_to(images, len(points)) & (depths > 0)
+    for i in np.flatnonzero(mirrored).tolist():
         if count > most:
             return None
-        if images and depth > 0:
-            heights, weights = _image_line(depth, medium.extrapolation_length)
-            line = foot + heights[:, None] * normal
-            clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
-            clear &= ~surface.contains(line)
-            # Beyond the first charge that comes too close to the body again there may be more of it.
-            clear = np.logical_and.accumulate(clear)
-            positions.append(line[clear])
-            strengths.append(power * weights[clear])
-            count += int(clear.sum())
+        foot, normal, depth, power = feet[i], normals[i], float(depths[i]), float(powers[i])
+        heights, weights = _image_line(depth, medium.extrapolation_length)
+        line = foot + heights[:, None] * normal
+        clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
+        clear &= ~surface.contains(line)
+        # Beyond the first charge that comes too close to the body again there may be more of it.
+        clear = np.logical_and.accumulate(clear)
+        positions.append(line[clear])
+        strengths.append(power * weights[clear])
+        count += int(clear.sum())
     if count > most:
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))

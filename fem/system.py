@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, at_surface, by_label, coefficients_on
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
@@ -15,6 +16,7 @@ from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import LinearResult, Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
+from tetlux.fem.partition import MeshPartition
 from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
@@ -134,7 +136,7 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.media, subtract, self.mesh.region_at)
+            sources = sources_of(lights, Body(self.body, self.media, MeshPartition(self.mesh)), subtract)
         solution, *_ = self._solved(sources, watch, None)
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
@@ -218,8 +220,7 @@ class System:
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        under = at_surface(next(iter(by_label(self.media).values())), mesh, self.coefficients)
-        validity = Validity(mesh, under, sources.lights, sources.deposits)
+        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
         solution = replace(
             added(of_lights),
             warnings=notes,

@@ -19,6 +19,7 @@ from skfem.refdom import RefTet, RefTri
 
 from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.assembly import system_matrix
+from tetlux.fem.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.linear import Solver
@@ -479,7 +480,7 @@ def point_in_a_ball(finenesses: Sequence[float], subtract: Subtract) -> Table:
     coarse = sphere_surface(radius)
     surface = TrueSphere(coarse.points, coarse.faces)
     light = PointSource((0.0, 0.0, height))
-    lit = lit_points([light.deposit_in(coarse, medium)], medium)
+    lit = lit_points([light.deposit_in(LitBody(coarse, (medium,)))])
 
     def truth(x: FloatArray) -> FloatArray:
         gamma = np.arctan2(np.hypot(x[..., 0], x[..., 1]), x[..., 2])

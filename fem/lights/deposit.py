@@ -6,8 +6,8 @@ from typing import Protocol
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
-from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -135,15 +135,6 @@ def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:
 class Light(Protocol):
     """Anything that can say what it leaves in a body."""
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
-        """What this light leaves in a body.
-
-        Parameters
-        ----------
-        surface : Surface
-        medium : Medium
-            Of the body.
-        uniform : bool
-            Whether the body is of this medium throughout; otherwise paths are followed on its mesh.
-        """
+    def deposit_in(self, body: Body) -> Deposit:
+        """What this light leaves in a body."""
         ...

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.lights.point import as_vector
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
 
@@ -216,7 +217,7 @@ def _axes(direction: FloatArray, up: Vector) -> tuple[FloatArray, FloatArray]:
     raised = raised - (raised @ direction) * direction
     length = float(np.linalg.norm(raised))
     if not length > 1e-6 * float(np.linalg.norm(up)):
-        raise InputError(f"up of the spot is {tuple(up)}, along the beam; give another direction that is up.")
+        raise InputError(f"up of the spot is {as_text(up)}, along the beam; give another direction that is up.")
     raised /= length
     return np.cross(direction, raised), raised
 
