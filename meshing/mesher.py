@@ -21,10 +21,10 @@ from tetlux.meshing.errors import InputError, RunError
 from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
-from tetlux.meshing.repair import bodies, compact
 from tetlux.meshing.scratch import run_child, scratch
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.topology import bodies, compact
 
 # The command that fills input.npz of its working directory; -S, since it is told where modules are.
 MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
