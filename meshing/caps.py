@@ -154,7 +154,7 @@ def _flipped(points: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
 def _angle(points: FloatArray, apex: IntArray, a: IntArray, b: IntArray) -> FloatArray:
     """The angle at `apex` between a and b."""
     u, v = points[a] - points[apex], points[b] - points[apex]
-    return np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
 
 
 def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:

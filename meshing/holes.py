@@ -10,7 +10,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.topology import Edges, boundary_loops
 
-Holes = Literal["close", "refuse"]
+Holes = Literal["small", "close", "refuse"]
 # A hole wider than this share of the diagonal is a missing part, and closing it would invent a shape.
 LARGEST_HOLE = 0.05
 # A wider one is closed all the same if its cap is smaller than this share of the diagonal's square: a slit.
@@ -22,7 +22,7 @@ DESCRIBED = 5
 
 
 def close_holes(
-    points: FloatArray, faces: IntArray, name: str, unit: str, holes: Holes | None, repairs: list[str]
+    points: FloatArray, faces: IntArray, name: str, unit: str, holes: Holes, repairs: list[str]
 ) -> tuple[FloatArray, IntArray]:
     """Cap holes, small ones or all, and say so.
 
@@ -32,9 +32,8 @@ def close_holes(
     faces : (m, 3) ndarray
     name, unit : str
         Used in messages.
-    holes : "close", "refuse" or None
-        Whether holes of any size are capped, or none; if not given, those that leave no choice: small ones, slits,
-        and those of three edges.
+    holes : "small", "close" or "refuse"
+        Which holes are capped: those that leave no choice (narrow ones, slits, those of three edges), all, or none.
     repairs : list of str
         Sentences are added to it.
 
@@ -53,9 +52,11 @@ def close_holes(
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     small = [_is_small(points[loop], diagonal) for loop in loops]
     if holes == "refuse" and loops:
-        raise InputError(f"{_largest(name, points, loops)}; close it in a mesh editor, or leave surface.holes out.")
+        raise InputError(
+            f"{_largest(name, points, loops)}; close it in a mesh editor, or leave out surface.holes: refuse."
+        )
     wide = [loop for loop, is_small in zip(loops, small, strict=True) if not is_small]
-    if holes is None and wide:
+    if holes == "small" and wide:
         raise InputError(
             f'{_largest(name, points, wide)}; cap it with surface.holes: close (in Python holes="close"), or close '
             "it in a mesh editor."

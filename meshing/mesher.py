@@ -22,7 +22,7 @@ from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import nesting, tagged
 from tetlux.meshing.scratch import run_child, scratch
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface import Surface, body_sizes
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 from tetlux.meshing.topology import bodies, compact
 
@@ -77,7 +77,8 @@ THINNEST = 0.002
 # A region whose inner ones leave it less than this share of its volume is filled by them.
 LEFT = 1e-6
 MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
-# Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
+# Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope, unless the surface has
+# bodies as small.
 DEBRIS = 1e-3
 
 
@@ -275,7 +276,7 @@ def _part(mesh: TetMesh, shell: _Shell) -> TetMesh:
     if len(tetrahedra) == 0:
         raise _NotTheBodyError(
             f"{shell.surface.name}: the mesh lost it, since it is too small beside the body; "
-            "give a smaller deviation, or leave it out."
+            "leave it out, or give tetrahedralize a smaller deviation."
         )
     return TetMesh(*compact(mesh.points, tetrahedra), mesh.unit)
 
@@ -397,9 +398,17 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: I
     keep = volumes > 0
     lump = bodies(len(points), tetrahedra)
     share = np.bincount(lump, volumes) / volumes.sum()
-    keep &= share[lump] > DEBRIS
+    keep &= share[lump] > _largest_debris(surface)
     mesh = TetMesh(*compact(points, tetrahedra[keep]), surface.unit)
     return mesh if tags is None else replace(mesh, regions=tags[keep])
+
+
+def _largest_debris(surface: Surface) -> float:
+    """The share of the volume below which a lump is debris: no body of the surface is, however small."""
+    if surface.overlaps:
+        return DEBRIS
+    volume, _ = body_sizes(surface.points, surface.faces, bodies(len(surface.points), surface.faces))
+    return min(DEBRIS, 0.5 * float(volume.min() / volume.sum()))
 
 
 def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
@@ -416,7 +425,8 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
         if not lowest <= change <= slack:
             raise _NotTheBodyError(
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
-                f"the mesher's deviation of {deviation:.3g} {surface.unit}: give a smaller deviation."
+                f"the mesher's deviation of {deviation:.3g} {surface.unit}: thicken or remove them, or give "
+                "tetrahedralize a smaller deviation."
             )
     of_surface = bodies(len(surface.points), surface.faces)
     # The first vertices of each body: a small one may be gone without a trace in the sums.
@@ -426,12 +436,12 @@ def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     if not surface.overlaps and (astray > LOST * deviation).any():
         raise _NotTheBodyError(
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
-            "others; give a smaller deviation, or leave it out."
+            "others; remove it, or give tetrahedralize a smaller deviation."
         )
     wanted = len(first)
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:
         raise _NotTheBodyError(
             f"{surface.name}: the mesh fell into {parts} parts where the surface has {wanted}; "
-            "give a smaller deviation, or thicken the narrowest part."
+            "thicken the narrowest part, or give tetrahedralize a smaller deviation."
         )

@@ -14,6 +14,7 @@ from tetlux.meshing.formats.scene import read_scene
 from tetlux.meshing.formats.stl import read_stl
 from tetlux.meshing.holes import Holes
 from tetlux.meshing.paths import exists, is_file, is_folder
+from tetlux.meshing.quiet import quiet
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.surface import Surface
 
@@ -26,7 +27,7 @@ READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
 SUFFIXES = (*READERS, ".glb", ".gltf", ".3mf")
 
 
-def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, holes: Holes | None = None) -> Surface:
+def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, holes: Holes = "small") -> Surface:
     """Read a closed triangle mesh from a file, check it, and mend what can be mended safely.
 
     Parameters
@@ -37,8 +38,8 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
         Unit of the coordinates once multiplied by `scale`: nm, um, mm, cm, m or in.
     scale : float
         Factor on the file's coordinates.
-    holes : "close" or "refuse", optional
-        Whether holes of any size are capped, or none; see `surface_from_arrays`.
+    holes : "small", "close" or "refuse"
+        Which holes are capped: see `surface_from_arrays`.
 
     Returns
     -------
@@ -81,7 +82,8 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
 def _load(path: Path) -> tuple[FloatArray, IntArray]:
     reader = READERS.get(path.suffix.lower())
     try:
-        points, faces = reader(path.read_bytes()) if reader else read_scene(path)
+        with quiet(), np.errstate(all="ignore"):
+            points, faces = reader(path.read_bytes()) if reader else read_scene(path)
     except InputError as error:
         raise InputError(f"{path} {error}") from error
     if len(faces) == 0:

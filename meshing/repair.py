@@ -1,5 +1,7 @@
 """What is wrong with a triangle mesh, what can be mended safely, and words for both."""
 
+from typing import get_args
+
 import numpy as np
 import numpy.typing as npt
 
@@ -31,7 +33,7 @@ def surface_from_arrays(
     *,
     unit: str = "mm",
     name: str = "surface",
-    holes: Holes | None = None,
+    holes: Holes = "small",
 ) -> Surface:
     """Check a triangle mesh, mend what can be mended safely, and say what was done.
 
@@ -43,9 +45,9 @@ def surface_from_arrays(
         One of nm, um, mm, cm, m, in.
     name : str
         Used in messages.
-    holes : "close" or "refuse", optional
-        Whether holes of any size are capped, or none. If not given, those are that leave no choice: up to 5 % of the
-        diagonal wide, of three edges, or slits.
+    holes : "small", "close" or "refuse"
+        Which holes are capped: those that leave no choice (up to 5 % of the diagonal wide, slits, those of three
+        edges), all, or none.
 
     Returns
     -------
@@ -65,8 +67,8 @@ def surface_from_arrays(
     """
     if unit not in UNITS:
         raise InputError(f'unit "{unit}" is not known; give one of {", ".join(UNITS)}.')
-    if holes not in (None, "close", "refuse"):
-        raise InputError(f'holes is "{holes}"; give "close" or "refuse", or leave it out.')
+    if holes not in get_args(Holes):
+        raise InputError(f'holes is "{holes}"; give one of {", ".join(get_args(Holes))}.')
     points, faces = _checked_arrays(points, faces, name)
     repairs: list[str] = []
     warnings: list[str] = []

@@ -1,11 +1,15 @@
 """Wavefront OBJ: `v` and `f`; everything else is about looks, curves or names."""
 
 import re
+from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.formats.polygons import flatten, triangulate
+from tetlux.meshing.formats.polygons import triangulate
+
+KINDS = {b"v ": 0, b"v\t": 0, b"f ": 1, b"f\t": 1}
 
 
 def read_obj(data: bytes) -> tuple[FloatArray, IntArray]:
@@ -21,31 +25,27 @@ def read_obj(data: bytes) -> tuple[FloatArray, IntArray]:
     """
     if b"\\" in data:
         data = re.sub(rb"\\[ \t]*(\r\n|\n|\r)", b" ", data)
-    rows = [line.split() for line in data.splitlines()]
-    vertices: list[list[bytes]] = []
-    faces: list[list[bytes]] = []
-    before: list[int] = []
-    for row in rows:
-        if not row:
-            continue
-        if row[0] == b"v":
-            vertices.append(row[1:4])
-        elif row[0] in (b"f", b"fo"):
-            comment = next((i for i, word in enumerate(row) if word.startswith(b"#")), len(row))
-            faces.append(row[1:comment])
-            before.append(len(vertices))
-    points = np.array(vertices, dtype=np.bytes_).astype(np.float64).reshape(len(vertices), -1)
-    words, counts = flatten(faces)
-    corners = _indices(words)
-    start = np.repeat(np.array(before, dtype=np.int64), counts)
+    if b"#" in data:
+        data = re.sub(rb"#[^\r\n]*", b"", data)
+    lines = [line for line in map(bytes.lstrip, data.removeprefix(b"\xef\xbb\xbf").splitlines()) if line[:2] in KINDS]
+    kinds = np.array([KINDS[line[:2]] for line in lines], dtype=np.int64)
+    words, starts, counts = _words([line for line in lines if line[:1] == b"v"], b"v")
+    if (counts < 3).any():
+        raise ValueError("a vertex of fewer than three coordinates")
+    points = words[starts[:, None] + np.arange(1, 4)].astype(np.float64)
+    words, starts, counts = _words([line for line in lines if line[:1] == b"f"], b"f")
+    corners = np.delete(words, starts).astype(np.int64)
     # A 0 or what counts back too far becomes -1, which names no vertex.
-    corners = np.where(corners > 0, corners - 1, np.where(corners < 0, np.maximum(corners + start, -1), -1))
+    before = np.repeat(np.cumsum(kinds == 0)[kinds == 1], counts)
+    corners = np.where(corners > 0, corners - 1, np.where(corners < 0, np.maximum(corners + before, -1), -1))
     return points, triangulate(points, corners, counts)
 
 
-def _indices(words: list[object]) -> IntArray:
-    """The numbers before the first slash of each word."""
-    text = b" ".join(words)  # type: ignore[arg-type]
+def _words(lines: Sequence[bytes], key: bytes) -> tuple[npt.NDArray[np.bytes_], IntArray, IntArray]:
+    """The words of lines that begin with a key, where each line begins, and how many words follow its key."""
+    text = b" ".join(lines)
     if b"/" in text:
         text = re.sub(rb"/\S*", b"", text)
-    return np.array(text.split(), dtype=np.bytes_).astype(np.int64)
+    words = np.array(text.split(), dtype=np.bytes_)
+    starts = np.flatnonzero(words == key)
+    return words, starts, np.diff(starts, append=len(words)) - 1

@@ -8,7 +8,6 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.quiet import quiet
 
 COMPRESSED = {
     "KHR_draco_mesh_compression": "Draco-compressed",
@@ -35,9 +34,8 @@ def read_scene(path: Path) -> tuple[FloatArray, IntArray]:
         check_gltf(_gltf_head(path))
     # Of a file's pictures and materials nothing is wanted: only glTF has triangles in other files.
     resolver = None if path.suffix.lower() == ".gltf" else ZipResolver({})
-    with quiet(), np.errstate(all="ignore"):
-        scene = trimesh.load_scene(path, resolver=resolver, process=False)
-        meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh)]
+    scene = trimesh.load_scene(path, resolver=resolver, process=False)
+    meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh)]
     if not meshes:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     offsets = np.cumsum([0] + [len(m.vertices) for m in meshes])
