@@ -4,6 +4,8 @@ Liepa, Filling holes in meshes, SGP 2003; with the harmonic surface in place of 
 the convex hull of the rim: a flat rim gets a flat cap.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -19,6 +21,8 @@ DENSITY = 2.0
 ROUNDS = 12
 # Triangles of one cap. A rim of n edges needs about n squared / 10.
 MOST = 20_000
+# What is gained by turning over the edge a-b of triangles abc and bad, (e,), from the corners (e, 3).
+Gain = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
 def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, IntArray]:
@@ -61,7 +65,7 @@ def triangulate_polygon(corners: FloatArray) -> IntArray:
     faces = np.vstack(parts)
     # Where the rim is hollow a chain's triangles are folded onto the others; flips unfold them.
     for _ in range(ROUNDS):
-        faces, flips = _flipped(corners, faces)
+        faces, flips = _flipped(corners, faces, _area_saved)
         if not flips:
             break
     return faces
@@ -115,14 +119,14 @@ def _refined(rim: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
         faces = np.vstack([faces[~large], *pieces])
         points, size = np.vstack([points, middle[large]]), np.concatenate([size, wanted[large].mean(axis=1)])
         for _ in range(ROUNDS):
-            faces, flips = _flipped(points, faces)
+            faces, flips = _flipped(points, faces, _angles_beyond)
             if not flips:
                 break
     return points[len(rim) :], faces
 
 
-def _flipped(points: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
-    """Inner edges whose two opposite angles are more than 180 degrees together, turned over; no two of a triangle."""
+def _flipped(points: FloatArray, faces: IntArray, gain: Gain) -> tuple[IntArray, int]:
+    """Inner edges a-b between triangles with apexes c and d, made edges c-d where that gains; no two of a triangle."""
     edges = Edges(faces)
     count = len(faces)
     inner = edges.sides((edges.triangles == 2) & (edges.balance == 0))
@@ -131,14 +135,13 @@ def _flipped(points: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
         return faces, 0
     apex = faces.T[[2, 0, 1]].ravel()
     a, b, c, d = edges.start[pairs[:, 0]], edges.end[pairs[:, 0]], apex[pairs[:, 0]], apex[pairs[:, 1]]
-    one, other = _angle(points, c, a, b), _angle(points, d, a, b)
-    excess = one + other - np.pi
+    gains = gain(*(points[corner] for corner in (a, b, c, d)))
     existing = set((np.minimum(edges.start, edges.end) * len(points) + np.maximum(edges.start, edges.end)).tolist())
     busy = np.zeros(count, dtype=bool)
     result = faces.copy()
     flips = 0
-    for i in np.argsort(-excess):
-        if excess[i] < 1e-6:
+    for i in np.argsort(-gains):
+        if gains[i] <= 0:
             break
         first, second = pairs[i] % count
         key = int(min(c[i], d[i]) * len(points) + max(c[i], d[i]))
@@ -151,10 +154,24 @@ def _flipped(points: FloatArray, faces: IntArray) -> tuple[IntArray, int]:
     return result, flips
 
 
-def _angle(points: FloatArray, apex: IntArray, a: IntArray, b: IntArray) -> FloatArray:
-    """The angle at `apex` between a and b."""
-    u, v = points[a] - points[apex], points[b] - points[apex]
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
+def _angles_beyond(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """By how much the angles at c and d exceed two right ones together: the Delaunay criterion."""
+
+    def angle(apex: FloatArray) -> FloatArray:
+        u, v = a - apex, b - apex
+        return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
+
+    return angle(c) + angle(d) - np.pi - 1e-6
+
+
+def _area_saved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """How much less area two triangles have that were folded onto each other."""
+
+    def area(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(np.cross(q - p, r - p), axis=1))
+
+    before, after = area(a, b, c) + area(a, b, d), area(a, c, d) + area(b, c, d)
+    return before * (1.0 - 1e-9) - after
 
 
 def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.caps import cap
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import triangle_areas
+from tetlux.meshing.surface import place_words, triangle_areas
 from tetlux.meshing.topology import Edges, boundary_loops
 
 Holes = Literal["small", "close", "refuse"]
@@ -73,7 +73,7 @@ def close_holes(
     if wide:
         areas = [float(triangle_areas(points, added)[1].sum()) for added in new_faces[1:]]
         wide_areas = [area for area, is_small in zip(areas, small, strict=True) if not is_small]
-        repairs.append(_caps_sentence(wide_areas, [points[loop].mean(axis=0) for loop in wide], unit))
+        repairs.append(_caps_sentence(wide_areas, [_middle(points, loop) for loop in wide], unit))
     return points, np.vstack(new_faces)
 
 
@@ -121,17 +121,18 @@ def _largest(name: str, points: FloatArray, loops: list[IntArray]) -> str:
     others = "" if len(loops) == 1 else f", the largest of {len(loops)}"
     return (
         f"{name}: the surface is open: a hole of {len(loop)} edges, {widths[widest]:.4g} wide around "
-        f"({_at(points[loop].mean(axis=0))}){others}"
+        f"{_middle(points, loop)}{others}"
     )
 
 
-def _caps_sentence(areas: list[float], places: list[FloatArray], unit: str) -> str:
+def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
     """What was capped: number, area and place of each, the largest first."""
     order = np.argsort(areas)[::-1]
-    each = [f"{areas[i]:.4g} {unit}² around ({_at(places[i])})" for i in order[:DESCRIBED]]
+    each = [f"{areas[i]:.4g} {unit}² around {places[i]}" for i in order[:DESCRIBED]]
     more = f" and {len(areas) - DESCRIBED} smaller ones" if len(areas) > DESCRIBED else ""
     return f"capped {len(areas)} {'hole' if len(areas) == 1 else 'holes'}: {', '.join(each)}{more}."
 
 
-def _at(place: FloatArray) -> str:
-    return ", ".join(f"{x:.4g}" for x in place)
+def _middle(points: FloatArray, loop: IntArray) -> str:
+    """Where a hole is."""
+    return place_words(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))

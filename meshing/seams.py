@@ -51,9 +51,9 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     if len(stitched) == 0 or (Edges(stitched).triangles % 2).sum() >= (before.triangles % 2).sum():
         return points, faces
     if joined:
-        repairs.append(f"joined {joined} vertices across hair cracks.")
+        repairs.append(f"closed hair cracks: joined {joined} {'vertex' if joined == 1 else 'vertices'} to others.")
     if inserted:
-        repairs.append(f"stitched seams: put {inserted} vertices on the edges that they lie on (T-junctions).")
+        repairs.append(f"stitched {inserted} {'T-junction' if inserted == 1 else 'T-junctions'}.")
     return compact(points, stitched)
 
 

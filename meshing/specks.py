@@ -4,7 +4,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.mesher import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface import body_sizes
+from tetlux.meshing.surface import body_sizes, place_words
 from tetlux.meshing.topology import bodies, compact
 
 # A body of a mean thickness 2 V/A below this many of the mesher's deviations is dropped. Balls and cubes beside a ball
@@ -46,10 +46,11 @@ def drop_specks(points: FloatArray, faces: IntArray, unit: str, repairs: list[st
 
 def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntArray, unit: str) -> str:
     places, sizes = [], []
+    size = float(np.linalg.norm(np.ptp(points, axis=0)))
     for one in specks:
         corners = points[faces[body == one]].reshape(-1, 3)
         sizes.append(float(np.linalg.norm(np.ptp(corners, axis=0))))
-        places.append("(" + ", ".join(f"{x:.4g}" for x in corners.mean(axis=0)) + ")")
+        places.append(place_words(corners.mean(axis=0), size))
     more = f" and {len(places) - DESCRIBED} more places" if len(places) > DESCRIBED else ""
     what = "a speck" if len(places) == 1 else f"{len(places)} specks"
     return (
