@@ -80,6 +80,12 @@ def single_faces(points: FloatArray, faces: IntArray, repairs: list[str]) -> Int
     return np.asarray(faces[np.sort(kept)])
 
 
+def without_pairs(faces: IntArray) -> IntArray:
+    """Of triangles given an even number of times none, of others one: each edge stays as even or odd as it was."""
+    first, kind = distinct_rows(np.sort(faces, axis=1))
+    return np.asarray(faces[np.sort(first[np.bincount(kind) % 2 == 1])])
+
+
 def _bounding(points: FloatArray, plain: IntArray, double: IntArray) -> BoolArray:
     """Which two-sided triangles (d, 3) belong to the surface that the one-sided ones (p, 3) are part of, (d,)."""
     if len(double) == 0:

@@ -9,7 +9,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.holes import Holes, check_closed, close_holes
-from tetlux.meshing.merge import MERGE_TOLERANCE, merge_vertices, single_faces
+from tetlux.meshing.merge import MERGE_TOLERANCE, merge_vertices, single_faces, without_pairs
 from tetlux.meshing.orient import face_outward, wind_consistently
 from tetlux.meshing.seams import stitch
 from tetlux.meshing.specks import drop_specks
@@ -75,9 +75,9 @@ def surface_from_arrays(
     rounding = _rounding(points)
     points, faces = _joined(points, faces, name, rounding, repairs)
     points, faces = close_holes(points, faces, name, unit, holes, repairs)
-    # A triangle that hangs loose is closed by itself turned over.
-    points, faces = compact(points, single_faces(points, faces, []))
-    _check_solid(points, faces, name, rounding)
+    # A triangle that hangs loose was closed by itself turned over.
+    points, faces = compact(points, without_pairs(faces))
+    _check_solid(points, faces, name, rounding, least=4)
     check_closed(faces, name, warnings)
     faces = wind_consistently(faces, name, repairs)
     points, faces = drop_specks(points, faces, unit, repairs)
@@ -102,18 +102,18 @@ def _joined(
     """Triangles that share their corners and edges, each once."""
     points, faces = merge_vertices(points, faces, repairs)
     points, faces = compact(points, single_faces(points, faces, repairs))
-    _check_solid(points, faces, name, rounding)
+    _check_solid(points, faces, name, rounding, least=1)
     return stitch(points, faces, repairs)
 
 
-def _check_solid(points: FloatArray, faces: IntArray, name: str, rounding: float) -> None:
+def _check_solid(points: FloatArray, faces: IntArray, name: str, rounding: float, least: int) -> None:
     """Refuse what is too little or too flat for a body."""
-    if len(faces) < 4 and rounding > MERGE_TOLERANCE:
+    if len(faces) < least and rounding > MERGE_TOLERANCE:
         raise InputError(
             f"{name}: the surface lies so far from the origin that its vertices are not told apart; move it to the "
             "origin where it was made, and write it again."
         )
-    if len(faces) < 4:
+    if len(faces) < least:
         raise InputError(f"{name}: the mesh has {len(faces)} usable triangles; a body needs at least four.")
     if np.ptp(points, axis=0).min() == 0:
         raise InputError(f"{name}: the surface is flat and encloses no volume; give a closed surface.")

@@ -45,15 +45,15 @@ def drop_specks(points: FloatArray, faces: IntArray, unit: str, repairs: list[st
 
 
 def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntArray, unit: str) -> str:
-    places, sizes = [], []
+    """How many specks are dropped, how large they are, and where the first ones are."""
+    order = np.argsort(body, kind="stable")
+    first = np.searchsorted(body[order], np.arange(int(body.max()) + 1))
+    corners = points[faces[order]]
+    extent = np.maximum.reduceat(corners.max(axis=1), first) - np.minimum.reduceat(corners.min(axis=1), first)
+    largest = float(np.linalg.norm(extent[specks], axis=1).max())
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
-    for one in specks:
-        corners = points[faces[body == one]].reshape(-1, 3)
-        sizes.append(float(np.linalg.norm(np.ptp(corners, axis=0))))
-        places.append(place_words(corners.mean(axis=0), size))
-    more = f" and {len(places) - DESCRIBED} more places" if len(places) > DESCRIBED else ""
-    what = "a speck" if len(places) == 1 else f"{len(places)} specks"
-    return (
-        f"dropped {what} of up to {max(sizes):.2g} {unit}, smaller than the mesh can show, at "
-        f"{', '.join(places[:DESCRIBED])}{more}."
-    )
+    middles = [points[faces[body == one]].mean(axis=(0, 1)) for one in specks[:DESCRIBED]]
+    places = ", ".join(place_words(middle, size) for middle in middles)
+    more = f" and {len(specks) - DESCRIBED} more places" if len(specks) > DESCRIBED else ""
+    what = "a speck" if len(specks) == 1 else f"{len(specks):,} specks"
+    return f"dropped {what} of up to {largest:.2g} {unit}, smaller than the mesh can show, at {places}{more}."
