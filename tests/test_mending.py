@@ -169,6 +169,22 @@ def test_a_missing_triangle_is_put_back() -> None:
         surface_from_arrays(coarse.points, coarse.faces[1:], holes="refuse")
 
 
+def test_three_sides_of_a_tetrahedron_want_one_more() -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    surface = surface_from_arrays(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2]])
+    assert surface.volume == pytest.approx(1 / 6)
+    with pytest.raises(InputError, match="0 usable triangles"):
+        surface_from_arrays(corners, [[1, 2, 3]])
+
+
+def test_many_triangles_missing_at_random_are_capped() -> None:
+    """Holes that touch, and single triangles left between them: what is capped is closed, whatever it is like."""
+    for seed in range(5):
+        left = np.random.default_rng(seed).permutation(FACES)[70:]
+        surface = surface_from_arrays(POINTS, left, holes="close")
+        assert surface.volume == pytest.approx(BALL.volume, rel=0.1)
+
+
 def test_a_slit_is_closed_however_long() -> None:
     points, faces = box((20.0, 10.0, 5.0)).points, box((20.0, 10.0, 5.0)).faces
     # One triangle of the top gets corners of its own, a little lower: the slit round it has six edges.
