@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.mesher import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface import body_sizes, place_words
 from tetlux.meshing.topology import bodies, compact
@@ -34,14 +34,25 @@ def drop_specks(points: FloatArray, faces: IntArray, unit: str, repairs: list[st
     large = volume >= DEBRIS * volume.sum()
     if large.all() or not large.any():
         return points, faces
-    diagonal = float(np.linalg.norm(np.ptp(points[faces[large[body]]].reshape(-1, 3), axis=0)))
-    thickness = 2.0 * volume[large].sum() / area[large].sum()
-    deviation = min(DEVIATION * diagonal, DEVIATION_OF_THICKNESS * thickness)
-    speck = ~large & (2.0 * volume < SPECK * deviation * area)
+    kept = large
+    speck = ~large & (2.0 * volume < SPECK * _deviation(points, faces, body, kept, volume, area) * area)
+    # What is kept widens the box, and so the mesher's deviation.
+    while (~speck != kept).any():
+        kept = ~speck
+        speck |= ~large & (2.0 * volume < SPECK * _deviation(points, faces, body, kept, volume, area) * area)
     if not speck.any():
         return points, faces
     repairs.append(_sentence(points, faces, body, np.flatnonzero(speck), unit))
     return compact(points, faces[~speck[body]])
+
+
+def _deviation(
+    points: FloatArray, faces: IntArray, body: IntArray, kept: BoolArray, volume: FloatArray, area: FloatArray
+) -> float:
+    """The mesher's deviation for the bodies that are kept, (b,)."""
+    diagonal = float(np.linalg.norm(np.ptp(points[faces[kept[body]]].reshape(-1, 3), axis=0)))
+    thickness = float(2.0 * volume[kept].sum() / area[kept].sum())
+    return min(DEVIATION * diagonal, DEVIATION_OF_THICKNESS * thickness)
 
 
 def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntArray, unit: str) -> str:

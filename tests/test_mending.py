@@ -320,9 +320,17 @@ def test_bodies_of_one_size_are_no_specks() -> None:
     assert surface_from_arrays(*together(*beads)).volume == pytest.approx(20 * 0.05**3 * BALL.volume)
 
 
+def test_a_wider_scene_makes_larger_specks() -> None:
+    """The mesher's deviation goes with the diagonal of all that is kept: a cube of 1 is kept at 14, not at 140."""
+    near, far = crumb(1.0, 14.0, 0.0, 0.0), crumb(3.0, 0.0, 200.0, 0.0)
+    assert surface_from_arrays(*together((POINTS, FACES), near)).repairs == ()
+    surface = surface_from_arrays(*together((POINTS, FACES), near, far))
+    assert surface.repairs == ("dropped a speck of up to 1.7 mm, smaller than the mesh can show, at (14, 0, 0).",)
+
+
 def test_the_limit_of_a_speck() -> None:
     deviation = 0.01 * BALL.diagonal
-    for factor, dropped in ((0.9, 1), (1.1, 0)):
+    for factor, dropped in ((0.9, 1), (1.2, 0)):
         # Of a cube 2 V / A is a third of its side.
         size = factor * 3.0 * SPECK * deviation
         surface = surface_from_arrays(*together((POINTS, FACES), crumb(size, 14.0, 0.0, 0.0)))
