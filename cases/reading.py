@@ -73,7 +73,7 @@ class Reader:
 
 def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:
     if spec.file is not None:
-        return read_surface(folder / spec.file, unit=unit, scale=spec.scale)
+        return read_surface(folder / spec.file, unit=unit, scale=spec.scale, holes=spec.holes)
     if spec.sphere:
         return shapes.sphere(spec.sphere.radius, center=spec.sphere.center, unit=unit)
     if spec.slab:

@@ -55,6 +55,9 @@ class SurfaceSpec(Choice):
     crease_angle: float = Field(
         30.0, ge=0, le=180, description="degrees; triangles that bend less are one smooth surface, 0: all are flat"
     )
+    holes: Literal["small", "close", "refuse"] = Field(
+        "small", description="which holes of a file are closed: small ones, all (close), none (refuse)"
+    )
     sphere: SphereSpec | None = None
     slab: SlabSpec | None = None
     box: BoxSpec | None = None
@@ -65,6 +68,8 @@ class SurfaceSpec(Choice):
     def _scale_of_a_file(self) -> "SurfaceSpec":
         if self.file is None and self.scale != 1.0:
             raise PydanticCustomError("scale", "scale belongs to a file; give the shape its own lengths")
+        if self.file is None and self.holes != "small":
+            raise PydanticCustomError("holes", "holes belongs to a file; built-in shapes are closed")
         return self
 
 

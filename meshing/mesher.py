@@ -18,10 +18,11 @@ from tetlux.meshing.errors import InputError, RunError
 from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import tagged
-from tetlux.meshing.repair import bodies, compact
-from tetlux.meshing.shells import DEVIATION_OF_THICKNESS, shells_of
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
+from tetlux.meshing.shells import shells_of
+from tetlux.meshing.surface import Surface, body_sizes
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.topology import bodies, compact
 
 # Measured with what follows on 2 cores, from surface to mesh, without the cache. Seconds are of the quietest of four
 # runs; the rest is over ten. Volume is against the surface's; deviation is of the mesh whose boundary was moved back,
@@ -39,8 +40,6 @@ from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 # mean free paths across and at tolerances from .05 to .005, half to 2.5 times this deviation take the same time within
 # a fifth and end with as many nodes.
 #
-# Default deviation: this share of the diagonal, or of the body's mean thickness 2 V/A if that is less.
-DEVIATION = 0.01
 # What fTetWild's envelope gets of the deviation; the proxy gets the rest. Time goes with the proxy's triangles
 # and with the inverse of the envelope: from .45 to .7 it is the same within a fifth.
 ENVELOPE = 0.55
@@ -62,8 +61,6 @@ NOT_INSTALLED = (
     "pytetwild, which fills surfaces with tetrahedra, is not installed, and pip has no wheel of it for Intel Macs; "
     "give tetrahedra in place of the surface, or build it: pip install pytetwild."
 )
-# Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
-DEBRIS = 1e-3
 
 
 def tetrahedralize(
@@ -267,6 +264,14 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: I
     keep = volumes > 0
     lump = bodies(len(points), tetrahedra)
     share = np.bincount(lump, volumes) / volumes.sum()
-    keep &= share[lump] > DEBRIS
+    keep &= share[lump] > _largest_debris(surface)
     mesh = TetMesh(*compact(points, tetrahedra[keep]), surface.unit)
     return mesh if tags is None else replace(mesh, regions=tags[keep])
+
+
+def _largest_debris(surface: Surface) -> float:
+    """The share of the volume below which a lump is debris: no body of the surface is, however small."""
+    if surface.overlaps:
+        return DEBRIS
+    volume, _ = body_sizes(surface.points, surface.faces, bodies(len(surface.points), surface.faces))
+    return min(DEBRIS, 0.5 * float(volume.min() / volume.sum()))

@@ -5,10 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tetlux.meshing.regions import nesting
+from tetlux.meshing.resolution import DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface import Surface
 
-# Default deviation from a surface, as a share of the mean thickness 2 V/A of what lies on either side of it.
-DEVIATION_OF_THICKNESS = 0.25
 # Default deviation of an inner surface: this share of its own diagonal, or of its region's mean thickness as above.
 # Seconds of the mesher and what the inner ball's volume lacks, until refinement puts more nodes onto it, at .02, .03
 # and .05: a twentieth of a ball's size, 3.4, 2.1, 1.5 and 3.9, 5.0, 8.0 %; 5 wide in the hare, which alone takes .9,

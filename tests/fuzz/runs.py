@@ -80,7 +80,7 @@ def write_surface(folder: Path, malformed: Malformed, tolerance: float = 0.02) -
     # Twenty mean free paths, if it is of the size that it should be.
     across = 20.0 / malformed.size
     case = {
-        "surface": {"file": file.name},
+        "surface": {"file": file.name, "holes": malformed.holes},
         "medium": {"sigma_a": 0.01 * across, "sigma_s_prime": across, "eta": 1.4},
         "lights": [{"diffuse": {"irradiance": 1.0}}],
         "tolerance": tolerance,
