@@ -24,8 +24,6 @@ from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
-from tetlux.meshing.paths import exists
-from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 
@@ -130,26 +128,6 @@ class Case:
         return tuple(self.channels[0].lights.values())
 
 
-def library_folder() -> Path:
-    """The folder of the case files that ship with the package."""
-    return Path(__file__).with_name("library")
-
-
-def find_case_file(request: str) -> Path:
-    """A path as given, or the shipped case file of that name where there is no such path."""
-    path = Path(request)
-    shipped = library_folder() / f"{request}.yaml"
-    known = exists(path)
-    if not known and path.name == request and shipped.is_file():
-        return shipped
-    if not known and path.name == request and not path.suffix:
-        names = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
-        raise InputError(f"{request} is neither a file nor one of the cases that ship: {names}.")
-    if path.suffix.lower() in SUFFIXES:
-        raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
-    return path
-
-
 def load_cases(path: Path) -> list[Case]:
     """Read a case file: one case, or as many as its sweep makes.
 
@@ -166,7 +144,7 @@ def load_cases(path: Path) -> list[Case]:
     reader = Reader(path.parent)
     cases = []
     for label, data, keys in swept(document, spec):
-        single = document if label is None else Document(path, data, {**document.lines, **keys})
+        single = document if label is None else Document(path, data, {**document.lines, **keys}, label)
         one = spec if label is None else validated(single, data)
         name = one.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:

@@ -11,9 +11,10 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import picture, run
-from tetlux.cases.case import Case, find_case_file, load_cases
+from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
 from tetlux.cases.run import run_case
+from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab
 from tetlux.fem.solve import solve_each
 from tetlux.meshing import RunError
