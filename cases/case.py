@@ -22,6 +22,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
 from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.regions import check_regions
@@ -44,6 +45,8 @@ class Channel:
     name: str
     medium: AnyMedium
     lights: Mapping[str, Light]
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +75,10 @@ class Case:
         Spent on reading and checking the surface.
     comparison : Comparison, optional
         Closed forms to hold the run against.
+    spec : CaseSpec
+        What the case file says of this run.
+    swept : mapping of str to float or str
+        The values of this run of a sweep, by their dotted keys.
     """
 
     name: str
@@ -82,6 +89,8 @@ class Case:
     regions: tuple[Region, ...]
     tolerance: float
     outputs: tuple[str, ...]
+    spec: CaseSpec
+    swept: Mapping[str, float | str]
     sensors: tuple[Sensor, ...] = ()
     camera: Vector | None = None
     reading_seconds: float = 0.0
@@ -127,6 +136,8 @@ class Case:
         """The lights of the first channel."""
         return tuple(self.channels[0].lights.values())
 
+    __repr__ = one_line
+
 
 def load_cases(path: Path) -> list[Case]:
     """Read a case file: one case, or as many as its sweep makes.
@@ -143,17 +154,17 @@ def load_cases(path: Path) -> list[Case]:
     spec = validated(document, document.data)
     reader = Reader(path.parent)
     cases = []
-    for label, data, keys in swept(document, spec):
+    for label, values, data, keys in swept(document, spec):
         single = document if label is None else Document(path, data, {**document.lines, **keys}, label)
         one = spec if label is None else validated(single, data)
         name = one.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise single.error(("name",), "this makes no name of a folder, or too long a one; give a short name.")
-        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
+        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader, values))
     return cases
 
 
-def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:
+def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]) -> Case:
     reader.seconds = 0.0
     with document.at(("surface",)):
         surface = reader.surface(spec.surface, spec.unit)
@@ -191,6 +202,8 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
         regions=regions,
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
+        spec=spec,
+        swept=values,
         sensors=tuple(sensors),
         camera=spec.camera.position if spec.camera else None,
         reading_seconds=reader.seconds,

@@ -15,17 +15,20 @@ from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.results import Results, results_of, surface_values, volume_values
 from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
+from tetlux.cases.vtp import write_vtp
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files import write_mesh
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+# The same surface for VTK, PyVista and ParaView, which show no values of a PLY.
+VTP = "surface.vtp"
 READINGS = "detectors.csv"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary last: see `publish`.
-ALL_FILES = (*FILES.values(), READINGS, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), VTP, READINGS, *COMPARISON, SUMMARY)
 
 
 def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: bool = True) -> Path:
@@ -88,10 +91,7 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     unit = case.surface.unit
     warnings = _warnings(results)
     if "surface" in case.outputs:
-        comments = [f"lengths in {unit}, exitance in W/{unit}^2"]
-        if results.has_colours:
-            comments.append(f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2")
-        write_ply(results.surface, folder / FILES["surface"], surface_values(results), comments)
+        _write_surface(results, folder)
     if "volume" in case.outputs:
         write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
     if "picture" in case.outputs:
@@ -125,6 +125,19 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
     return warnings
+
+
+def _write_surface(results: Results, folder: Path) -> None:
+    """The surface with its values, for mesh tools and for VTK."""
+    unit, values = results.case.surface.unit, surface_values(results)
+    notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
+    if results.has_colours:
+        notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"
+    write_ply(results.surface, folder / FILES["surface"], values, list(notes.values()))
+    if results.has_colours:
+        # One array of three bytes is what VTK's viewers can show as a colour.
+        values["preview"] = results.preview[0]
+    write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
 
 
 def _warnings(results: Results) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.case import Channel
+from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in
 from tetlux.fem.coefficients import base_of
 from tetlux.fem.local_validity import Validity
@@ -34,6 +35,7 @@ def summarize(
         "unit": case.surface.unit,
         "model": "fem",
         "tolerance": case.tolerance,
+        "as_ran": as_ran(case),
         "mesh": {
             "nodes": len(mesh.points),
             "tetrahedra": len(mesh.tetrahedra),

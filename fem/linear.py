@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, csr_matrix
 
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS, at_once
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import RunError
 
 # The iteration aims here; a true residual above the second is refused.
@@ -107,6 +108,8 @@ class Multigrid:
     def __call__(self, rest: FloatArray) -> FloatArray:
         """See `Method`."""
         return _on_all_cores(self.product, lambda some: conjugate_gradients(self.product, self.cycle, some))(rest)
+
+    __repr__ = one_line
 
 
 def multigrid(product: Product) -> Multigrid:

@@ -23,6 +23,7 @@ from tetlux.fem.validity_tables import (
     wide_error,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import TetMesh
 from tetlux.meshing.thickness import thickness
 
@@ -103,6 +104,8 @@ class Validity:
     def _entries(self) -> "list[_Entry]":
         lights = zip(self.lights, self.deposits, strict=True)
         return [_entry_of(light, deposit, self.medium) for light, deposit in lights]
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)

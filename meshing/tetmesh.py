@@ -13,6 +13,7 @@ from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 from tetlux.meshing.blocks import grouped, in_blocks, once
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.marched import Kept
 from tetlux.meshing.proximity import ClosestPoint
@@ -386,6 +387,14 @@ class TetMesh:
             Barycentric coordinates; nan for points outside.
         """
         return self.tree.locate(np.asarray(queries, dtype=float).reshape(-1, 3))
+
+    def __repr__(self) -> str:
+        regions = len(np.unique(self.regions))
+        parts = "" if regions == 1 else f"{count(regions, 'region')}, "
+        return (
+            f"TetMesh({count(len(self.points), 'node')}, {count(len(self.tetrahedra), 'tetrahedron', 'tetrahedra')}, "
+            f"{parts}{size(self.points, self.unit)}, volume {self.volume:.3g} {self.unit}³)"
+        )
 
 
 def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
