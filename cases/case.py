@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.lighting import BODY, keys_of, light_names, light_of
 from tetlux.cases.media import media_of
+from tetlux.cases.picture_view import UPRIGHT, toward_camera
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
@@ -18,10 +17,11 @@ from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
 from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.lights import Deposit, Light
+from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
 from tetlux.fem.validity import check_media, check_size
-from tetlux.meshing.arrays import Vector
+from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
@@ -70,7 +70,11 @@ class Case:
     sensors : tuple of Sensor
         The detectors, by name.
     camera : (3,) floats, optional
-        From where the surface is seen, unit.
+        Where radiance is wanted, unit; the picture is taken from there.
+    up : (3,) floats
+        What is up in the picture.
+    toward : (3,) ndarray, optional
+        Unit vector to the eye of the picture; chosen by the light if not given.
     reading_seconds : float
         Spent on reading and checking the surface.
     comparison : Comparison, optional
@@ -93,6 +97,8 @@ class Case:
     swept: Mapping[str, float | str]
     sensors: tuple[Sensor, ...] = ()
     camera: Vector | None = None
+    up: Vector = UPRIGHT
+    toward: FloatArray | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
 
@@ -190,9 +196,10 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values:
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
             sensors.append(sensor_of(detector, surface, base_of(media[0])))
-    if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
-        with document.at(("camera", "position")):
-            raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
+    with document.at(("up",)):
+        unit_vector(spec.up, "up")
+    with document.at(("camera", "position")):
+        toward = toward_camera(spec.camera, surface, spec.up) if spec.camera else None
     return Case(
         name=name,
         source=document.path,
@@ -206,6 +213,8 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values:
         swept=values,
         sensors=tuple(sensors),
         camera=spec.camera.position if spec.camera else None,
+        up=spec.up,
+        toward=toward,
         reading_seconds=reader.seconds,
         comparison=comparison,
     )

@@ -4,11 +4,12 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tetlux.cases.case import Case
 from tetlux.cases.compare import as_json, compare
 from tetlux.cases.compare_picture import draw_comparison
-from tetlux.cases.picture import Scene, draw
+from tetlux.cases.picture import Scene, Shape, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply
 from tetlux.cases.publish import cannot_write, claimed, publish
@@ -94,20 +95,9 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         _write_surface(results, folder)
     if "volume" in case.outputs:
         write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
-    if "picture" in case.outputs:
-        # One that is dark in the first channel may be bright in another.
-        lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-        scene = Scene(
-            points=results.surface.points,
-            triangles=results.surface.faces,
-            exitance=results.exitance(),
-            unit=unit,
-            title=case.name,
-            lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
-            colours=results.preview if results.has_colours else None,
-        )
-        warnings += draw(scene, folder / FILES["picture"])
     found = readings(case.sensors, results.by_light())
+    if "picture" in case.outputs:
+        warnings += draw(_scene(results, found), folder / FILES["picture"])
     if found:
         write_readings(found, unit, folder / READINGS)
     compared = None
@@ -138,6 +128,26 @@ def _write_surface(results: Results, folder: Path) -> None:
         # One array of three bytes is what VTK's viewers can show as a colour.
         values["preview"] = results.preview[0]
     write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
+
+
+def _scene(results: Results, readings: list[dict[str, Any]]) -> Scene:
+    """What the picture shows."""
+    case = results.case
+    # A light that is dark in the first channel may be bright in another.
+    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
+    return Scene(
+        points=results.surface.points,
+        triangles=results.surface.faces,
+        exitance=results.exitance(),
+        unit=case.surface.unit,
+        title=case.name,
+        lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
+        colours=results.preview if results.has_colours else None,
+        up=case.up,
+        toward=case.toward,
+        regions=tuple(Shape(one.surface.name, one.surface.points, one.surface.faces) for one in case.regions),
+        detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
+    )
 
 
 def _warnings(results: Results) -> list[str]:

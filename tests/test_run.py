@@ -45,7 +45,8 @@ def case(tmp_path: Path) -> Case:
 
 
 def test_a_run_writes_its_files_and_no_others(finished: Path) -> None:
-    assert sorted(p.name for p in finished.iterdir()) == ["picture.png", "summary.json", "surface.ply", "volume.vtu"]
+    names = ["picture.png", "summary.json", "surface.ply", "surface.vtp", "volume.vtu"]
+    assert sorted(p.name for p in finished.iterdir()) == names
 
 
 def test_the_summary_holds_what_it_promises(finished: Path) -> None:
@@ -127,7 +128,7 @@ def test_a_run_replaces_the_files_of_an_earlier_one(case: Case, tmp_path: Path) 
         (target / name).write_text("old")
     (target / "notes.txt").write_text("mine")
     run_case(replace(case, outputs=("surface",)), tmp_path / "out")
-    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply"]
+    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply", "surface.vtp"]
 
 
 def test_a_fault_while_writing_leaves_no_half_result(
