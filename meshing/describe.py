@@ -32,7 +32,7 @@ def _is_default(self: Any, one: "Field[Any]") -> bool:
     value = getattr(self, one.name)
     default = one.default_factory() if one.default_factory is not MISSING else one.default
     if isinstance(value, np.ndarray) or isinstance(default, np.ndarray):
-        return np.shape(value) == np.shape(default) and np.size(value) == 0
+        return isinstance(value, np.ndarray) and value.size == 0
     return bool(value is default or value == default)
 
 
