@@ -41,9 +41,11 @@ def find_case_file(request: str) -> Path:
             return library_folder() / f"{request}.yaml"
         if not path.suffix:
             names = sorted(path.stem for path in library_folder().glob("*.yaml"))
-            sentence = f"{request} is neither a file nor one of the cases that ship: {', '.join(names)}"
-            hint = did_you_mean(request, names).strip()
-            raise _input_error(f"{sentence}; {hint}" if hint else f"{sentence}.")
+            hint = did_you_mean(request, names)
+            raise _input_error(
+                f"{request}{': ' + hint + 'it' if hint else ''} is neither a file nor one of the cases that ship: "
+                f"{', '.join(names)}."
+            )
     if path.suffix.lower() not in ("", *SUFFIXES):
         _refuse_surface(path)
     return path

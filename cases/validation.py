@@ -69,9 +69,8 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
         text = "expected a number or a word"
     hint = ""
     if kind == "literal_error" and isinstance(given, str):
-        hint = "; " + did_you_mean(given, re.findall(r"'(.*?)'", message))
+        text = did_you_mean(given, re.findall(r"'(.*?)'", message)) + text
     if isinstance(given, str) and kind.startswith(("model_", "dict_")) and key and key[-1] in ONE_WORD:
         hint = "; write " + ONE_WORD[str(key[-1])].format(given)
     shown = PYTHONS[given] if given is None or isinstance(given, bool) else repr(given)
-    ended = f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}{hint}".rstrip("; ")
-    return ended if ended.endswith("?") else f"{ended}."
+    return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}{hint}."

@@ -71,9 +71,9 @@ def test_every_alias_can_be_met() -> None:
         ("sphere", "ball", 'surface.ball: unknown key; did you mean "sphere"?'),
         ("surface", "geometry", 'geometry: unknown key; did you mean "surface"?'),
         ("lights", "sources", 'sources: unknown key; did you mean "lights"?'),
-        ("surface:", "outputs: [png]\nsurface:", "outputs[0]: expected 'surface', 'volume' or 'picture', but found "
-         "'png'; did you mean \"picture\"?"),
-        ("surface:", "unit: inches\nsurface:", "but found 'inches'; did you mean \"in\"?"),
+        ("surface:", "outputs: [png]\nsurface:", "outputs[0]: did you mean \"picture\"? expected 'surface', "
+         "'volume' or 'picture', but found 'png'."),
+        ("surface:", "unit: inches\nsurface:", "unit: did you mean \"in\"? expected"),
         ("surface:", "unit: leagues\nsurface:", "but found 'leagues'."),
         ("{sphere: {radius: 10}}", "bunny.stl", "but found 'bunny.stl'; write surface: {file: bunny.stl}."),
         ("{sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}", "marble", "write medium: {material: marble}."),
