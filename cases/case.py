@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from tetlux.cases.body import CaseBody, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare import Comparison, comparison_for
 from tetlux.cases.document import Document, read_document
 from tetlux.cases.lighting import keys_of, light_names, light_of
+from tetlux.cases.picture_view import UPRIGHT, toward_camera
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
@@ -18,12 +17,12 @@ from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
 from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.lights import Deposit, Light
+from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
-from tetlux.meshing.arrays import Vector
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.paths import exists
-from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -48,6 +47,8 @@ class Channel:
     lights: Mapping[str, Light]
     media: AnyMedium | MediaByLabel
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class Case:
@@ -70,13 +71,21 @@ class Case:
     sensors : tuple of Sensor
         The detectors, by name.
     camera : (3,) floats, optional
-        From where the surface is seen, unit.
+        Where radiance is wanted, unit; the picture is taken from there.
+    up : (3,) floats
+        What is up in the picture.
+    toward : (3,) ndarray, optional
+        Unit vector to the eye of the picture; chosen by the light if not given.
     reading_seconds : float
         Spent on reading and checking the surface.
     mesh : TetMesh, optional
         Tetrahedra that are used as they are; `surface` is then their boundary.
     comparison : Comparison, optional
         Closed forms to hold the run against.
+    spec : CaseSpec
+        What the case file says of this run.
+    swept : mapping of str to float or str
+        The values of this run of a sweep, by their dotted keys.
     """
 
     name: str
@@ -87,8 +96,12 @@ class Case:
     regions: tuple[Region, ...]
     tolerance: float
     outputs: tuple[str, ...]
+    spec: CaseSpec
+    swept: Mapping[str, float | str]
     sensors: tuple[Sensor, ...] = ()
     camera: Vector | None = None
+    up: Vector = UPRIGHT
+    toward: FloatArray | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
     mesh: TetMesh | None = None
@@ -134,25 +147,7 @@ class Case:
         """The lights of the first channel."""
         return tuple(self.channels[0].lights.values())
 
-
-def library_folder() -> Path:
-    """The folder of the case files that ship with the package."""
-    return Path(__file__).with_name("library")
-
-
-def find_case_file(request: str) -> Path:
-    """A path as given, or the shipped case file of that name where there is no such path."""
-    path = Path(request)
-    shipped = library_folder() / f"{request}.yaml"
-    known = exists(path)
-    if not known and path.name == request and shipped.is_file():
-        return shipped
-    if not known and path.name == request and not path.suffix:
-        names = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
-        raise InputError(f"{request} is neither a file nor one of the cases that ship: {names}.")
-    if path.suffix.lower() in SUFFIXES:
-        raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
-    return path
+    __repr__ = one_line
 
 
 def load_cases(path: Path) -> list[Case]:
@@ -170,17 +165,17 @@ def load_cases(path: Path) -> list[Case]:
     spec = validated(document, document.data)
     reader = Reader(path.parent)
     cases = []
-    for label, data, keys in swept(document, spec):
-        single = document if label is None else Document(path, data, {**document.lines, **keys})
+    for label, values, data, keys in swept(document, spec):
+        single = document if label is None else Document(path, data, {**document.lines, **keys}, label)
         one = spec if label is None else validated(single, data)
         name = one.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise single.error(("name",), "this makes no name of a folder, or too long a one; give a short name.")
-        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
+        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader, values))
     return cases
 
 
-def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:
+def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]) -> Case:
     reader.seconds = 0.0
     channels = channel_names(document, spec)
     body = body_of(document, spec, len(channels), reader)
@@ -201,9 +196,10 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
             sensors.append(sensor_of(detector, surface, body.of_channels[0].outer))
-    if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
-        with document.at(("camera", "position")):
-            raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
+    with document.at(("up",)):
+        unit_vector(spec.up, "up")
+    with document.at(("camera", "position")):
+        toward = toward_camera(spec.camera, surface, spec.up) if spec.camera else None
     return Case(
         name=name,
         source=document.path,
@@ -214,8 +210,12 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
         mesh=body.mesh,
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
+        spec=spec,
+        swept=values,
         sensors=tuple(sensors),
         camera=spec.camera.position if spec.camera else None,
+        up=spec.up,
+        toward=toward,
         reading_seconds=reader.seconds,
         comparison=comparison,
     )

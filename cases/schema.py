@@ -131,7 +131,10 @@ class CaseSpec(Section):
         0.02, description="wanted relative L2 error of the exitance"
     )
     detectors: list[DetectorSpec] = Field([])
-    camera: CameraSpec | None = Field(None, description="radiance towards it is written with the surface")
+    camera: CameraSpec | None = Field(
+        None, description="from where the picture is taken; chosen by the light if left out"
+    )
+    up: Vector3 = Field((0.0, 0.0, 1.0), description="what is up in the picture")
     outputs: list[Output] = Field(["surface", "volume", "picture"])
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,

@@ -2,17 +2,15 @@
 
 import math
 import platform
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from tetlux.cases.case import Channel
-from tetlux.cases.lighting import BODY
+from tetlux.cases.media_rows import media_rows
+from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in
-from tetlux.fem.coefficients import Coefficients, MediaByLabel, at_cells, by_label, coefficients_on
 from tetlux.fem.local_validity import Validity
-from tetlux.fem.scene import media_of
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
@@ -29,29 +27,22 @@ def summarize(
     """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
     case, mesh = results.case, results.solutions[0].mesh
     several = len(case.light_names) > 1
-    if case.mesh is not None:
-        media: list[MediaByLabel] = [channel.media for channel in case.channels if isinstance(channel.media, Mapping)]
-        names = {label: case.mesh.labels.get(label, str(label)) for label in media[0]}
-    else:
-        media = [
-            by_label(each) for each in media_of([c.medium for c in case.channels], case.regions, len(case.channels))
-        ]
-        names = dict(enumerate((BODY, *(region.surface.name for region in case.regions))))
     channels = [
         _channel(
             channel,
             solution,
             results.exitance(channel.name),
             several,
-            _media(mesh, coefficients_on(mesh, each), names),
+            media,
         )
-        for channel, solution, each in zip(case.channels, results.solutions, media, strict=True)
+        for channel, solution, media in zip(case.channels, results.solutions, media_rows(case, mesh), strict=True)
     ]
     return {
         "case": case.name,
         "unit": case.surface.unit,
         "model": "fem",
         "tolerance": case.tolerance,
+        "as_ran": as_ran(case),
         "mesh": {
             "nodes": len(mesh.points),
             "tetrahedra": len(mesh.tetrahedra),
@@ -101,32 +92,6 @@ def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
     """Labels of a mesh that was given, their names if they have any, and their volumes."""
     volumes = mesh.region_volumes.items()
     return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
-
-
-def _media(mesh: TetMesh, coefficients: Coefficients, names: Mapping[int, str]) -> list[dict[str, Any]]:
-    """Coefficients of the body outside of its regions and of each region; means over the volume where they vary."""
-    found = []
-    for region, name in names.items():
-        cells = np.flatnonzero(mesh.regions == region)
-        sigma_a, total = (
-            _mean(at_cells(each, cells), mesh.volumes[cells])
-            for each in (coefficients.sigma_a, coefficients.sigma_t_prime)
-        )
-        found.append(
-            {
-                "name": name,
-                "sigma_a": sigma_a,
-                "sigma_s_prime": total - sigma_a,
-                "sigma_tr": math.sqrt(3.0 * sigma_a * total),
-                "albedo": 1.0 - sigma_a / total,
-            }
-        )
-    return found
-
-
-def _mean(values: FloatArray, weights: FloatArray) -> float:
-    """Weighted mean, without rounding where all values are alike."""
-    return float(values[0] if np.ptp(values) == 0 else weights @ values / weights.sum())
 
 
 def _power(power: Power) -> dict[str, float]:

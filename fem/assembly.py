@@ -24,6 +24,7 @@ from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import EDGES, TetMesh
 
 Mass = Literal["lumped", "consistent"]
@@ -168,3 +169,5 @@ class Assembly:
         indices[place], source[place] = transposed.indices, transposed.data
         indices[middle], source[middle] = np.arange(nodes), len(low) + np.arange(nodes)
         return starts.astype(np.int32), indices, source
+
+    __repr__ = one_line

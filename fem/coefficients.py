@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.fem.medium import Medium
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -61,6 +62,8 @@ class Coefficients:
     def escape(self) -> float:
         """1/(2A) of the boundary condition."""
         return 0.5 / self.outer.boundary_factor
+
+    __repr__ = one_line
 
 
 def coefficients_of(medium: Medium) -> Coefficients:

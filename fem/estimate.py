@@ -46,6 +46,7 @@ from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.blocks import at_once
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -88,6 +89,8 @@ class Estimate:
     def error(self) -> float:
         """Relative L2 error of the exitance over the surface."""
         return float(self.shares.sum())
+
+    __repr__ = one_line
 
 
 def estimated(

@@ -15,6 +15,7 @@ from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.validity_tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import TetMesh
 
 
@@ -153,6 +154,8 @@ class Validity:
         if not isinstance(light, CollimatedBeam) or light.spot is not None:
             breadth = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
         return _Entry(cKDTree(places), media, breadth, rows, in_a_point and not sources)
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)

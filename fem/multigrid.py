@@ -9,6 +9,7 @@ from scipy.sparse import csr_array, csr_matrix
 from tetlux.fem.direct import direct
 from tetlux.fem.krylov import Preconditioner, Product, dots, preconditioned
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 
 # PyAMG finds the aggregates, and has no wheel for Linux on ARM.
 HAS_PYAMG = find_spec("pyamg") is not None
@@ -27,6 +28,8 @@ class Multigrid:
     def __call__(self, rest: FloatArray) -> tuple[FloatArray, int]:
         """See `tetlux.fem.krylov.Method`."""
         return preconditioned(self.product, self.cycle)(rest)
+
+    __repr__ = one_line
 
 
 def multigrid(product: Product) -> Multigrid:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tetlux.fem.coefficients import AnyMedium
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -22,6 +23,8 @@ class Region:
 
     surface: Surface
     medium: AnyMedium | Sequence[AnyMedium]
+
+    __repr__ = one_line
 
 
 def check_list_of_regions(regions: Sequence[Region]) -> None:

@@ -11,6 +11,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -214,6 +215,21 @@ class Solution:
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
         return fluence
+
+    def __repr__(self) -> str:
+        low, high = self.exitance.min(), self.exitance.max()
+        facts = [
+            count(len(self.mesh.points), "node"),
+            f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",
+            f"{self.power.exited:.4g} of {self.power.incident:.4g} W exited",
+        ]
+        if np.isfinite(self.error_estimate):
+            facts.append(f"estimated error {self.error_estimate:.2%}")
+        if self.of_lights:
+            facts.append(count(len(self.of_lights), "light"))
+        if self.warnings:
+            facts.append(count(len(self.warnings), "warning"))
+        return f"Solution({', '.join(facts)})"
 
 
 def added(parts: Sequence[Solution]) -> Solution:

@@ -11,6 +11,7 @@ from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -49,6 +50,8 @@ class Sources:
     def dips(self) -> bool:
         """Whether the equation itself may have a fluence below zero: that of a source of a first moment may."""
         return any(charges.dips for charges in self.charges)
+
+    __repr__ = one_line
 
 
 def sources_of(

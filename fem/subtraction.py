@@ -30,6 +30,7 @@ from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.march import march
 from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.subdivide import quartered
@@ -128,6 +129,8 @@ class Charges:
 
         in_blocks(work, len(points), max(1, PAIRS // len(charges)))
         return fluence
+
+    __repr__ = one_line
 
 
 def charges_of(
@@ -228,6 +231,8 @@ class Patch:
         cells, faces = np.divmod(places, 4)
         return mesh.tetrahedra[inside[cells, None], FACES[faces]], beyond.reshape(-1)[places] < 0
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class PatchTerms:
@@ -244,6 +249,8 @@ class PatchTerms:
     load: FloatArray
     exited: float
     absorbed: float
+
+    __repr__ = one_line
 
 
 def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:

@@ -23,6 +23,7 @@ from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.describe import count, one_line
 from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -38,6 +39,8 @@ class Step:
     solution: Solution
     estimate: Estimate
     good: tuple[BoolArray, ...]
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +291,10 @@ class System:
         losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
         return losing
 
+    def __repr__(self) -> str:
+        regions = f", {count(len(self.regions), 'region')}" if self.regions else ""
+        return f"System({self.mesh!r}, {self.medium!r}{regions})"
+
 
 @dataclass(frozen=True, eq=False)
 class Equations:
@@ -305,6 +312,8 @@ class Equations:
     solver: Solver
     absorbing: FloatArray
     fitting: Fitting | None
+
+    __repr__ = one_line
 
 
 def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:

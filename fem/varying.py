@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 # Values (n,) of a coefficient, 1/unit, at points (n, 3); raises InputError where it is not known.
@@ -83,6 +84,8 @@ class VaryingMedium:
         _, cosine = self.base.delta_eddington
         # sigma_s* (1 - g*) = sigma_s', whatever the peak.
         return sigma_s_prime / (1.0 - cosine), cosine
+
+    __repr__ = one_line
 
 
 def as_text(point: FloatArray | Vector) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.curved import CurvedPatches
+from tetlux.meshing.describe import count, size
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.rays import RayCaster
 
@@ -214,6 +215,12 @@ class Surface:
         if len(leaves) == 0:
             return None
         return float(distances[leaves[0]]), int(faces[leaves[0]])
+
+    def __repr__(self) -> str:
+        return (
+            f'Surface("{self.name}", {count(len(self.faces), "triangle")}, {size(self.points, self.unit)}, '
+            f"volume {self.volume:.3g} {self.unit}³)"
+        )
 
 
 def barycentric_of(points: FloatArray, triangles: FloatArray) -> FloatArray:

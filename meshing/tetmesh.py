@@ -13,6 +13,7 @@ from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 from tetlux.meshing.blocks import grouped, in_blocks, once
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.marched import Kept
 from tetlux.meshing.proximity import ClosestPoint
@@ -419,6 +420,14 @@ class TetMesh:
         numbers, place = np.unique(self.regions, return_inverse=True)
         volumes = np.bincount(place, self.volumes)
         return dict(zip(numbers.tolist(), volumes.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        regions = len(np.unique(self.regions))
+        parts = "" if regions == 1 else f"{count(regions, 'region')}, "
+        return (
+            f"TetMesh({count(len(self.points), 'node')}, {count(len(self.tetrahedra), 'tetrahedron', 'tetrahedra')}, "
+            f"{parts}{size(self.points, self.unit)}, volume {self.volume:.3g} {self.unit}³)"
+        )
 
 
 def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:

@@ -18,7 +18,7 @@ from tests.conftest import TISSUE
 from tetlux import cases, fem, meshing
 from tetlux.cases import chart as chart_module
 from tetlux.cases import chart_methods, chart_peers, chart_runs, chart_scene
-from tetlux.cases.case import find_case_file, load_cases
+from tetlux.cases.case import load_cases
 from tetlux.cases.chart_measure import fitted_exponent, pareto_front, relative_error, surface_samples
 from tetlux.cases.chart_methods import FINITE_ELEMENTS, OURS, Method, Outcome
 from tetlux.cases.chart_models import MODELS, MONTE_CARLO
@@ -27,6 +27,7 @@ from tetlux.cases.chart_picture import LOOKS
 from tetlux.cases.chart_runs import Run, exponents, runs_on
 from tetlux.cases.chart_scene import Reference, Samples, Scene, scene_of
 from tetlux.cases.cli import main
+from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere
 from tetlux.meshing import RunError, Surface, box, tetrahedralize

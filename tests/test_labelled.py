@@ -152,9 +152,7 @@ def test_media_by_label_need_a_mesh_and_no_regions() -> None:
     with pytest.raises(InputError, match="leave them out where media are by label"):
         solve(HEAD, {0: TISSUE, 1: FLUID}, LIGHT, regions=[core])
     wrong: Any = FLUID
-    with pytest.raises(
-        InputError, match=r"a Medium is given where a region is wanted"
-    ):
+    with pytest.raises(InputError, match=r"a Medium is given where a region is wanted"):
         solve(HEAD, TISSUE, LIGHT, regions=[wrong])
 
 

@@ -11,9 +11,10 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import batch, picture, run
-from tetlux.cases.case import Case, find_case_file, load_cases
+from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
 from tetlux.cases.run import run_case
+from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab
 from tetlux.fem.solve import solve_each
 from tetlux.meshing import RunError
@@ -44,7 +45,8 @@ def case(tmp_path: Path) -> Case:
 
 
 def test_a_run_writes_its_files_and_no_others(finished: Path) -> None:
-    assert sorted(p.name for p in finished.iterdir()) == ["picture.png", "summary.json", "surface.ply", "volume.vtu"]
+    names = ["picture.png", "summary.json", "surface.ply", "surface.vtp", "volume.vtu"]
+    assert sorted(p.name for p in finished.iterdir()) == names
 
 
 def test_the_summary_holds_what_it_promises(finished: Path) -> None:
@@ -62,7 +64,8 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     (medium,) = channel["media"]
     assert medium.pop("name") == "body"
     expected_medium = {"sigma_a": 0.01, "sigma_s_prime": 1.0, "sigma_tr": 0.174069, "albedo": 1 / 1.01}
-    assert medium == pytest.approx(expected_medium, rel=1e-5)
+    assert {name: medium[name] for name in expected_medium} == pytest.approx(expected_medium, rel=1e-5)
+    assert (medium["eta"], medium["boundary"]) == (1.4, "exact")
     power = channel["power"]
     assert power["incident"] == 2.0
     assert abs(power["balance_error"]) < 1e-9
@@ -158,7 +161,7 @@ def test_a_run_replaces_the_files_of_an_earlier_one(case: Case, tmp_path: Path) 
         (target / name).write_text("old")
     (target / "notes.txt").write_text("mine")
     run_case(replace(case, outputs=("surface",)), tmp_path / "out")
-    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply"]
+    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply", "surface.vtp"]
 
 
 def test_a_fault_while_writing_leaves_no_half_result(

@@ -9,6 +9,7 @@ import numpy as np
 from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -94,6 +95,8 @@ class Deposit:
         if self.on_mesh is None:
             return self
         return together([replace(self, on_mesh=None), self.on_mesh(mesh, surface, coefficients)])
+
+    __repr__ = one_line
 
 
 def together(parts: Sequence[Deposit]) -> Deposit:

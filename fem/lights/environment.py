@@ -14,6 +14,7 @@ from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.lights.spot import check_pixels
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -117,3 +118,5 @@ class EnvironmentLight:
             mesh.to_boundary_nodes(each * mesh.boundary_areas) / mesh.boundary_node_areas for each in (outside, passed)
         )
         return Deposit(irradiance=irradiance, transmitted_irradiance=transmitted)
+
+    __repr__ = one_line

@@ -10,6 +10,7 @@ import numpy as np
 from tetlux.fem.lights.point import as_vector
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 # A Gaussian spot is cut off where it has fallen to exp(-8), 0.03 %, of its middle.
@@ -385,6 +386,8 @@ class Image:
         within = scattered(count)
         places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
         return np.asarray(places * [self.width, self.height] @ np.stack(_axes(direction, self.up)))
+
+    __repr__ = one_line
 
 
 # Spots that stay what they are, of which what they light may be remembered.
