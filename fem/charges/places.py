@@ -1,0 +1,121 @@
+"""Where charges go: above the surface, outside the body, closest together where light enters."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tetlux.fem.charges.samples import APART, Samples, Spacing, cells_of, spread, thin
+from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.surface import Surface
+
+# A charge is this many spacings above the surface, ...
+HEIGHT = 2.0
+# ... or lower, if another part of the body is nearer to it than this share of its height: by this factor, so often; ...
+CLEAR, LOWER, LOWERINGS = 0.7, 0.8, 10
+# ... and is left out if it would be lower than this many spacings, where equations are too far apart to see it.
+LOWEST = 0.3
+# Equations for each charge, by the ratio of their spacings.
+FINER = 2.0
+# Charges to each square of their spacing (measured: .89 to .95; those that are left out come off).
+KEPT = 0.92
+# Unit spacing at the foot of a source, by its depth; far away it is the distance from it.
+AT_FOOT = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where charges are, and the points of the surface at which they are fitted and checked.
+
+    Attributes
+    ----------
+    charges : (c, 3) ndarray
+        Outside the body.
+    fitted, checked : Samples
+        No point is in both.
+    """
+
+    charges: FloatArray
+    fitted: Samples
+    checked: Samples
+
+
+def spacing_for(sources: FloatArray, depths: FloatArray) -> Spacing:
+    """Spacing, up to a factor, that grows with the distance from the nearest source.
+
+    Over a flat surface it is ``sqrt(d² + (.6 z0)²)`` for a source z0 deep, d away from the point below which it lies.
+
+    Parameters
+    ----------
+    sources : (s, 3) ndarray
+    depths : (s,) ndarray
+        Distance of each to the surface, unit.
+
+    Returns
+    -------
+    callable
+        The same everywhere if there is no source.
+    """
+    if len(sources) == 0:
+        return lambda points: np.ones(len(points))
+
+    def spacing(points: FloatArray) -> FloatArray:
+        square = np.square(points[:, None] - sources).sum(axis=2) - (1.0 - AT_FOOT**2) * depths**2
+        # No point of the surface is nearer than the depth, but points of large triangles may be.
+        return np.asarray(np.sqrt(np.maximum(square, (AT_FOOT * depths) ** 2).min(axis=1)))
+
+    return spacing
+
+
+def places_for(surface: Surface, spacing: Spacing, count: int, seed: int = 0) -> Places:
+    """Places of about `count` charges.
+
+    Parameters
+    ----------
+    surface : Surface
+    spacing : callable
+        Up to a factor, which follows from the count.
+    count : int
+    seed : int
+        Of the random order in which points are taken.
+    """
+    rng = np.random.default_rng(seed)
+    scale = 1.0
+    for _ in range(2):
+        # Cells as fine as the points: their number says how many points there would be.
+        load = cells_of(surface, _scaled(spacing, scale)).load
+        scale *= float(np.sqrt(KEPT * load / count))
+    cells = cells_of(surface, _scaled(spacing, scale / FINER))
+    fitted, others = spread(surface, cells, rng)
+    feet = fitted[thin(fitted, FINER * APART * fitted.spacing)]
+    charges, clear = above(surface, feet, FINER * feet.spacing)
+    return Places(charges[clear], fitted, _checked(others, fitted))
+
+
+def _scaled(spacing: Spacing, scale: float) -> Spacing:
+    return lambda points: scale * spacing(points)
+
+
+def _checked(others: Samples, fitted: Samples) -> Samples:
+    """At most twice as many points as are fitted, which stand for the whole surface."""
+    some = others[np.arange(min(len(others), 2 * len(fitted)))]
+    return replace(some, areas=some.areas * (fitted.areas.sum() / some.areas.sum()))
+
+
+def above(surface: Surface, feet: Samples, spacing: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Places above points of the surface (n, 3), and which of them are clear of the body (n,)."""
+    heights = HEIGHT * spacing
+    # More of the body may lie across a gap; a ray from a curve that is sunk below its triangle leaves that first.
+    gaps, met = surface.rays.first(feet.points, feet.normals)
+    enters = (met >= 0) & (np.einsum("ij,ij->i", surface.normals[met], feet.normals) < 0.0)
+    heights[enters] = np.minimum(heights[enters], gaps[enters] / (1.0 + CLEAR))
+    places, clear = np.empty((len(feet), 3)), np.zeros(len(feet), dtype=bool)
+    some = np.arange(len(feet))
+    for _ in range(LOWERINGS):
+        places[some] = feet.points[some] + heights[some, None] * feet.normals[some]
+        nearest, normals = surface.project(places[some])
+        way = places[some] - nearest
+        outside = np.einsum("ij,ij->i", way, normals) > 0.0
+        clear[some] = outside & (np.linalg.norm(way, axis=1) >= CLEAR * heights[some])
+        some = some[~clear[some]]
+        heights[some] *= LOWER
+    return places, clear & (heights >= LOWEST * spacing)
