@@ -10,20 +10,24 @@ from tetlux.fem.charges.check import Quality, quality_of
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import Factors, factorise
 from tetlux.fem.charges.kernel import Equation, NumberArray
-from tetlux.fem.charges.places import FINER, Places, places_for, spacing_for
+from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, places_for, spacing_for
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface import Surface
 
-# The first fit, and how many times more charges the next one has.
-FIRST, GROWTH = 100, 3.0
-# Where it ends: 1,600 charges are fitted in some 5 s.
+# The first fit, and how many times more charges the next one has. Estimate in % and seconds of the processor by 300
+# charges after 100, or after 100 and 170: hare .47, .19 / .42, .27, its ear 1.6, .19 / .94, .28, spot 1.8, .20 / 1.5, .28.
+FIRST, GROWTH = 100, 1.73
+# Where it ends: as many are fitted in some 5 s.
 MOST = 1600
-# The spacing shrinks as this power of the residual, which is averaged over so many points and not taken to be less
-# than this share of its mean. Error by 300 and 800 charges, in %, on torus / spot / hare: power 0 .18 / 2.1, 2.0 / 1.9,
-# .69; .33 .02 / 2.1, .55 / .91, .31; .5 .03 / 1.6, .52 / .85, .34; .7 .05 / 1.5, .52 / .95, .46, and torus with 800
-# worse than with 300.
-POWER, ALIKE, FLOOR = 0.4, 12, 1e-3
+# Charges are higher where an earlier fit was this good, which shows that the body is smooth. Estimate in % by 300
+# charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037 / .050, hare .43 / .46,
+# rocker-arm .63 / .93.
+SMOOTH = 0.003
+# The spacing shrinks as this power of the residual, averaged over so many points, as far as that is this factor from
+# its mean or more, which is noise otherwise. Error in % by 300 charges on ball, torus, hare, spot for several of these:
+# power 0: .004, .16, .81, 2.6; .4 from 1 on: .017, .037, .46, 1.6; .5 from 2 on: .005, .043, .50, 1.8.
+POWER, ALIKE, NOISE = 0.5, 12, 2.0
 # New points take the mean of so many old ones.
 AROUND = 6
 
@@ -103,10 +107,13 @@ def levels(surface: Surface, equation: Equation, drive: Drive, *, most: int = MO
     spacing = spacing_for(drive.points, np.linalg.norm(surface.project(drive.points)[0] - drive.points, axis=1))
     # Steps of equal factors, so that the last is a whole one.
     steps = max(0, round(np.log(most / FIRST) / np.log(GROWTH)))
+    height = LOW
     for step in range(steps + 1):
-        places = places_for(surface, spacing, round(most * (FIRST / most) ** ((steps - step) / max(steps, 1))))
+        count = round(most * (FIRST / most) ** ((steps - step) / max(steps, 1)))
+        places = places_for(surface, spacing, count, height)
         fitted = fit_at(places, equation, drive)
         yield fitted
+        height = HIGH if fitted.quality.estimate <= SMOOTH else LOW
         spacing = _finer(places.checked, np.abs(fitted.residual) * places.checked.spacing)
 
 
@@ -130,8 +137,10 @@ def _finer(samples: Samples, felt: FloatArray) -> Spacing:
     count = min(ALIKE, len(samples))
     _, near = tree.query(samples.points, k=count)
     local = np.sqrt(np.square(felt)[near].mean(axis=1))
-    local = np.maximum(local, FLOOR * np.sqrt(np.square(felt).mean()))
-    wanted = (np.log(samples.spacing) - POWER * np.log(local))[near].mean(axis=1)
+    off = np.log(np.maximum(local, np.finfo(float).tiny))
+    off -= off.mean()
+    off = np.sign(off) * np.maximum(np.abs(off) - np.log(NOISE), 0.0)
+    wanted = (np.log(samples.spacing) - POWER * off)[near].mean(axis=1)
 
     def spacing(points: FloatArray) -> FloatArray:
         _, around = tree.query(points, k=min(AROUND, count))

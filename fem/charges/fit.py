@@ -6,7 +6,6 @@ import numpy as np
 import scipy.linalg
 
 from tetlux.fem.charges.kernel import Equation, NumberArray
-from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray
 
 # Combinations of charges that the equations see less of than this share are left out.

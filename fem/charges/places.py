@@ -8,8 +8,8 @@ from tetlux.fem.charges.samples import APART, Samples, Spacing, cells_of, spread
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface import Surface
 
-# A charge is this many spacings above the surface, ...
-HEIGHT = 2.0
+# A charge is this many spacings above the surface, where the field is rough and where it is smooth; ...
+LOW, HIGH = 2.0, 3.0
 # ... or lower, if another part of the body is nearer to it than this share of its height: by this factor, so often; ...
 CLEAR, LOWER, LOWERINGS = 0.7, 0.8, 10
 # ... and is left out if it would be lower than this many spacings, where equations are too far apart to see it.
@@ -66,7 +66,7 @@ def spacing_for(sources: FloatArray, depths: FloatArray) -> Spacing:
     return spacing
 
 
-def places_for(surface: Surface, spacing: Spacing, count: int, seed: int = 0) -> Places:
+def places_for(surface: Surface, spacing: Spacing, count: int, height: float = LOW, seed: int = 0) -> Places:
     """Places of about `count` charges.
 
     Parameters
@@ -75,19 +75,21 @@ def places_for(surface: Surface, spacing: Spacing, count: int, seed: int = 0) ->
     spacing : callable
         Up to a factor, which follows from the count.
     count : int
+    height : float
+        Of charges above the surface, spacings.
     seed : int
         Of the random order in which points are taken.
     """
     rng = np.random.default_rng(seed)
-    scale = 1.0
+    cells, scale = cells_of(surface, spacing), 1.0
     for _ in range(2):
         # Cells as fine as the points: their number says how many points there would be.
-        load = cells_of(surface, _scaled(spacing, scale)).load
-        scale *= float(np.sqrt(KEPT * load / count))
-    cells = cells_of(surface, _scaled(spacing, scale / FINER))
-    fitted, others = spread(surface, cells, rng)
+        change = float(np.sqrt(KEPT * cells.load / count))
+        scale *= change
+        cells = cells.scaled(change).cut(_scaled(spacing, scale))
+    fitted, others = spread(surface, cells.scaled(1.0 / FINER).cut(_scaled(spacing, scale / FINER)), rng)
     feet = fitted[thin(fitted, FINER * APART * fitted.spacing)]
-    charges, clear = above(surface, feet, FINER * feet.spacing)
+    charges, clear = above(surface, feet, FINER * feet.spacing, height)
     return Places(charges[clear], fitted, _checked(others, fitted))
 
 
@@ -101,9 +103,11 @@ def _checked(others: Samples, fitted: Samples) -> Samples:
     return replace(some, areas=some.areas * (fitted.areas.sum() / some.areas.sum()))
 
 
-def above(surface: Surface, feet: Samples, spacing: FloatArray) -> tuple[FloatArray, BoolArray]:
+def above(
+    surface: Surface, feet: Samples, spacing: FloatArray, height: float
+) -> tuple[FloatArray, BoolArray]:
     """Places above points of the surface (n, 3), and which of them are clear of the body (n,)."""
-    heights = HEIGHT * spacing
+    heights = height * spacing
     # More of the body may lie across a gap; a ray from a curve that is sunk below its triangle leaves that first.
     gaps, met = surface.rays.first(feet.points, feet.normals)
     enters = (met >= 0) & (np.einsum("ij,ij->i", surface.normals[met], feet.normals) < 0.0)

@@ -15,7 +15,7 @@ STEP = 1e-5
 
 def quadrature(surface: Surface, spacing: Spacing) -> Samples:
     """Points of the smooth surface and the areas they stand for, to integrate what changes over a spacing."""
-    cells = cells_of(surface, spacing, 1.0)
+    cells = cells_of(surface, spacing).cut(spacing, 1.0)
     coarse = longest_sides(cells.corners) > COARSE * cells.spacing
     fine, rule = np.flatnonzero(~coarse), np.repeat(np.flatnonzero(coarse), 3)
     at_middle = cells.corners[fine].mean(axis=1)

@@ -58,36 +58,57 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Parts of a surface's triangles: the triangle of each (m,), corners (m, 3, 3), areas (m,) and spacing (m,)."""
+    """Parts of a surface's triangles.
+
+    Attributes
+    ----------
+    faces : (m,) ndarray
+        The triangle of each.
+    corners : (m, 3, 3) ndarray
+    spacing : (m,) ndarray
+        Wanted distance between points there, unit.
+    """
 
     faces: IntArray
     corners: FloatArray
-    areas: FloatArray
     spacing: FloatArray
+
+    @property
+    def areas(self) -> FloatArray:
+        """Their areas (m,), unit²."""
+        first, second = (self.corners[:, i] - self.corners[:, 0] for i in (1, 2))
+        return np.asarray(0.5 * np.linalg.norm(np.cross(first, second), axis=1))
 
     @property
     def load(self) -> float:
         """How many squares of the spacing there are."""
         return float((self.areas / self.spacing**2).sum())
 
+    def scaled(self, scale: float) -> "Cells":
+        """The same for a spacing so many times as large."""
+        return replace(self, spacing=scale * self.spacing)
 
-def cells_of(surface: Surface, spacing: Spacing, size: float = COARSEST) -> Cells:
-    """Cut the triangles of a surface until none is longer than `size` times the spacing in its middle."""
-    faces, corners = np.arange(len(surface.faces)), surface.points[surface.faces]
-    done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-    for cut in range(_CUTS + 1):
-        wanted = spacing(corners.mean(axis=1))
-        small = (longest_sides(corners) <= size * wanted) | (cut == _CUTS)
-        done.append((faces[small], corners[small], wanted[small]))
-        if small.all():
-            break
-        faces, corners = np.repeat(faces[~small], 4), quartered(corners[~small])
-    faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
-    # Parts of one triangle side by side, so that drawing in order spreads candidates evenly.
-    order = np.argsort(faces, kind="stable")
-    faces, corners, wanted = faces[order], corners[order], wanted[order]
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return Cells(faces, corners, areas, wanted)
+    def cut(self, spacing: Spacing, size: float = COARSEST) -> "Cells":
+        """Cut them until none is longer than `size` times the spacing in its middle."""
+        faces, corners, wanted = self.faces, self.corners, self.spacing
+        done: list[tuple[IntArray, FloatArray, FloatArray]] = []
+        for cut in range(_CUTS + 1):
+            small = (longest_sides(corners) <= size * wanted) | (cut == _CUTS)
+            done.append((faces[small], corners[small], wanted[small]))
+            if small.all():
+                break
+            faces, corners = np.repeat(faces[~small], 4), quartered(corners[~small])
+            wanted = spacing(corners.mean(axis=1))
+        faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
+        # Parts of one triangle side by side, so that drawing in order spreads points evenly.
+        order = np.argsort(faces, kind="stable")
+        return Cells(faces[order], corners[order], wanted[order])
+
+
+def cells_of(surface: Surface, spacing: Spacing) -> Cells:
+    """The triangles of a surface."""
+    corners = surface.points[surface.faces]
+    return Cells(np.arange(len(corners)), corners, spacing(corners.mean(axis=1)))
 
 
 def draw(surface: Surface, cells: Cells, rng: np.random.Generator, density: float = CANDIDATES) -> Samples:

@@ -1,0 +1,201 @@
+"""Charges fitted to the boundary: how good, how fast, and are they honest? ``python -m tests.benchmarks.charges``.
+
+Without arguments: a pencil beam as a point on each body, with 100, 300 and 800 charges. `--scenes N` draws N scenes,
+300 charges each: a body, a source .3 to 10 mean free paths below a random point of it, albedo .8 to .9999, index 1 to
+1.5, the body 10 to 80 mean free paths across. Further arguments are files of surfaces, which join the bodies.
+
+Seconds are of the processor, of all threads, the least of three runs, from a surface whose trees are built. The truth
+is the series for balls, and elsewhere the same method with as many charges as `--truth` says, whose own bound is
+printed: the error is known to a share of that, about as much as the estimate is smaller than the bound.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.fem import Medium, PencilBeam
+from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_charges
+from tetlux.fem.charges.check import norm
+from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, torus
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.surface import triangle_areas
+
+TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+DARKER = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
+HARE = Path(__file__).parents[2] / "cases" / "library" / "hare.stl"
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A body, a medium and a point source; the radius of a ball, whose source lies on the z axis."""
+
+    name: str
+    surface: Surface
+    medium: Medium
+    source: FloatArray
+    radius: float | None = None
+
+    def fit(self, charges: int) -> FittedCharges:
+        """About so many charges."""
+        drive = Drive(self.source, np.ones((1, 1)), np.zeros(1))
+        return fit_charges(self.surface, equation_of(self.medium), drive, tolerance=0.0, most=charges)
+
+    def truth_at(self, points: FloatArray, charges: int) -> tuple[FloatArray, float]:
+        """The exitance at points (n, 3), and the bound of its error."""
+        if self.radius is None:
+            best = self.fit(charges)
+            return best.field.exitance(points)[:, 0], best.quality.bound
+        gamma = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
+        depth = float(self.source[0, 2])
+        return exact_sphere.point_exitance(self.medium, radius=self.radius, source_radius=depth, gamma=gamma), 0.0
+
+
+def lit(name: str, surface: Surface, medium: Medium, beam: PencilBeam, radius: float | None = None) -> Scene:
+    """A pencil beam as a point."""
+    return Scene(name, surface, medium, beam.deposit_in(surface, medium).points, radius)
+
+
+def named(files: list[str]) -> list[Scene]:
+    """The bodies of the table."""
+    down = PencilBeam((0, 0, 100), (0, 0, -1))
+    hare = read_surface(HARE)
+    scenes = [
+        lit("ball 10", sphere(10.0), TISSUE, down, 10.0),
+        lit("ball 30", sphere(30.0), TISSUE, down, 30.0),
+        lit("torus", torus(10.0, 4.0), TISSUE, PencilBeam((25, 0, 15), (-1, 0, -1))),
+        lit("box", box((20.0, 20.0, 20.0)), TISSUE, PencilBeam((3, 2, 20), (0, 0, -1))),
+        lit("cylinder", cylinder(5.0, 20.0), DARKER, PencilBeam((20, 0, 1), (-1, 0, 0))),
+        lit("hare, ear", hare, TISSUE, PencilBeam((2, -30, 30), (0.08, 1, -0.1))),
+        lit("hare, back", hare, TISSUE, PencilBeam((-40, 0, 12), (1, 0, 0))),
+        lit("hare, side", hare, TISSUE, PencilBeam((0, -30, 10), (0, 1, 0))),
+    ]
+    for file in files:
+        surface = scaled(read_surface(file))
+        middles = surface.points[surface.faces].mean(axis=1)
+        for axis in range(3):
+            direction = -np.eye(3)[axis]
+            # Aimed at the triangle nearest to the middle.
+            away = np.linalg.norm(np.delete(middles - middles.mean(axis=0), axis, axis=1), axis=1)
+            start = middles[away.argmin()] - 30.0 * direction
+            beam = PencilBeam(tuple(start.tolist()), tuple(direction.tolist()))
+            scenes.append(lit(f"{Path(file).stem} from {'xyz'[axis]}", surface, TISSUE, beam))
+    return scenes
+
+
+def scaled(surface: Surface) -> Surface:
+    """The same, 26 mm from corner to corner."""
+    return surface_from_arrays(surface.points * (26.0 / surface.diagonal), surface.faces, name=surface.name)
+
+
+def ellipsoid(axes: FloatArray) -> Surface:
+    """A sphere stretched along its axes."""
+    ball = sphere(1.0)
+    return surface_from_arrays(ball.points * axes, ball.faces, name="ellipsoid")
+
+
+def random_scenes(count: int, files: list[str], first: int) -> Iterator[Scene]:
+    """Scenes drawn from their numbers, so that one of them can be looked at again."""
+    hare, others = read_surface(HARE), [read_surface(file) for file in files]
+    bodies: list[Callable[[np.random.Generator], Surface]] = [
+        lambda _: sphere(1.0),
+        lambda rng: ellipsoid(rng.uniform(0.4, 1.0, 3)),
+        lambda rng: torus(1.0, rng.uniform(0.2, 0.7)),
+        lambda rng: box(tuple(rng.uniform(0.3, 1.0, 3))),
+        lambda rng: cylinder(1.0, rng.uniform(0.5, 5.0)),
+        lambda rng: slab(1.0, rng.uniform(0.1, 0.3)),
+        lambda _: hare,
+        *(lambda _, surface=surface: surface for surface in others),
+    ]
+    for number in range(first, first + count):
+        rng = np.random.default_rng(number)
+        surface = bodies[number % len(bodies)](rng)
+        albedo, eta = 1.0 - 10.0 ** rng.uniform(-4.0, np.log10(0.2)), rng.uniform(1.0, 1.5)
+        free_path = surface.diagonal / 10.0 ** rng.uniform(1.0, np.log10(80.0))
+        medium = Medium(sigma_a=(1.0 - albedo) / free_path, sigma_s_prime=albedo / free_path, eta=eta)
+        ball = number % len(bodies) == 0
+        depth, source = 0.0, np.zeros((1, 3))
+        while not depth:
+            depth = free_path * 10.0 ** rng.uniform(np.log10(0.3), 1.0)
+            source = np.array([[0.0, 0.0, 1.0 - depth]]) if ball else below(surface, depth, rng)
+            away = float(np.linalg.norm(surface.closest(source)[0] - source))
+            # Not through the other side, nor much nearer to it.
+            if not surface.contains(source)[0] or away < 0.7 * depth:
+                depth = 0.0
+        name = f"{number} {surface.name}, albedo {albedo:.4f}, n {eta:.2f}, "
+        name += f"{surface.diagonal / free_path:.0f} mfp across, source {depth / free_path:.2g} deep"
+        yield Scene(name, surface, medium, source, 1.0 if ball else None)
+
+
+def below(surface: Surface, depth: float, rng: np.random.Generator) -> FloatArray:
+    """A point so deep below a random one of the surface, (1, 3)."""
+    areas = triangle_areas(surface.points, surface.faces)[1]
+    face = np.array([rng.choice(len(areas), p=areas / areas.sum())])
+    flat = np.einsum("i,ij->j", rng.dirichlet([1.0, 1.0, 1.0]), surface.points[surface.faces[face[0]]])
+    point, normal = surface.on_curve(face, flat[None])
+    return np.asarray(point - depth * normal)
+
+
+def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, float, float]:
+    """A line of the table; estimate and bound as multiples of the error."""
+    scene.surface.rays.first(scene.source, np.array([[0.0, 0.0, 1.0]]))
+    scene.surface.project(scene.source)
+    seconds = []
+    for _ in range(repeats):
+        started = time.process_time()
+        fitted = scene.fit(charges)
+        seconds.append(time.process_time() - started)
+    samples, quality = fitted.places.checked, fitted.quality
+    exitance = fitted.field.exitance(samples.points)[:, 0]
+    right, bound = scene.truth_at(samples.points, truth)
+    size = norm(samples.areas, right)
+    error = norm(samples.areas, exitance - right) / size
+    bright = right > 1e-6 * right.max()
+    faint = bright & (right < 0.01 * right.max())
+    off = np.abs(exitance - right)
+    median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
+    text = f"| {scene.name} | {len(fitted.places.charges)} | {min(seconds):.2f} | {error:.4%} | {quality.estimate:.4%} | "
+    text += f"{quality.estimate / error:.2f} | {quality.bound:.3%} | {quality.bound / error:.1f} | {bound:.3%} | "
+    text += f"{median:.2%} | {(off[bright] / right[bright]).max():.1%} |"
+    return text, quality.estimate / error, quality.bound / error
+
+
+HEAD = """| body | charges | seconds | error | estimate | over error | bound | over error | bound of truth | \
+median error below 1 % of the brightest | worst within six decades |
+|---|---|---|---|---|---|---|---|---|---|---|"""
+
+
+def main() -> None:
+    """Print the table asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--truth", type=int, default=1600)
+    parser.add_argument("--charges", type=int, nargs="+", default=[100, 300, 800])
+    parser.add_argument("files", nargs="*")
+    given = parser.parse_args()
+    print(HEAD)
+    if not given.scenes:
+        for scene in named(given.files):
+            for charges in given.charges:
+                print(row(scene, charges, given.truth, 3)[0], flush=True)
+        return
+    ratios = []
+    for scene in random_scenes(given.scenes, given.files, given.first):
+        text, estimate, bound = row(scene, 300, given.truth, 1)
+        ratios.append((estimate, bound))
+        print(text, flush=True)
+    estimates, bounds = np.array(ratios).T
+    print(f"estimate over error: {np.quantile(estimates, [0.0, 0.05, 0.5, 0.95, 1.0]).round(2)}")
+    print(f"not within .5 to 4: {int(((estimates < 0.5) | (estimates > 4.0)).sum())} of {len(estimates)}")
+    print(f"bound over error: least {bounds.min():.2f}, median {np.median(bounds):.1f}")
+
+
+if __name__ == "__main__":
+    main()
