@@ -1,0 +1,213 @@
+"""Charges fitted to the boundary: against closed forms, and honest about their error."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Medium, PencilBeam, PointSource
+from tetlux.fem.charges import ChargeSolution, solve_with_charges
+from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_charges
+from tetlux.fem.charges.check import norm, quality_of
+from tetlux.fem.charges.field import ChargeField
+from tetlux.fem.charges.kernel import Equation, equation_of
+from tetlux.fem.charges.places import FINER
+from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.meshing import InputError, Surface, box, sphere, torus
+from tetlux.meshing.arrays import FloatArray
+
+TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+RADIUS, DEPTH = 10.0, 1.0 / 1.01
+
+
+@pytest.fixture(scope="module")
+def ball() -> Surface:
+    return sphere(RADIUS)
+
+
+def of_points(points: FloatArray, powers: FloatArray | None = None) -> Drive:
+    count = len(points)
+    given = np.ones((count, 1)) if powers is None else powers
+    return Drive(points, given, np.zeros(given.shape[1]))
+
+
+def below_pole(depth: float = DEPTH) -> Drive:
+    return of_points(np.array([[0.0, 0.0, RADIUS - depth]]))
+
+
+def truth(points: FloatArray, medium: Medium = TISSUE, depth: float = DEPTH) -> FloatArray:
+    gamma = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
+    return exact_sphere.point_exitance(medium, radius=RADIUS, source_radius=RADIUS - depth, gamma=gamma)
+
+
+def error_of(fitted: FittedCharges, medium: Medium = TISSUE, depth: float = DEPTH) -> float:
+    samples = fitted.places.checked
+    right = truth(samples.points, medium, depth)
+    return norm(samples.areas, fitted.field.exitance(samples.points)[:, 0] - right) / norm(samples.areas, right)
+
+
+@pytest.fixture(scope="module")
+def fitted(ball: Surface) -> FittedCharges:
+    return fit_charges(ball, equation_of(TISSUE), below_pole(), tolerance=0.0, most=300)
+
+
+def test_three_hundred_charges_are_a_ball_to_a_hundredth_of_a_per_cent(fitted: FittedCharges) -> None:
+    assert 250 < len(fitted.places.charges) < 350
+    assert error_of(fitted) < 1e-4  # measured: 2e-5
+
+
+@pytest.mark.parametrize(
+    ("albedo", "eta", "depth"), [(0.99, 1.4, 1.0), (0.8, 1.0, 0.3), (0.9999, 1.5, 3.0), (0.95, 1.2, 10.0)]
+)
+def test_the_bound_holds_and_the_estimate_is_near_the_error(
+    ball: Surface, albedo: float, eta: float, depth: float
+) -> None:
+    medium = Medium(sigma_a=1.0 - albedo, sigma_s_prime=albedo, eta=eta)
+    for most in (50, 100, 200):
+        fitted = fit_charges(ball, equation_of(medium), below_pole(depth), tolerance=0.0, most=most)
+        error = error_of(fitted, medium, depth)
+        assert error <= fitted.quality.bound
+        assert 0.5 * error <= fitted.quality.estimate <= 4.0 * error
+
+
+def test_charges_lie_outside(fitted: FittedCharges, ball: Surface) -> None:
+    assert not ball.contains(fitted.places.charges).any()
+    sharp = torus(4.0, 2.5)  # with a narrow hole
+    light = of_points(np.array([[2.2, 0.0, 0.0]]))
+    places = fit_charges(sharp, equation_of(TISSUE), light, tolerance=0.0, most=300).places
+    assert not sharp.contains(places.charges).any()
+
+
+def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
+    """The bound of another field at the same points."""
+    samples = fitted.places.checked
+    exitance, residual = field.exitance_and_residual(samples.points, samples.normals)
+    return quality_of(field.equation, samples, FINER * samples.spacing, exitance[:, 0], residual[:, 0]).bound
+
+
+def test_the_residual_tells_a_flipped_sign(fitted: FittedCharges) -> None:
+    field = fitted.field
+    assert spoilt(fitted, field) == pytest.approx(fitted.quality.bound)
+    strengths = field.strengths.copy()
+    strengths[len(strengths) // 2] *= -1.0
+    assert spoilt(fitted, replace(field, strengths=strengths)) > 3.0 * fitted.quality.bound
+
+
+@pytest.mark.parametrize("name", ["wave_number", "diffusion", "boundary_factor"])
+def test_the_residual_tells_another_equation(fitted: FittedCharges, name: str) -> None:
+    equation = fitted.field.equation
+    other = replace(equation, **{name: 1.05 * getattr(equation, name)})
+    assert spoilt(fitted, replace(fitted.field, equation=other)) > 10.0 * fitted.quality.bound
+
+
+@pytest.mark.parametrize("name", ["wave_number", "diffusion", "boundary_factor"])
+def test_a_fit_with_another_equation_is_not_the_ball(ball: Surface, name: str) -> None:
+    equation = equation_of(TISSUE)
+    other = replace(equation, **{name: 1.05 * getattr(equation, name)})
+    assert error_of(fit_charges(ball, other, below_pole(), tolerance=0.0, most=100)) > 0.005
+
+
+def test_a_complex_wave_number_is_light_that_is_modulated(ball: Surface) -> None:
+    """Amplitude and lag at 500 MHz, from the series with ``sigma_a + i omega n/c``."""
+    omega, speed = 2.0 * np.pi * 0.5, 299.792458 / 1.4  # rad/ns, mm/ns
+    wave_number = complex(np.sqrt((TISSUE.sigma_a + 1j * omega / speed) / TISSUE.diffusion))
+    equation = Equation(wave_number, TISSUE.diffusion, TISSUE.boundary_factor)
+    field = fit_charges(ball, equation, below_pole(), tolerance=0.0, most=300).field
+    gamma = np.radians([0.0, 30.0, 60.0, 90.0, 180.0])
+    points = RADIUS * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
+    exitance = field.exitance(points)[:, 0]
+    assert np.abs(exitance) == pytest.approx([4.333458e-2, 1.664280e-3, 2.547526e-4, 7.798646e-5, 2.076560e-5], rel=5e-3)
+    assert -np.degrees(np.angle(exitance)) == pytest.approx([2.74850, 17.58637, 36.66729, 53.91994, 79.11970], abs=0.2)
+
+
+def test_a_reading_is_smooth_in_the_coefficients_at_kept_places(fitted: FittedCharges) -> None:
+    gamma = np.radians([10.0, 60.0, 120.0])
+    points = RADIUS * np.column_stack([np.sin(gamma), np.zeros(3), np.cos(gamma)])
+    change = np.linspace(-0.12, 0.12, 25)
+    readings = []
+    for each in change:
+        medium = replace(TISSUE, sigma_a=TISSUE.sigma_a * (1.0 + each))
+        readings.append(fit_at(fitted.places, equation_of(medium), below_pole()).field.exitance(points)[:, 0])
+    curves = np.array(readings)
+    off = curves - np.array([np.polyval(np.polyfit(change, curve, 5), change) for curve in curves.T]).T
+    assert np.abs(off / curves).max() < 1e-6
+
+
+def test_ten_sources_are_the_sum_of_ten() -> None:
+    body = box((20.0, 15.0, 10.0))
+    rng = np.random.default_rng(1)
+    points = rng.uniform(-0.5, 0.5, (10, 3)) * np.array([18.0, 13.0, 8.0])
+    together = fit_charges(body, equation_of(TISSUE), of_points(points), tolerance=0.002, most=900)
+    samples = together.places.checked
+    each = fit_at(together.places, equation_of(TISSUE), of_points(points, np.eye(10)))
+    exitance = each.field.exitance(samples.points)
+    assert exitance.sum(axis=1) == pytest.approx(together.field.exitance(samples.points)[:, 0], rel=1e-9)
+    apart = np.zeros(len(samples.points))
+    for point in points[:4]:
+        apart += fit_charges(body, equation_of(TISSUE), of_points(point[None]), tolerance=0.002).field.exitance(
+            samples.points
+        )[:, 0]
+    four = exitance[:, :4].sum(axis=1)
+    assert norm(samples.areas, four - apart) < 0.005 * norm(samples.areas, four)
+
+
+def test_source_and_reading_may_change_places() -> None:
+    """Reciprocity: the fluence at one point of a source at another."""
+    body = torus(10.0, 4.0)
+    a, b = np.array([[12.0, 0.0, 2.0]]), np.array([[7.0, 8.0, -1.0]])
+    fields = [fit_charges(body, equation_of(TISSUE), of_points(x), tolerance=0.0, most=300).field for x in (a, b)]
+    there, back = float(fields[0].fluence(b)[0, 0]), float(fields[1].fluence(a)[0, 0])
+    assert there == pytest.approx(back, rel=0.01)
+
+
+def test_fluence_and_power_of_a_ball(ball: Surface) -> None:
+    light = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), power=2.0)
+    solution = solve_with_charges(ball, TISSUE, [light], tolerance=1e-4)
+    entered = solution.power.incident - solution.power.specular
+    assert solution.power.incident == 2.0
+    depth = 1.0 / TISSUE.sigma_t_prime
+    total = exact_sphere.point_total(TISSUE, radius=RADIUS, source_radius=RADIUS - depth)
+    assert solution.power.exited == pytest.approx(entered * TISSUE.albedo * total, rel=1e-3)
+    assert abs(solution.power.balance_error) < 1e-4
+    inside = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 3.0, 8.0]])
+    right = exact_sphere.point_fluence(TISSUE, radius=RADIUS, source_radius=RADIUS - depth, points=inside)
+    assert solution.fluence_at(inside) == pytest.approx(entered * TISSUE.albedo * right, rel=2e-3)
+    assert np.isnan(solution.fluence_at([(0.0, 0.0, 11.0)])[0])
+
+
+def test_diffuse_light_on_a_ball(ball: Surface) -> None:
+    """``phi + zb phi' = 4 E_t/(1 - 2 C1)`` at the surface for ``phi = c sinh(k r)/r``."""
+    solution = solve_with_charges(ball, TISSUE, [DiffuseLight(1.0)], tolerance=0.002)
+    k, zb = TISSUE.sigma_tr, TISSUE.extrapolation_length
+    growth = k / np.tanh(k * RADIUS) - 1.0 / RADIUS
+    passed = 1.0 - solution.power.specular / solution.power.incident
+    exitance = passed - TISSUE.diffusion * growth * 4.0 * TISSUE.eta**2 / (1.0 + zb * growth)
+    assert solution.exitance_at(ball.points[:500]) == pytest.approx(np.full(500, exitance), rel=0.01)
+    assert abs(solution.power.balance_error) < 1e-3
+
+
+def test_a_solution_is_read_like_one_with_a_mesh(ball: Surface) -> None:
+    lights = [PointSource((0.0, 0.0, 9.0)), DiffuseLight(0.001)]
+    solution = solve_with_charges(ball, TISSUE, lights)
+    assert isinstance(solution, ChargeSolution)
+    assert (solution.mesh, solution.model) == (None, "charges")
+    assert solution.error_estimate <= 0.02
+    assert solution.exitance.shape == (len(ball.points),)
+    first, second = solution.of_lights
+    assert first.exitance + second.exitance == pytest.approx(solution.exitance, rel=1e-9)
+    assert first.power.incident + second.power.incident == pytest.approx(solution.power.incident)
+    with pytest.raises(InputError, match="no mesh"):
+        _ = solution.fluence
+
+
+@pytest.mark.parametrize(
+    ("light", "message"),
+    [
+        (PencilBeam((0, 0, 20), (0, 0, -1), deposit="line"), "PencilBeam leaves light along lines"),
+        (CollimatedBeam((0, 0, -1)), "CollimatedBeam leaves light along lines"),
+        (Emission(1.0), "Emission emits light throughout"),
+    ],
+)
+def test_what_charges_cannot_do_is_said(ball: Surface, light: PencilBeam, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        solve_with_charges(ball, TISSUE, [light])
