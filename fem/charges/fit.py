@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from tetlux.fem.charges.kernel import Equation, NumberArray
+from tetlux.fem.charges.kernel import NumberArray
 from tetlux.meshing.arrays import FloatArray
 
 # Combinations of charges that the equations see less of than this share are left out.

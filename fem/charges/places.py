@@ -103,9 +103,7 @@ def _checked(others: Samples, fitted: Samples) -> Samples:
     return replace(some, areas=some.areas * (fitted.areas.sum() / some.areas.sum()))
 
 
-def above(
-    surface: Surface, feet: Samples, spacing: FloatArray, height: float
-) -> tuple[FloatArray, BoolArray]:
+def above(surface: Surface, feet: Samples, spacing: FloatArray, height: float) -> tuple[FloatArray, BoolArray]:
     """Places above points of the surface (n, 3), and which of them are clear of the body (n,)."""
     heights = height * spacing
     # More of the body may lie across a gap; a ray from a curve that is sunk below its triangle leaves that first.

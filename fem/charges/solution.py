@@ -104,7 +104,7 @@ class ChargeSolution:
     @property
     def fluence(self) -> FloatArray:
         """Refused: it is that at the nodes of a mesh."""
-        raise InputError('model "charges" has no mesh and no nodes; ask fluence_at(points), or solve with model "full".')
+        raise InputError('model "charges" has no mesh, nor fluence at its nodes; ask fluence_at(points).')
 
     @cached_property
     def of_lights(self) -> "tuple[ChargeSolution, ...]":
