@@ -10,19 +10,19 @@ from tetlux.fem.charges.check import Quality, quality_of
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import Factors, factorise
 from tetlux.fem.charges.kernel import Equation, NumberArray
-from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, places_for, spacing_for
+from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, distance_from, places_for
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface import Surface
 
-# The first fit, and how many times more charges the next one has. Estimate in % and seconds of the processor by 300
-# charges after 100, or after 100 and 170: hare .47, .19 / .42, .27, its ear 1.6, .19 / .94, .28, spot 1.8, .20 / 1.5, .28.
+# The first fit, and how many times more charges the next one has. Estimate in % by 300 charges after 100, and after 100
+# and 170, which takes .08 s longer: hare .47 / .42, its ear 1.6 / .94, spot 1.8 / 1.5.
 FIRST, GROWTH = 100, 1.73
 # Where it ends: as many are fitted in some 5 s.
 MOST = 1600
 # Charges are higher where an earlier fit was this good, which shows that the body is smooth. Estimate in % by 300
-# charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037 / .050, hare .43 / .46,
-# rocker-arm .63 / .93.
+# charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037 / .050, hare .43 /
+# .46, rocker-arm .63 / .93.
 SMOOTH = 0.003
 # The spacing shrinks as this power of the residual, averaged over so many points, as far as that is this factor from
 # its mean or more, which is noise otherwise. Error in % by 300 charges on ball, torus, hare, spot for several of these:
@@ -62,7 +62,7 @@ class FittedCharges:
     drive : Drive
     places : Places
     factors : Factors
-        Of the equations, weighted by the root of their area; for other lights at the same places.
+        Of the weighted equations; for other lights at the same places.
     quality : Quality
         Of the sum of all lights.
     residual : (n,) ndarray
@@ -104,13 +104,13 @@ def fit_charges(
 
 def levels(surface: Surface, equation: Equation, drive: Drive, *, most: int = MOST) -> Iterator[FittedCharges]:
     """Fit ever more charges, about `most` of them at last."""
-    spacing = spacing_for(drive.points, np.linalg.norm(surface.project(drive.points)[0] - drive.points, axis=1))
+    spacing = distance = distance_from(surface, drive.points)
     # Steps of equal factors, so that the last is a whole one.
     steps = max(0, round(np.log(most / FIRST) / np.log(GROWTH)))
     height = LOW
     for step in range(steps + 1):
         count = round(most * (FIRST / most) ** ((steps - step) / max(steps, 1)))
-        places = places_for(surface, spacing, count, height)
+        places = places_for(surface, spacing, distance, count, height)
         fitted = fit_at(places, equation, drive)
         yield fitted
         height = HIGH if fitted.quality.estimate <= SMOOTH else LOW
@@ -120,7 +120,7 @@ def levels(surface: Surface, equation: Equation, drive: Drive, *, most: int = MO
 def fit_at(places: Places, equation: Equation, drive: Drive) -> FittedCharges:
     """Fit charges at given places."""
     samples, checked = places.fitted, places.checked
-    weights = np.sqrt(samples.areas)[:, None]
+    weights = places.weights[:, None]
     factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, places.charges))
     missing = drive.inflow - equation.residual_of_each(samples.points, samples.normals, drive.points) @ drive.powers
     strengths = factors.solve(weights * missing)

@@ -7,15 +7,15 @@ parts:
 
     ∫ D |grad e|² + sigma_a e²  +  ∮ e²/(2A)  =  -∮ r e
 
-All terms on the left are positive, and the right is at most ``|r| |e|`` in L2 of the surface: ``|e|/(2A) <= |r|``. Since
-the exitance is ``phi/(2A)``, that of G is off by at most ``|r|`` in L2, whatever the strengths and places of the
+All terms on the left are positive, and the right is at most ``|r| |e|`` in L2 of the surface: ``|e|/(2A) <= |r|``.
+Since the exitance is ``phi/(2A)``, that of G is off by at most ``|r|`` in L2, whatever the strengths and places of the
 charges outside. This holds in one even medium with a real wave number, for the surface at which r is taken with the
 normals it has there. What is not in it: the integral of r² is a sum over points, which were not fitted but are not all
 points either; the smooth surface is one reading of the triangles; and diffusion itself has an error of its own.
 
-**The estimate.** Only a part of r reaches e: over a flat surface a ripple of r of wave number q makes one of e/(2A) that
-is ``1 + zb sqrt(q² + k²)`` times smaller, zb = 2 A D. A fit leaves ripples as long as the charges are apart, so that
-``q = pi/h`` at a spacing h takes most of the difference away. RIPPLE makes it lean to the safe side.
+**The estimate.** Only a part of r reaches e: over a flat surface a ripple of r of wave number q makes one of e/(2A)
+that is ``1 + zb sqrt(q² + k²)`` times smaller, zb = 2 A D. A fit leaves ripples as long as the charges are apart, so
+that ``q = pi/h`` at a spacing h takes most of the difference away. RIPPLE makes it lean to the safe side.
 """
 
 from dataclasses import dataclass
@@ -47,11 +47,15 @@ class Quality:
     estimate: float
 
 
+def ripple_of(equation: Equation, spacing: FloatArray) -> FloatArray:
+    """How fast what charges a spacing (n,) apart leave changes across a surface, ``sqrt(q² + k²)``, (n,), 1/unit."""
+    return np.asarray(np.sqrt((np.pi / (RIPPLE * spacing)) ** 2 + abs(equation.wave_number) ** 2))
+
+
 def damped(equation: Equation, residual: NumberArray, spacing: FloatArray) -> NumberArray:
     """What residuals (n,) at charges a spacing (n,) apart make of the exitance, (n,), W/unit²."""
-    ripple = np.sqrt((np.pi / (RIPPLE * spacing)) ** 2 + abs(equation.wave_number) ** 2)
     zb = 2.0 * equation.boundary_factor * equation.diffusion
-    return np.asarray(residual / (1.0 + zb * ripple))
+    return np.asarray(residual / (1.0 + zb * ripple_of(equation, spacing)))
 
 
 def quality_of(

@@ -1,10 +1,11 @@
 """Where charges go: above the surface, outside the body, closest together where light enters."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.charges.samples import APART, Samples, Spacing, cells_of, spread, thin
+from tetlux.fem.charges.samples import APART, Cells, Samples, Spacing, cells_of, spread, thin
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface import Surface
 
@@ -18,6 +19,11 @@ LOWEST = 0.3
 FINER = 2.0
 # Charges to each square of their spacing (measured: .89 to .95; those that are left out come off).
 KEPT = 0.92
+# Rows are weighted by this power of the distance from the light, so that what is far and faint counts too. By 300
+# charges, error and its median below 1 % of the brightest, both in %, for 0 / .75 / 1.5: torus .011, .17 / .012, .25 /
+# .017, .24; hare .25, 2.2 / .26, 2.5 / 2.3, 5.6; spot 1.1, 8.3 / 1.2, 4.6 / 8.3, 8.2; rocker-arm .32, 9.2 / .30, 5.4 /
+# .85, 8.1.
+FAR = 0.75
 # Unit spacing at the foot of a source, by its depth; far away it is the distance from it.
 AT_FOOT = 0.6
 
@@ -30,43 +36,51 @@ class Places:
     ----------
     charges : (c, 3) ndarray
         Outside the body.
+    feet : Samples
+        The points of the surface that charges were put above; some of these charges were left out.
     fitted, checked : Samples
         No point is in both.
+    weights : (f,) ndarray
+        Of the equations at the points that are fitted.
     """
 
     charges: FloatArray
+    feet: Samples
     fitted: Samples
+    weights: FloatArray
     checked: Samples
 
 
-def spacing_for(sources: FloatArray, depths: FloatArray) -> Spacing:
-    """Spacing, up to a factor, that grows with the distance from the nearest source.
+def distance_from(surface: Surface, sources: FloatArray) -> Spacing:
+    """The distance from the nearest source, with which the spacing grows.
 
     Over a flat surface it is ``sqrt(d² + (.6 z0)²)`` for a source z0 deep, d away from the point below which it lies.
 
     Parameters
     ----------
+    surface : Surface
     sources : (s, 3) ndarray
-    depths : (s,) ndarray
-        Distance of each to the surface, unit.
 
     Returns
     -------
     callable
-        The same everywhere if there is no source.
+        1 everywhere if there is no source.
     """
     if len(sources) == 0:
         return lambda points: np.ones(len(points))
+    depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
 
-    def spacing(points: FloatArray) -> FloatArray:
+    def distance(points: FloatArray) -> FloatArray:
         square = np.square(points[:, None] - sources).sum(axis=2) - (1.0 - AT_FOOT**2) * depths**2
         # No point of the surface is nearer than the depth, but points of large triangles may be.
         return np.asarray(np.sqrt(np.maximum(square, (AT_FOOT * depths) ** 2).min(axis=1)))
 
-    return spacing
+    return distance
 
 
-def places_for(surface: Surface, spacing: Spacing, count: int, height: float = LOW, seed: int = 0) -> Places:
+def places_for(
+    surface: Surface, spacing: Spacing, distance: Spacing, count: int, height: float = LOW, seed: int = 0
+) -> Places:
     """Places of about `count` charges.
 
     Parameters
@@ -74,6 +88,8 @@ def places_for(surface: Surface, spacing: Spacing, count: int, height: float = L
     surface : Surface
     spacing : callable
         Up to a factor, which follows from the count.
+    distance : callable
+        From the light, up to a factor.
     count : int
     height : float
         Of charges above the surface, spacings.
@@ -81,19 +97,35 @@ def places_for(surface: Surface, spacing: Spacing, count: int, height: float = L
         Of the random order in which points are taken.
     """
     rng = np.random.default_rng(seed)
-    cells, scale = cells_of(surface, spacing), 1.0
-    for _ in range(2):
-        # Cells as fine as the points: their number says how many points there would be.
-        change = float(np.sqrt(KEPT * cells.load / count))
-        scale *= change
-        cells = cells.scaled(change).cut(_scaled(spacing, scale))
-    fitted, others = spread(surface, cells.scaled(1.0 / FINER).cut(_scaled(spacing, scale / FINER)), rng)
+    (cells,), scale = fitting_cells([surface], [spacing], count)
+    return places_at(surface, cells, scaled(spacing, scale), distance, rng, height)
+
+
+def places_at(
+    surface: Surface, cells: Cells, spacing: Spacing, distance: Spacing, rng: np.random.Generator, height: float
+) -> Places:
+    """Places of charges a spacing apart, from cells of that spacing."""
+    fitted, others = spread(surface, cells.scaled(1.0 / FINER).cut(scaled(spacing, 1.0 / FINER)), rng)
     feet = fitted[thin(fitted, FINER * APART * fitted.spacing)]
     charges, clear = above(surface, feet, FINER * feet.spacing, height)
-    return Places(charges[clear], fitted, _checked(others, fitted))
+    return Places(charges[clear], feet, fitted, _weights(fitted, distance), _checked(others, fitted))
 
 
-def _scaled(spacing: Spacing, scale: float) -> Spacing:
+def fitting_cells(surfaces: Sequence[Surface], spacings: Sequence[Spacing], count: float) -> tuple[list[Cells], float]:
+    """Cells of surfaces that together hold about `count` charges, and the factor of their spacings."""
+    all_cells, scale = [cells_of(*each) for each in zip(surfaces, spacings, strict=True)], 1.0
+    for _ in range(2):
+        # Cells as fine as the points: their number says how many points there would be.
+        change = float(np.sqrt(KEPT * sum(cells.load for cells in all_cells) / count))
+        scale *= change
+        all_cells = [
+            cells.scaled(change).cut(scaled(spacing, scale)) for cells, spacing in zip(all_cells, spacings, strict=True)
+        ]
+    return all_cells, scale
+
+
+def scaled(spacing: Spacing, scale: float) -> Spacing:
+    """A spacing, so many times as large."""
     return lambda points: scale * spacing(points)
 
 
@@ -121,3 +153,9 @@ def above(surface: Surface, feet: Samples, spacing: FloatArray, height: float) -
         some = some[~clear[some]]
         heights[some] *= LOWER
     return places, clear & (heights >= LOWEST * spacing)
+
+
+def _weights(samples: Samples, distance: Spacing) -> FloatArray:
+    """Weights (n,) of equations at samples: the root of area, times a power of the distance from the light."""
+    away = distance(samples.points)
+    return np.asarray(np.sqrt(samples.areas) * (away / away.max()) ** FAR)

@@ -1,4 +1,4 @@
-"""`ChargeSolution`: light in a body of one even medium, by charges fitted to its surface, without a mesh."""
+"""`ChargeSolution`: light in a body of even regions, by charges fitted to their surfaces, without a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -7,17 +7,20 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import MOST, Drive, FittedCharges, fit_charges
+from tetlux.fem.charges.adapt import MOST, Drive, fit_charges
 from tetlux.fem.charges.check import Quality
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
+from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
 from tetlux.fem.fresnel import moments
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.regions import nesting, region_at
 from tetlux.meshing.surface import Surface
 
 
@@ -40,16 +43,25 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class ChargeSolution:
-    """Light in one body, as a sum of screened charges; what `tetlux.fem.Solution` is with a mesh.
+    """Light in one body, as sums of screened charges; what `tetlux.fem.Solution` is with a mesh.
 
     Attributes
     ----------
     surface : Surface
     medium : Medium
-    fitted : FittedCharges
-        With a column for each light.
+        Of the body.
+    walls : tuple of Wall
+        The body's surface, and those of its regions.
+    fields : tuple of ChargeField
+        In the body's own region and in the others, each with a column of strengths for each light.
+    samples : tuple of Samples
+        Points of each wall at which charges were fitted.
+    sources : (s,) ndarray
+        Power of each light's points, W.
     entries : tuple of Entry
         Of each light.
+    quality : Quality
+        Of the sum of all lights.
     seconds : dict
         Seconds spent on surface, solve, and total.
     warnings : list of str
@@ -57,8 +69,12 @@ class ChargeSolution:
 
     surface: Surface
     medium: Medium
-    fitted: FittedCharges
+    walls: tuple[Wall, ...]
+    fields: tuple[ChargeField, ...]
+    samples: tuple[Samples, ...]
+    sources: FloatArray
     entries: tuple[Entry, ...]
+    quality: Quality
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
 
@@ -68,12 +84,12 @@ class ChargeSolution:
     @property
     def error_estimate(self) -> float:
         """Estimated relative L2 error of the exitance: see `tetlux.fem.charges.check`."""
-        return self.fitted.quality.estimate
+        return self.quality.estimate
 
     @property
     def error_bound(self) -> float:
-        """Relative L2 error that the exitance does not exceed: see `tetlux.fem.charges.check`."""
-        return self.fitted.quality.bound
+        """Relative L2 error that the exitance does not exceed, nan with regions: see `tetlux.fem.charges.check`."""
+        return self.quality.bound
 
     @cached_property
     def exitance(self) -> FloatArray:
@@ -90,16 +106,24 @@ class ChargeSolution:
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
-        return np.asarray(self._total.exitance(queries) + self._unscattered)
+        return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
 
     def fluence_at(self, points: FloatArray) -> FloatArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
         fluence = np.full(len(queries), np.nan)
         inside = np.flatnonzero(self.surface.contains(queries))
-        with np.errstate(divide="ignore"):
-            fluence[inside] = self._total.fluence(queries[inside])
+        regions = region_at(queries[inside], [wall.surface for wall in self.walls[1:]])
+        for region, each in enumerate(self._sums):
+            some = inside[regions == region]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                fluence[some] = each.fluence(queries[some])
         return fluence
+
+    @property
+    def charges(self) -> int:
+        """How many there are, sources included."""
+        return sum(len(each.positions) for each in self.fields)
 
     @property
     def fluence(self) -> FloatArray:
@@ -113,49 +137,66 @@ class ChargeSolution:
         return tuple(self._of_light(light) for light in range(count)) if count > 1 else ()
 
     def _of_light(self, light: int) -> "ChargeSolution":
-        fitted = self.fitted
-        strengths, drive = fitted.field.strengths[:, [light]], fitted.drive
-        drive = Drive(drive.points, drive.powers[:, [light]], drive.inflow[[light]])
-        quality = Quality(np.nan, np.nan)
-        own = replace(fitted, field=replace(fitted.field, strengths=strengths), drive=drive, quality=quality)
-        return replace(self, fitted=own, entries=(self.entries[light],), warnings=[])
+        fields = tuple(replace(each, strengths=each.strengths[:, [light]]) for each in self.fields)
+        return replace(
+            self,
+            fields=fields,
+            sources=self.sources[[light]],
+            entries=(self.entries[light],),
+            quality=Quality(np.nan, np.nan),
+            warnings=[],
+        )
 
     @cached_property
     def power(self) -> Power:
         """The ledger, W.
 
-        What exits is the integral of the exitance, and what is absorbed is what the lights give less what flows out by
-        Gauss's theorem: they balance as far as the boundary condition holds.
+        What exits is the integral of the exitance. What is absorbed is, by Gauss's theorem, what sources give and what
+        flows into each region through its walls: the ledger balances as far as the conditions there hold.
         """
-        fitted, drive = self.fitted, self.fitted.drive
-        points = fitted.places.fitted
-        tree = cKDTree(points.points)
-        samples = quadrature(self.surface, lambda places: FINER * points.spacing[tree.query(places)[1]])
-        area = float(samples.areas.sum())
-        exitance, residual = self._total.exitance_and_residual(samples.points, samples.normals)
-        diffused = float(samples.areas @ exitance)
+        area, exited, inflow = self._flows
         known = [entry.known for entry in self.entries]
         irradiance = sum(entry.irradiance for entry in self.entries)
         transmitted = sum(entry.transmitted for entry in self.entries)
         return Power(
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
-            absorbed=sum(each.absorbed for each in known)
-            + float(drive.powers.sum() + samples.areas @ residual - diffused),
-            exited=diffused + area * self._unscattered,
+            absorbed=sum(each.absorbed for each in known) + float(self.sources.sum()) + inflow,
+            exited=exited + area * self._unscattered,
             ballistic=sum(each.ballistic for each in known),
         )
 
+    @property
+    def _flows(self) -> tuple[float, float, float]:
+        """Area of the body, integral of ``phi/(2A)`` over it, and what flows into all regions through their walls."""
+        area, diffused, inflow = 0.0, 0.0, 0.0
+        for wall, fitted in zip(self.walls, self.samples, strict=True):
+            tree = cKDTree(fitted.points)
+            spacing = FINER * fitted.spacing
+            points = quadrature(wall.surface, _nearest(tree, spacing))
+            exitance, residual = self._sums[wall.inside].exitance_and_residual(points.points, points.normals)
+            inflow += float(points.areas @ (residual - exitance))
+            if wall.outside is None:
+                area, diffused = float(points.areas.sum()), float(points.areas @ exitance)
+            else:
+                exitance, residual = self._sums[wall.outside].exitance_and_residual(points.points, points.normals)
+                inflow -= float(points.areas @ (residual - exitance))
+        return area, diffused, inflow
+
     @cached_property
-    def _total(self) -> ChargeField:
-        fitted = self.fitted.field
-        return replace(fitted, strengths=fitted.strengths.sum(axis=1))
+    def _sums(self) -> tuple[ChargeField, ...]:
+        """The fields of all lights together."""
+        return tuple(replace(each, strengths=each.strengths.sum(axis=1)) for each in self.fields)
 
     @property
     def _unscattered(self) -> float:
         """Exitance beside ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
         share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1])
         return share * sum(entry.transmitted for entry in self.entries)
+
+
+def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
+    return lambda places: values[tree.query(places)[1]]
 
 
 def charge_solution(
@@ -165,32 +206,49 @@ def charge_solution(
     powers: FloatArray,
     entries: Sequence[Entry],
     *,
+    inner: Sequence[tuple[Surface, Medium]] = (),
     tolerance: float = 0.02,
     most: int = MOST,
 ) -> ChargeSolution:
-    """Solve for point sources and diffuse light in a body of one even medium.
+    """Solve for point sources and diffuse light in a body of even regions.
 
     Parameters
     ----------
     surface : Surface
     medium : Medium
+        Of the body.
     points : (p, 3) ndarray
         Sources inside the body.
     powers : (p, s) ndarray
         What each of s lights puts into each of them, W.
     entries : sequence of Entry
-        Of each light.
+        Of each light; diffuse light is for a body without regions.
+    inner : sequence of (Surface, Medium)
+        Regions of the body.
     tolerance : float
         Wanted relative L2 error of the exitance.
     most : int
-        Charges at which fitting ends in any case.
+        Charges at which fitting ends in any case, about.
 
     Returns
     -------
     ChargeSolution
     """
-    transmitted = np.array([entry.transmitted for entry in entries])
-    inflow = 2.0 * transmitted / (1.0 + 3.0 * moments(medium.eta)[1])
-    drive = Drive(points, powers, inflow)
-    fitted = fit_charges(surface, equation_of(medium), drive, tolerance=tolerance, most=most)
-    return ChargeSolution(surface, medium, fitted, tuple(entries))
+    sources = powers.sum(axis=0)
+    if not inner:
+        inflow = 2.0 * np.array([entry.transmitted for entry in entries]) / (1.0 + 3.0 * moments(medium.eta)[1])
+        drive = Drive(points, powers, inflow)
+        fitted = fit_charges(surface, equation_of(medium), drive, tolerance=tolerance, most=most)
+        walls, samples = (Wall(surface, 0, None),), (fitted.places.fitted,)
+        return ChargeSolution(surface, medium, walls, (fitted.field,), samples, sources, tuple(entries), fitted.quality)
+    surfaces = [each for each, _ in inner]
+    parents = nesting(surface, surfaces).parents
+    walls = (
+        Wall(surface, 0, None),
+        *(Wall(s, i, p) for i, (s, p) in enumerate(zip(surfaces, parents, strict=True), 1)),
+    )
+    light = RegionLight(points, region_at(points, surfaces), powers)
+    equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
+    fit = fit_regions(walls, equations, light, tolerance=tolerance, most=most)
+    fitted_at = tuple(each.places.fitted for each in fit.places)
+    return ChargeSolution(surface, medium, walls, fit.fields, fitted_at, sources, tuple(entries), fit.quality)

@@ -1,4 +1,4 @@
-"""Lights in a body of one even medium, solved by charges: what `tetlux.fem.solve` calls for ``model="charges"``."""
+"""Lights in a body of even regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,20 +7,30 @@ import numpy as np
 
 from tetlux.fem.charges.adapt import MOST
 from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.medium import Medium
+from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power
 from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.validity import check_media
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 
 _INSTEAD = 'solve it with model "full".'
 
 
 def solve_with_charges(
-    surface: Surface, medium: Medium, lights: Sequence[Light], *, tolerance: float = 0.02, most: int = MOST
+    surface: Surface,
+    medium: AnyMedium,
+    lights: Sequence[Light],
+    *,
+    regions: Sequence[Region] = (),
+    tolerance: float = 0.02,
+    most: int = MOST,
 ) -> ChargeSolution:
-    """Solve for lights in a body of one even medium, without a mesh.
+    """Solve for lights in a body of even regions, without a mesh.
 
     Parameters
     ----------
@@ -28,6 +38,8 @@ def solve_with_charges(
     medium : Medium
     lights : sequence of Light
         Points, beams that are points, and diffuse light; they add up.
+    regions : sequence of Region
+        Parts of the body with media of their own; with these there is no diffuse light.
     tolerance : float
         Wanted relative L2 error of the exitance.
     most : int
@@ -40,7 +52,7 @@ def solve_with_charges(
     Raises
     ------
     InputError
-        If a light does not go with the body, or is none of those.
+        If a light or a region does not go with the body, or is none of those.
 
     Examples
     --------
@@ -52,21 +64,23 @@ def solve_with_charges(
     """
     watch = Stopwatch()
     with watch.stage("surface"):
-        deposits = [light.deposit_in(surface, medium) for light in lights]
-        for light, deposit in zip(lights, deposits, strict=True):
-            _check(light, deposit)
+        inner = [(region.surface, _even(only_medium(region))) for region in regions]
+        body = _even(medium)
+        check_regions(surface, [each for each, _ in inner])
+        check_media(surface, [body, *(each for _, each in inner)])
+        deposits = [_deposit(light, surface, body, uniform=not inner) for light in lights]
     with watch.stage("solve"):
         owners = np.repeat(np.arange(len(deposits)), [len(deposit.points) for deposit in deposits])
         powers = np.zeros((len(owners), len(deposits)))
         powers[np.arange(len(owners)), owners] = np.concatenate([deposit.powers for deposit in deposits])
         points = np.vstack([deposit.points for deposit in deposits])
         entries = [_entry(deposit) for deposit in deposits]
-        solution = charge_solution(surface, medium, points, powers, entries, tolerance=tolerance, most=most)
+        solution = charge_solution(surface, body, points, powers, entries, inner=inner, tolerance=tolerance, most=most)
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     if not solution.error_estimate <= tolerance:
         warnings.append(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
-            f"{len(solution.fitted.places.charges)} charges; solve it with finite elements."
+            f"{solution.charges} charges; {_INSTEAD}"
         )
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
 
@@ -76,12 +90,21 @@ def _entry(deposit: Deposit) -> Entry:
     return Entry(known, float(deposit.irradiance), float(deposit.transmitted_irradiance))
 
 
-def _check(light: Light, deposit: Deposit) -> None:
-    """Refuse a light that is no sum of points and even diffuse light."""
-    name = type(light).__name__
+def _even(medium: AnyMedium) -> Medium:
+    if isinstance(medium, Medium):
+        return medium
+    raise InputError(f'the medium varies within the body, and model "charges" has even ones; {_INSTEAD}')
+
+
+def _deposit(light: Light, surface: Surface, medium: Medium, *, uniform: bool) -> Deposit:
+    """What a light leaves, if that is points and even diffuse light."""
+    deposit, name = light.deposit_in(surface, medium, uniform=uniform), type(light).__name__
     if len(deposit.starts) or deposit.on_mesh is not None:
         raise InputError(f'{name} leaves light along lines or by facets, and model "charges" has points; {_INSTEAD}')
     if np.any(deposit.emission):
         raise InputError(f'{name} emits light throughout, and model "charges" has points; {_INSTEAD}')
     if np.ndim(deposit.irradiance) or np.ndim(deposit.transmitted_irradiance):
         raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
+    if deposit.irradiance and not uniform:
+        raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
+    return deposit

@@ -161,7 +161,8 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
     off = np.abs(exitance - right)
     median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
     text = f"| {scene.name} | {len(fitted.places.charges)} | {min(seconds):.2f} | {error:.4%} | "
-    text += f"{quality.estimate:.4%} | {quality.estimate / error:.2f} | {quality.bound:.3%} | {quality.bound / error:.1f} | {bound:.3%} | "
+    text += f"{quality.estimate:.4%} | {quality.estimate / error:.2f} | {quality.bound:.3%} | {quality.bound / error:.1f} | "
+    text += f"{bound:.3%} | "
     text += f"{median:.2%} | {(off[bright] / right[bright]).max():.1%} |"
     return text, quality.estimate / error, quality.bound / error
 
