@@ -239,16 +239,16 @@ def charge_solution(
         inflow = 2.0 * np.array([entry.transmitted for entry in entries]) / (1.0 + 3.0 * moments(medium.eta)[1])
         drive = Drive(points, powers, inflow)
         fitted = fit_charges(surface, equation_of(medium), drive, tolerance=tolerance, most=most)
-        walls, samples = (Wall(surface, 0, None),), (fitted.places.fitted,)
-        return ChargeSolution(surface, medium, walls, (fitted.field,), samples, sources, tuple(entries), fitted.quality)
+        samples, wall = fitted.places.fitted, Wall(surface, 0, None)
+        return ChargeSolution(
+            surface, medium, (wall,), (fitted.field,), (samples,), sources, tuple(entries), fitted.quality
+        )
     surfaces = [each for each, _ in inner]
     parents = nesting(surface, surfaces).parents
-    walls = (
-        Wall(surface, 0, None),
-        *(Wall(s, i, p) for i, (s, p) in enumerate(zip(surfaces, parents, strict=True), 1)),
-    )
+    walls = [Wall(surface, 0, None)]
+    walls += [Wall(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
     light = RegionLight(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
     fit = fit_regions(walls, equations, light, tolerance=tolerance, most=most)
     fitted_at = tuple(each.places.fitted for each in fit.places)
-    return ChargeSolution(surface, medium, walls, fit.fields, fitted_at, sources, tuple(entries), fit.quality)
+    return ChargeSolution(surface, medium, tuple(walls), fit.fields, fitted_at, sources, tuple(entries), fit.quality)

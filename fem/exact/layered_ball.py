@@ -1,7 +1,7 @@
 """A ball of concentric layers, each of its own medium, with a point source in the outermost.
 
-Of each order l the fluence in a layer is ``a i_l(k r) + b k_l(k r)``; phi and ``D dphi/dr`` are continuous from layer to
-layer. Let y be what is regular at the centre, ``rho = b k_l/(a i_l)`` the share of the decaying part, and u and v the
+Of each order l the fluence in a layer is ``a i_l(k r) + b k_l(k r)``; phi and ``D dphi/dr`` are continuous from layer
+to layer. Let y be what is regular at the centre, ``rho = b k_l/(a i_l)`` the share of the decaying part, and u and v the
 logarithmic derivatives of `bessel.WallRates`. Then
 
     g = r y'/y = (u - v rho)/(1 + rho),   rho(s)/rho(r) = [x (u + v)]_r/[x (u + v)]_s (i_l(k r)/i_l(k s))²
@@ -14,6 +14,7 @@ gives, with one layer the series of `tetlux.fem.exact.sphere`:
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -56,7 +57,7 @@ def point_exitance(
         If the radii do not ascend, there are not as many as media, or the source is not in the outermost layer.
     """
     bounds = [checks.positive("radius", radius) for radius in radii]
-    if len(bounds) != len(media) or any(a >= b for a, b in zip(bounds, bounds[1:], strict=False)):
+    if len(bounds) != len(media) or any(a >= b for a, b in pairwise(bounds)):
         raise InputError("give one radius for each medium, ascending from the core outward.")
     inner, radius = ([0.0, *bounds[:-1]])[-1], bounds[-1]
     r0 = checks.within("source_radius", source_radius, inner, radius, "outermost layer")

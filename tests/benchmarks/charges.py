@@ -160,10 +160,20 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
     faint = bright & (right < 0.01 * right.max())
     off = np.abs(exitance - right)
     median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
-    text = f"| {scene.name} | {len(fitted.places.charges)} | {min(seconds):.2f} | {error:.4%} | "
-    text += f"{quality.estimate:.4%} | {quality.estimate / error:.2f} | {quality.bound:.3%} | {quality.bound / error:.1f} | "
-    text += f"{bound:.3%} | "
-    text += f"{median:.2%} | {(off[bright] / right[bright]).max():.1%} |"
+    columns = [
+        scene.name,
+        str(len(fitted.places.charges)),
+        f"{min(seconds):.2f}",
+        f"{error:.4%}",
+        f"{quality.estimate:.4%}",
+        f"{quality.estimate / error:.2f}",
+        f"{quality.bound:.3%}",
+        f"{quality.bound / error:.1f}",
+        f"{bound:.3%}",
+        f"{median:.2%}",
+        f"{(off[bright] / right[bright]).max():.1%}",
+    ]
+    text = "| " + " | ".join(columns) + " |"
     return text, quality.estimate / error, quality.bound / error
 
 
