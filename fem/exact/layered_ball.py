@@ -1,8 +1,8 @@
 """A ball of concentric layers, each of its own medium, with a point source in the outermost.
 
 Of each order l the fluence in a layer is ``a i_l(k r) + b k_l(k r)``; phi and ``D dphi/dr`` are continuous from layer
-to layer. Let y be what is regular at the centre, ``rho = b k_l/(a i_l)`` the share of the decaying part, and u and v the
-logarithmic derivatives of `bessel.WallRates`. Then
+to layer. Let y be what is regular at the centre, ``rho = b k_l/(a i_l)`` the share of the decaying part, and u and v
+the logarithmic derivatives of `bessel.WallRates`. Then
 
     g = r y'/y = (u - v rho)/(1 + rho),   rho(s)/rho(r) = [x (u + v)]_r/[x (u + v)]_s (i_l(k r)/i_l(k s))²
 
