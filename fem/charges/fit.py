@@ -45,9 +45,9 @@ class Factors:
 def factorise(table: NumberArray) -> Factors:
     """Factorise a table, which is overwritten.
 
-    Pivoted QR of its columns at equal lengths: without pivots first, which is done in large blocks, and with them of the
-    small triangle that this leaves (a third quicker). The table is nearly singular by nature, and all the
-    more so the higher charges are above the surface: strengths grow, and what they add up to does not suffer as long as
+    Pivoted QR of its columns at equal lengths: without pivots first, which is done in large blocks, and with them of
+    the small triangle that this leaves (a third quicker). The table is nearly singular by nature, and the more so the
+    higher charges are above the surface: strengths grow, and what they add up to does not suffer as long as
     small pivots are left out (Barnett & Betcke 2008).
     """
     scales = np.linalg.norm(table, axis=0)

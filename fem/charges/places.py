@@ -102,13 +102,19 @@ def places_for(
 
 
 def places_at(
-    surface: Surface, cells: Cells, spacing: Spacing, distance: Spacing, rng: np.random.Generator, height: float
+    surface: Surface,
+    cells: Cells,
+    spacing: Spacing,
+    distance: Spacing,
+    rng: np.random.Generator,
+    height: float,
+    far: float = FAR,
 ) -> Places:
     """Places of charges a spacing apart, from cells of that spacing."""
     fitted, others = spread(surface, cells.scaled(1.0 / FINER).cut(scaled(spacing, 1.0 / FINER)), rng)
     feet = fitted[thin(fitted, FINER * APART * fitted.spacing)]
     charges, clear = above(surface, feet, FINER * feet.spacing, height)
-    return Places(charges[clear], feet, fitted, _weights(fitted, distance), _checked(others, fitted))
+    return Places(charges[clear], feet, fitted, _weights(fitted, distance, far), _checked(others, fitted))
 
 
 def fitting_cells(surfaces: Sequence[Surface], spacings: Sequence[Spacing], count: float) -> tuple[list[Cells], float]:
@@ -155,7 +161,7 @@ def above(surface: Surface, feet: Samples, spacing: FloatArray, height: float) -
     return places, clear & (heights >= LOWEST * spacing)
 
 
-def _weights(samples: Samples, distance: Spacing) -> FloatArray:
+def _weights(samples: Samples, distance: Spacing, far: float) -> FloatArray:
     """Weights (n,) of equations at samples: the root of area, times a power of the distance from the light."""
     away = distance(samples.points)
-    return np.asarray(np.sqrt(samples.areas) * (away / away.max()) ** FAR)
+    return np.asarray(np.sqrt(samples.areas) * (away / away.max()) ** far)

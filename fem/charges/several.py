@@ -20,6 +20,11 @@ from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface import Surface
 
+# Light that went deep is faint: rows far from the source weigh more than in one medium. Reading at 30° of a four-layer
+# head by 1,050 charges, error in % and that of the whole for powers of .75 / 1.25 / 1.5: -.99, .0045 / -.75, .0047 /
+# -.66, .0049; at 45° 1.0 / .03 / -.19.
+FAR = 1.25
+
 
 @dataclass(frozen=True, eq=False)
 class Wall:
@@ -96,7 +101,7 @@ def wall_places(
     all_cells, scale = fitting_cells(surfaces, spacings, share * count)
     found = []
     for wall, cells, spacing in zip(walls, all_cells, spacings, strict=True):
-        places = places_at(wall.surface, cells, scaled(spacing, scale), spacing, rng, height)
+        places = places_at(wall.surface, cells, scaled(spacing, scale), spacing, rng, height, FAR)
         within = np.zeros((0, 3))
         if wall.outside is not None:
             turned = replace(wall.surface, faces=wall.surface.faces[:, ::-1])
