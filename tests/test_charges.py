@@ -202,7 +202,7 @@ def test_diffuse_light_on_a_ball(ball: Surface) -> None:
 
 
 def test_a_solution_is_read_like_one_with_a_mesh(ball: Surface) -> None:
-    lights = [PointSource((0.0, 0.0, 9.0)), DiffuseLight(0.001)]
+    lights: list[Light] = [PointSource((0.0, 0.0, 9.0)), DiffuseLight(0.001)]
     solution = solve_with_charges(ball, TISSUE, lights)
     assert isinstance(solution, ChargeSolution)
     assert (solution.mesh, solution.model) == (None, "charges")

@@ -34,6 +34,6 @@ def _stretched(surface: Surface, cells: Cells, own: IntArray, flat: FloatArray, 
     faces, corners = cells.faces[own], cells.corners[own]
     points, normals = surface.on_curve(faces, flat)
     sides = [corners[:, i] - corners[:, 0] for i in (1, 2)]
-    along = [(surface.on_curve(faces, flat + STEP * side)[0] - points) / STEP for side in sides]
-    areas = 0.5 * np.linalg.norm(np.cross(*along), axis=1)
+    first, second = ((surface.on_curve(faces, flat + STEP * side)[0] - points) / STEP for side in sides)
+    areas = 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
     return Samples(points, normals, shares * areas, cells.spacing[own])

@@ -131,12 +131,12 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     if count < 2:
         return np.ones(count, dtype=bool)
     tree = cKDTree(samples.points)
-    distance, near = tree.query(samples.points, k=min(NEIGHBOURS, count))
-    near = near[:, 1:]
-    close = distance[:, 1:] < np.minimum(radii[:, None], radii[near])
+    found = tree.query(samples.points, k=min(NEIGHBOURS, count))
+    distance, near = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
+    close = distance < np.minimum(radii[:, None], radii[near])
     close &= np.einsum("ij,ikj->ik", samples.normals, samples.normals[near]) > 0.0
-    first, second = np.nonzero(close)
-    second = near[first, second]
+    first, place = np.nonzero(close)
+    second = near[first, place]
     earlier = second < first
     late, early = first[earlier], second[earlier]
     kept, open_ = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
@@ -158,5 +158,5 @@ def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Sa
     drawn = drawn[rng.permutation(len(drawn))]
     kept = thin(drawn, APART * drawn.spacing)
     chosen = drawn[kept]
-    nearest = cKDTree(chosen.points).query(drawn.points)[1]
+    nearest = np.asarray(cKDTree(chosen.points).query(drawn.points)[1])
     return replace(chosen, areas=summed(nearest, drawn.areas, len(chosen))), drawn[~kept]

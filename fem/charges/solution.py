@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.adapt import MOST, Drive, fit_charges
@@ -96,7 +97,7 @@ class ChargeSolution:
         """Exitance at the vertices of `surface`, (v,), W/unit²."""
         return self.exitance_at(self.surface.points)
 
-    def exitance_at(self, points: FloatArray) -> FloatArray:
+    def exitance_at(self, points: npt.ArrayLike) -> FloatArray:
         """Exitance at the points of the surface nearest to given points (q, 3), (q,), W/unit²; nan if not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
@@ -108,7 +109,7 @@ class ChargeSolution:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
 
-    def fluence_at(self, points: FloatArray) -> FloatArray:
+    def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
         fluence = np.full(len(queries), np.nan)
