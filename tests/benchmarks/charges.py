@@ -4,6 +4,9 @@ Without arguments: a pencil beam as a point on each body, with 100, 300 and 800 
 300 charges each: a body, a source .3 to 10 mean free paths below a random point of it, albedo .8 to .9999, index 1 to
 1.5, the body 10 to 80 mean free paths across. Further arguments are files of surfaces, which join the bodies.
 
+`--remainder` adds finite elements for what charges leave, on the mesher's own mesh, and `solve` at .02 and .005 beside
+them. `--head` is a head of four layers against its series.
+
 Seconds are of the processor, of all threads, the least of three runs, from a surface whose trees are built. The truth
 is the series for balls, and elsewhere the same method with as many charges as `--truth` says, whose own bound is
 printed: the error is known to a share of that, about as much as the estimate is smaller than the bound.
@@ -17,12 +20,18 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.fem import Medium, PencilBeam
+from tetlux.fem import Medium, PencilBeam, PointSource, Power, solve
 from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.charges.places import distance_from
+from tetlux.fem.charges.places import scaled as scaled_spacing
+from tetlux.fem.charges.remainder import solve_remainder
+from tetlux.fem.charges.samples import cells_of, draw
+from tetlux.fem.charges.solution import Entry, charge_solution
+from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, torus
+from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.surface import triangle_areas
@@ -126,7 +135,7 @@ def random_scenes(count: int, files: list[str], first: int) -> Iterator[Scene]:
             source = np.array([[0.0, 0.0, 1.0 - depth]]) if ball else below(surface, depth, rng)
             away = float(np.linalg.norm(surface.closest(source)[0] - source))
             # Not through the other side, nor much nearer to it.
-            if not surface.contains(source)[0] or away < 0.7 * depth:
+            if not surface.contains(source)[0] or away < 0.7 * depth or (ball and depth > 1.0):
                 depth = 0.0
         name = f"{number} {surface.name}, albedo {albedo:.4f}, n {eta:.2f}, "
         name += f"{surface.diagonal / free_path:.0f} mfp across, source {depth / free_path:.2g} deep"
@@ -177,6 +186,66 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
     return text, quality.estimate / error, quality.bound / error
 
 
+def remainder_rows(scene: Scene, truth: int) -> Iterator[str]:
+    """Lines of the table of what finite elements add."""
+    mesh = tetrahedralize(scene.surface)
+    distance = distance_from(scene.surface, scene.source)
+    spacing = scaled_spacing(distance, 0.2)
+    samples = draw(scene.surface, cells_of(scene.surface, spacing).cut(spacing), np.random.default_rng(3))
+    right, bound = scene.truth_at(samples.points, truth)
+    faint = (right < 0.01 * right.max()) & (right > 1e-6 * right.max())
+
+    def line(name: str, nodes: int, started: float, exitance: FloatArray) -> str:
+        off = np.abs(exitance - right)
+        error = norm(samples.areas, off) / norm(samples.areas, right)
+        return (
+            f"| {scene.name} | {name} | {nodes} | {time.process_time() - started:.2f} | {error:.4%} | "
+            f"{np.median(off[faint] / right[faint]):.2%} | {bound:.3%} |"
+        )
+
+    for charges in (100, 300):
+        started = time.process_time()
+        fitted = scene.fit(charges)
+        yield line(f"{charges} charges", 0, started, fitted.field.exitance(samples.points)[:, 0])
+        started = time.process_time()
+        both = solve_remainder(mesh, scene.surface, scene.medium, fitted)
+        yield line(f"{charges} charges, with u", len(mesh.points), started, both.exitance_on(samples.points))
+    light = PointSource(tuple(scene.source[0].tolist()))
+    for tolerance in (0.02, 0.005):
+        started = time.process_time()
+        solution = solve(scene.surface, scene.medium, [light], tolerance=tolerance)
+        yield line(f"solve at {tolerance}", len(solution.mesh.points), started, solution.exitance_on(samples.points))
+
+
+def head_rows() -> Iterator[str]:
+    """Lines of the table of a head of four layers, for more and more charges."""
+    radii = (36.8, 34.8, 32.0, 31.2)
+    media = [
+        Medium(sigma_a=a, sigma_s_prime=s, eta=1.4) for a, s in ((0.018, 1.9), (0.016, 1.6), (0.004, 0.3), (0.036, 2.2))
+    ]
+    outer, *inner = (sphere(radius) for radius in radii)
+    depth = radii[0] - media[0].mean_free_path
+    gamma = np.radians([0.0, 10.0, 20.0, 30.0, 45.0])
+    points = radii[0] * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
+    right = layered_ball.point_exitance(media[::-1], radii[::-1], source_radius=depth, gamma=gamma)
+    entry = Entry(Power(1.0, 0.0, 0.0, 0.0, 0.0))
+    for most in (700, 1211):
+        started = time.process_time()
+        solution = charge_solution(
+            outer,
+            media[0],
+            np.array([[0.0, 0.0, depth]]),
+            np.ones((1, 1)),
+            [entry],
+            inner=list(zip(inner, media[1:], strict=True)),
+            tolerance=0.0,
+            most=most,
+        )
+        seconds = time.process_time() - started
+        off = " | ".join(f"{each:.3%}" for each in solution.exitance_on(points) / right - 1.0)
+        yield f"| {solution.charges} | {seconds:.1f} | {solution.error_estimate:.4%} | {off} |"
+
+
 HEAD = """| body | charges | seconds | error | estimate | over error | bound | over error | bound of truth | \
 median error below 1 % of the brightest | worst within six decades |
 |---|---|---|---|---|---|---|---|---|---|---|"""
@@ -190,7 +259,23 @@ def main() -> None:
     parser.add_argument("--truth", type=int, default=1600)
     parser.add_argument("--charges", type=int, nargs="+", default=[100, 300, 800])
     parser.add_argument("files", nargs="*")
+    parser.add_argument("--remainder", action="store_true")
+    parser.add_argument("--head", action="store_true")
     given = parser.parse_args()
+    if given.head:
+        print(
+            "| charges | seconds | estimate | error at 0° | 10° | 20° | 30° | 45° |\n|---|---|---|---|---|---|---|---|"
+        )
+        for text in head_rows():
+            print(text, flush=True)
+        return
+    if given.remainder:
+        print("| body | by | nodes | seconds | error | median error where faint | bound of truth |")
+        print("|---|---|---|---|---|---|---|")
+        for scene in named(given.files):
+            for text in remainder_rows(scene, given.truth):
+                print(text, flush=True)
+        return
     print(HEAD)
     if not given.scenes:
         for scene in named(given.files):
