@@ -28,6 +28,7 @@ from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing import InputError, Surface, box, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 
@@ -214,6 +215,9 @@ def test_a_solution_is_read_like_one_with_a_mesh(ball: Surface) -> None:
     assert first.power.incident + second.power.incident == pytest.approx(solution.power.incident)
     with pytest.raises(InputError, match="no mesh"):
         _ = solution.fluence
+    shown, values = surface_exitance(solution)
+    assert len(shown.points) > len(ball.points)
+    assert values[: len(ball.points)] == pytest.approx(solution.exitance, rel=1e-9)
 
 
 HEAD = (36.8, 34.8, 32.0, 31.2)
@@ -347,6 +351,8 @@ def test_bodies_that_are_not_even_are_refused(ball: Surface) -> None:
     varying = VaryingMedium(base=TISSUE, sigma_a=lambda points: 0.01 + 0.001 * points[:, 0])
     with pytest.raises(InputError, match="varies within the body"):
         solve(ball, varying, [light], model="charges")
+    with pytest.raises(InputError, match="crosses itself"):
+        solve(replace(ball, overlaps=True), TISSUE, [light], model="charges")
     with pytest.raises(InputError, match="one medium at a time"):
         solve(ball, [TISSUE, TISSUE], [light], model="charges")
     with pytest.raises(InputError, match="on a body with regions"):

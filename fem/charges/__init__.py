@@ -13,6 +13,8 @@ tables are nearly singular and why that does no harm, see Barnett & Betcke 2008,
     check       a bound of the error, and an estimate
     adapt       more charges, where the residual is large
     quadrature  integrals over the surface
+    several     several even regions, each with charges of its own
+    remainder   finite elements for what charges leave
     field, solution, solve
 
 `tetlux.fem.charges.check` says what the bound promises and what not. Surfaces are the smooth ones (`Surface.on_curve`):

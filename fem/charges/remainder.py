@@ -6,7 +6,7 @@ missing, ``u = phi - G``, obeys the equation without light, and
     ∫ D grad u . grad v + sigma_a u v  +  ∮ u v/(2A)  =  -∮ r v
 
 Nothing else of G enters, so that flat facets do no harm: r is that of the true surface, and is carried to the facets
-of a mesh by nearest points. u is small and smooth, since charges carry what is near the light, and a coarse mesh will do:
+of a mesh by nearest points. u is small and smooth, since charges carry what is near the light: a coarse mesh will do.
 
 | body | charges | nodes | error alone, with u | median below 1 % of the brightest | `solve` at .005: nodes, both |
 |---|---|---|---|---|---|

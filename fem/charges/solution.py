@@ -122,6 +122,11 @@ class ChargeSolution:
         return fluence
 
     @property
+    def resolution(self) -> tuple[FloatArray, FloatArray]:
+        """Points of the body's surface (n, 3), and how far apart charges are above them (n,), unit."""
+        return self.samples[0].points, FINER * self.samples[0].spacing
+
+    @property
     def charges(self) -> int:
         """How many there are, sources included."""
         return sum(len(each.positions) for each in self.fields)

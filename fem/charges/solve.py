@@ -66,6 +66,12 @@ def solve_with_charges(
     with watch.stage("surface"):
         inner = [(region.surface, _even(only_medium(region))) for region in regions]
         body = _even(medium)
+        for each in (surface, *(own for own, _ in inner)):
+            if each.overlaps:
+                raise InputError(
+                    f'{each.name} crosses itself or holds a body within, and model "charges" needs a surface all of '
+                    f"which bounds the body; {_INSTEAD}"
+                )
         check_regions(surface, [each for each, _ in inner])
         check_media(surface, [body, *(each for _, each in inner)])
         deposits = [_deposit(light, surface, body, uniform=not inner) for light in lights]
