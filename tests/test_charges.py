@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
+from tetlux.cases.case import library_folder
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
@@ -29,7 +31,7 @@ from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.surface_exitance import surface_exitance
-from tetlux.meshing import InputError, Surface, box, sphere, tetrahedralize, torus
+from tetlux.meshing import InputError, Surface, box, read_surface, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
@@ -86,12 +88,18 @@ def test_the_bound_holds_and_the_estimate_is_near_the_error(
         assert 0.5 * error <= fitted.quality.estimate <= 4.0 * error
 
 
-def test_charges_lie_outside(fitted: FittedCharges, ball: Surface) -> None:
+def test_charges_lie_outside_and_clear_of_the_body(fitted: FittedCharges, ball: Surface) -> None:
     assert not ball.contains(fitted.places.charges).any()
-    sharp = torus(4.0, 2.5)  # with a narrow hole
-    light = of_points(np.array([[2.2, 0.0, 0.0]]))
-    places = fit_charges(sharp, equation_of(TISSUE), light, tolerance=0.0, most=300).places
-    assert not sharp.contains(places.charges).any()
+    narrow = torus(4.0, 3.5)  # with a hole of half a mean free path
+    folded = read_surface(library_folder() / "hare.stl")  # between its ears, and at their roots
+    for body, source in ((narrow, (2.2, 0.0, 0.0)), (folded, (3.69, -3.5, 27.29))):
+        light = of_points(np.array([source]))
+        places = fit_charges(body, equation_of(TISSUE), light, tolerance=0.0, most=100).places
+        assert not body.contains(places.charges).any()
+        away = np.linalg.norm(body.project(places.charges)[0] - places.charges, axis=1)
+        near = cKDTree(places.fitted.points).query(places.charges)[1]
+        # As far as equations are apart, or they would not see what charges do between them.
+        assert (away > 0.3 * places.fitted.spacing[near]).all()
 
 
 def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
