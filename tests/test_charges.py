@@ -26,8 +26,9 @@ from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_charges
 from tetlux.fem.charges.check import norm, quality_of
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import Equation, equation_of
-from tetlux.fem.charges.places import FINER
+from tetlux.fem.charges.places import FINER, above
 from tetlux.fem.charges.remainder import solve_remainder
+from tetlux.fem.charges.samples import Samples
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.surface_exitance import surface_exitance
@@ -90,9 +91,9 @@ def test_the_bound_holds_and_the_estimate_is_near_the_error(
 
 def test_charges_lie_outside_and_clear_of_the_body(fitted: FittedCharges, ball: Surface) -> None:
     assert not ball.contains(fitted.places.charges).any()
-    narrow = torus(4.0, 3.5)  # with a hole of half a mean free path
+    narrow = torus(4.0, 3.9)  # with a hole a fifth of a mean free path
     folded = read_surface(library_folder() / "hare.stl")  # between its ears, and at their roots
-    for body, source in ((narrow, (2.2, 0.0, 0.0)), (folded, (3.69, -3.5, 27.29))):
+    for body, source in ((narrow, (1.0, 0.0, 0.0)), (folded, (3.69, -3.5, 27.29))):
         light = of_points(np.array([source]))
         places = fit_charges(body, equation_of(TISSUE), light, tolerance=0.0, most=100).places
         assert not body.contains(places.charges).any()
@@ -100,6 +101,17 @@ def test_charges_lie_outside_and_clear_of_the_body(fitted: FittedCharges, ball: 
         near = cKDTree(places.fitted.points).query(places.charges)[1]
         # As far as equations are apart, or they would not see what charges do between them.
         assert (away > 0.3 * places.fitted.spacing[near]).all()
+
+
+def test_there_is_no_charge_in_a_gap_far_narrower_than_the_spacing() -> None:
+    """It would be a spike between the points at which it is fitted."""
+    one, other = box((10.0, 10.0, 10.0)), box((10.0, 10.0, 10.0), center=(0.0, 0.0, 10.01))
+    pair = Surface(np.vstack([one.points, other.points]), np.vstack([one.faces, other.faces + len(one.points)]))
+    points, normals = np.array([[0.5, 0.2, 5.0], [5.0, 0.3, 0.4]]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    feet = Samples(points, normals, np.ones(2), np.ones(2))
+    places, clear = above(pair, feet, np.ones(2), 2.0)
+    assert clear.tolist() == [False, True]
+    assert places[1] == pytest.approx([7.0, 0.3, 0.4])
 
 
 def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
