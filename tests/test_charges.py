@@ -293,6 +293,17 @@ def test_regions_of_the_bodys_own_medium_are_none(ball: Surface) -> None:
     assert cut.fluence_at([(0, 0, 0)]) == pytest.approx(plain.fluence_at([(0, 0, 0)]), rel=0.01)
 
 
+def test_a_source_may_come_near_the_surface_of_a_region_and_not_lie_on_it(ball: Surface) -> None:
+    regions = [Region(sphere(5.0), Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4))]
+    exited = [
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, z))], regions=regions, model="charges").power.exited
+        for z in (4.998, 5.05)
+    ]
+    assert exited == pytest.approx([0.557, 0.5595], rel=0.003)
+    with pytest.raises(InputError, match="lies on the surface of region 1"):
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], regions=regions, model="charges")
+
+
 # Finite elements at tolerance .003, whose own estimates are .17 and .05 %: exitance at points, and power that leaves.
 @pytest.mark.parametrize(
     ("body", "beam", "points", "exitance", "exited"),
