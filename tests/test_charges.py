@@ -267,7 +267,7 @@ def test_a_head_of_four_layers_is_read_as_its_series_has_it(head: ChargeSolution
 
 
 def test_the_ledger_of_a_head_balances(head: ChargeSolution) -> None:
-    nodes, weights = np.polynomial.legendre.leggauss(2000)
+    nodes, weights = np.polynomial.legendre.leggauss(600)
     depth = TISSUES[0].mean_free_path
     gamma = np.arccos(nodes)
     exitance = layered_ball.point_exitance(TISSUES[::-1], HEAD[::-1], source_radius=HEAD[0] - depth, gamma=gamma)
