@@ -24,9 +24,11 @@ from tetlux.meshing.surface import Surface
 # head by 1,050 charges, error in % and that of the whole for powers of .75 / 1.25 / 1.5: -.99, .0045 / -.75, .0047 /
 # -.66, .0049; at 45° 1.0 / .03 / -.19.
 FAR = 1.25
-# What reaches the surface from an inner wall is the longer part of its ripples: so many times as long as at the surface.
+# What reaches the surface from an inner wall is the longer part of its ripples: so many times as long as at the body's.
 # The estimate over the error on 24 random balls of two or three layers: .26 to 1.9 with 1, .89 to 3.8 with 3.
 DEEPER = 3.0
+# A last step to the most charges is taken if that is so many times more.
+WORTHWHILE = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +161,8 @@ def fit_regions(
     """
     count = min(FIRST * (2 * len(walls) - 1), most)
     best = fit_regions_at(wall_places(walls, light, count), equations, light)
-    while best.quality.estimate > tolerance and GROWTH * count <= most:
-        count = round(GROWTH * count)
+    while best.quality.estimate > tolerance and WORTHWHILE * count <= most:
+        count = min(round(GROWTH * count), most)
         height = HIGH if best.quality.estimate <= SMOOTH else LOW
         fitted = fit_regions_at(wall_places(walls, light, count, height), equations, light)
         if fitted.quality.estimate < best.quality.estimate:

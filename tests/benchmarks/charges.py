@@ -229,7 +229,7 @@ def head_rows() -> Iterator[str]:
     points = radii[0] * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
     right = layered_ball.point_exitance(media[::-1], radii[::-1], source_radius=depth, gamma=gamma)
     entry = Entry(Power(1.0, 0.0, 0.0, 0.0, 0.0))
-    for most in (700, 1211):
+    for most in (700, 1050):
         started = time.process_time()
         solution = charge_solution(
             outer,
