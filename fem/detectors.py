@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.lights.point import as_vector
 from tetlux.fem.radiance import collected_share
 from tetlux.fem.solution import Solution
@@ -124,7 +125,7 @@ class Reading:
     power: float | None = None
 
 
-def read(detector: Detector, solution: Solution) -> Reading:
+def read(detector: Detector, solution: Solution | ChargeSolution) -> Reading:
     """Read a detector.
 
     A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
@@ -134,7 +135,7 @@ def read(detector: Detector, solution: Solution) -> Reading:
     Parameters
     ----------
     detector : PointDetector, DiscDetector or FibreDetector
-    solution : Solution
+    solution : Solution or ChargeSolution
 
     Returns
     -------
@@ -168,7 +169,9 @@ def read(detector: Detector, solution: Solution) -> Reading:
     return Reading(_vector(place), _vector(normal), exitance, area, share * exitance * area)
 
 
-def _on_surface(solution: Solution, name: str, given: Vector, reach: float, what: str) -> tuple[FloatArray, FloatArray]:
+def _on_surface(
+    solution: Solution | ChargeSolution, name: str, given: Vector, reach: float, what: str
+) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
     wanted = as_vector(given, name)
     (place,), (normal,) = solution.surface.project(wanted[None])

@@ -4,11 +4,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from threading import Timer
-from typing import Any, overload
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
+from tetlux.fem.charges.solution import ChargeSolution
+from tetlux.fem.charges.solve import solve_with_charges
 from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
@@ -64,6 +66,7 @@ def solve(  # type: ignore[overload-overlap]  # a list of channels may be among 
     most_tetrahedra: int = ...,
     cache: bool = ...,
     report: Callable[[str], None] = ...,
+    model: Literal["full"] = ...,
 ) -> Solution: ...
 
 
@@ -82,7 +85,20 @@ def solve(
     most_tetrahedra: int = ...,
     cache: bool = ...,
     report: Callable[[str], None] = ...,
+    model: Literal["full"] = ...,
 ) -> list[Solution]: ...
+
+
+@overload
+def solve(
+    body: Surface | TetMesh,
+    medium: AnyMedium | Sequence[AnyMedium],
+    lights: Sequence[Light],
+    *,
+    model: Literal["charges"],
+    regions: Sequence[Region] = ...,
+    tolerance: float = ...,
+) -> ChargeSolution: ...
 
 
 def solve(
@@ -99,7 +115,8 @@ def solve(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Callable[[str], None] = lambda _: None,
-) -> Solution | list[Solution]:
+    model: Literal["full", "charges"] = "full",
+) -> Solution | list[Solution] | ChargeSolution:
     """Solve for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
@@ -134,11 +151,16 @@ def solve(
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
         Called with a line of text as each stage ends.
+    model : {"full", "charges"}
+        "full" is finite elements. "charges" needs no mesh: screened charges outside the body are fitted to its
+        surface, see `tetlux.fem.charges`; for points, beams that are points, and diffuse light in even regions. Of
+        the other arguments it takes `regions` and `tolerance`.
 
     Returns
     -------
-    Solution or list of Solution
-        One for each channel, if `medium` is a sequence, or one of its labels has a sequence.
+    Solution, list of Solution, or ChargeSolution
+        One for each channel, if `medium` is a sequence, or one of its labels has a sequence. A ChargeSolution for
+        ``model="charges"``.
 
     Raises
     ------
@@ -153,6 +175,10 @@ def solve(
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """
+    if model not in ("full", "charges"):
+        raise InputError(f'model is "{model}"; it is "full" or "charges".')
+    if model == "charges":
+        return _without_mesh(body if mesh is None else mesh, medium, lights, regions, tolerance)
     channels, several = channels_of(body, mesh, medium)
     solutions = solve_each(
         body,
@@ -207,8 +233,7 @@ def solve_each(
     InputError, RunError
         As in `solve`.
     """
-    if not 1e-4 <= tolerance < 1:
-        raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+    _check_tolerance(tolerance)
     if not isinstance(scenes, Sequence):
         raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
     for lights in scenes:
@@ -246,6 +271,30 @@ def solve_each(
         found.append(replace(step.solution, warnings=list(dict.fromkeys(warnings))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
+
+
+def _without_mesh(
+    body: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    lights: Sequence[Light],
+    regions: Sequence[Region],
+    tolerance: float,
+) -> ChargeSolution:
+    """Solve by charges, if that can be."""
+    if isinstance(body, TetMesh):
+        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
+    if not isinstance(medium, AnyMedium):
+        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
+    _check_tolerance(tolerance)
+    check_list(lights)
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
+    return solve_with_charges(body, medium, lights, regions=regions, tolerance=tolerance)
+
+
+def _check_tolerance(tolerance: float) -> None:
+    if not 1e-4 <= tolerance < 1:
+        raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
 @contextmanager

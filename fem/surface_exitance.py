@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
@@ -20,14 +21,14 @@ COARSER, FINER = 2.0, 0.05
 MOST_ADDED = 200_000
 
 
-def surface_exitance(solution: Solution) -> tuple[Surface, FloatArray]:
+def surface_exitance(solution: Solution | ChargeSolution) -> tuple[Surface, FloatArray]:
     """Exitance at the vertices of the surface that was solved for.
 
     Triangles too large to show how the exitance changes are split: the given vertices come first, in their order.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or ChargeSolution
 
     Returns
     -------
@@ -38,10 +39,7 @@ def surface_exitance(solution: Solution) -> tuple[Surface, FloatArray]:
     given = solution.surface
     flat, faces, parents = given.points, given.faces, np.arange(len(given.faces))
     points, exitance = given.points, solution.exitance_on(given.points)
-    mesh = solution.mesh
-    facets = mesh.points[mesh.boundary_faces]
-    tree = cKDTree(facets.mean(axis=1))
-    size = longest_sides(facets)
+    tree, size = _resolved(solution)
     # Edges that were looked at and found short enough stay so.
     known = np.zeros((0, 2), dtype=np.int64)
     while len(flat) < len(given.points) + MOST_ADDED:
@@ -68,3 +66,12 @@ def surface_exitance(solution: Solution) -> tuple[Surface, FloatArray]:
         parents = parents[origin]
         points, exitance = np.vstack([points, added]), np.concatenate([exitance, solution.exitance_on(added)])
     return replace(given, points=points, faces=faces, repairs=(), warnings=()), exitance
+
+
+def _resolved(solution: Solution | ChargeSolution) -> tuple[cKDTree, FloatArray]:
+    """Points of the surface, and how much space the exitance needs to change there, (n,), unit."""
+    if isinstance(solution, ChargeSolution):
+        points, spacing = solution.resolution
+        return cKDTree(points), spacing
+    facets = solution.mesh.points[solution.mesh.boundary_faces]
+    return cKDTree(facets.mean(axis=1)), longest_sides(facets)

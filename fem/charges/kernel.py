@@ -1,0 +1,147 @@
+"""The screened charge: its fluence, its flux through a surface, and sums of many.
+
+A charge of q watts at p gives ``phi = q e^{-k r}/(4 pi D r)``, ``r = |x - p|``, which obeys the diffusion equation
+everywhere but at p. The wave number k may be complex: light modulated in time has ``k² = (sigma_a + i omega/v)/D``.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.blocks import in_blocks
+
+# Pairs of a point and a charge worked on at once, so that they stay in the processor's cache.
+PAIRS = 50_000
+
+# Real in steady light, complex for modulated light.
+NumberArray = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Equation:
+    """``-div D grad phi + D k² phi = 0`` in one even medium, with ``D dphi/dn + phi/(2A) = 0`` on its surface.
+
+    Attributes
+    ----------
+    wave_number : float or complex
+        ``k = sqrt(sigma_a/D)``, 1/unit; with a positive real part.
+    diffusion : float
+        D, unit.
+    boundary_factor : float
+        A.
+    """
+
+    wave_number: complex
+    diffusion: float
+    boundary_factor: float
+
+    @property
+    def robin(self) -> float:
+        """``1/(2A)``, which makes exitance of fluence."""
+        return 0.5 / self.boundary_factor
+
+    @property
+    def dtype(self) -> npt.DTypeLike:
+        """Of fluence."""
+        return np.complex128 if isinstance(self.wave_number, complex) else np.float64
+
+    def fluence_of_each(self, points: FloatArray, positions: FloatArray) -> NumberArray:
+        """Fluence at points (n, 3) of unit charges at positions (c, 3), (n, c), W/unit²."""
+        table = np.empty((len(points), len(positions)), dtype=self.dtype)
+
+        def work(rows: slice) -> None:
+            table[rows] = self._unit_fluence(_distances(points[rows], positions))
+
+        in_blocks(work, len(points), _rows(positions))
+        return table
+
+    def traces_of_each(
+        self, points: FloatArray, normals: FloatArray, positions: FloatArray
+    ) -> tuple[NumberArray, NumberArray]:
+        """Fluence and ``D dphi/dn`` at points (n, 3) of a surface, of unit charges at (c, 3), two (n, c), W/unit²."""
+        shape = len(points), len(positions)
+        fluence, flux = np.empty(shape, dtype=self.dtype), np.empty(shape, dtype=self.dtype)
+
+        def work(rows: slice) -> None:
+            fluence[rows], flux[rows] = self._unit_traces(points[rows], normals[rows], positions)
+
+        in_blocks(work, len(points), _rows(positions))
+        return fluence, flux
+
+    def residual_of_each(self, points: FloatArray, normals: FloatArray, positions: FloatArray) -> NumberArray:
+        """``D dphi/dn + phi/(2A)`` at points (n, 3) of a surface, of unit charges at (c, 3), (n, c), W/unit²."""
+        table = np.empty((len(points), len(positions)), dtype=self.dtype)
+
+        def work(rows: slice) -> None:
+            fluence, flux = self._unit_traces(points[rows], normals[rows], positions)
+            fluence *= self.robin
+            flux += fluence
+            table[rows] = flux
+
+        in_blocks(work, len(points), _rows(positions))
+        return table
+
+    def fluence(self, points: FloatArray, positions: FloatArray, strengths: NumberArray) -> NumberArray:
+        """Fluence of charges of given strengths (c, ...), W, at points (n, 3), (n, ...), W/unit²."""
+        sums = np.empty((len(points), *strengths.shape[1:]), dtype=np.result_type(self.dtype, strengths))
+
+        def work(rows: slice) -> None:
+            sums[rows] = self._unit_fluence(_distances(points[rows], positions)) @ strengths
+
+        in_blocks(work, len(points), _rows(positions))
+        return sums
+
+    def traces(
+        self, points: FloatArray, normals: FloatArray, positions: FloatArray, strengths: NumberArray
+    ) -> tuple[NumberArray, NumberArray]:
+        """Fluence and ``D dphi/dn`` of charges of given strengths (c, ...), two (n, ...), W/unit²."""
+        shape, dtype = (len(points), *strengths.shape[1:]), np.result_type(self.dtype, strengths)
+        fluence, flux = np.empty(shape, dtype=dtype), np.empty(shape, dtype=dtype)
+
+        def work(rows: slice) -> None:
+            value, slope = self._unit_traces(points[rows], normals[rows], positions)
+            fluence[rows], flux[rows] = value @ strengths, slope @ strengths
+
+        in_blocks(work, len(points), _rows(positions))
+        return fluence, flux
+
+    def _unit_fluence(self, distance: FloatArray) -> NumberArray:
+        value: NumberArray = np.exp(-self.wave_number * distance)
+        value /= 4.0 * np.pi * self.diffusion * distance
+        return value
+
+    def _unit_traces(
+        self, points: FloatArray, normals: FloatArray, positions: FloatArray
+    ) -> tuple[NumberArray, NumberArray]:
+        distance = _distances(points, positions)
+        fluence = self._unit_fluence(distance)
+        # About a point near by, so that few digits are lost.
+        origin = points[0]
+        height = np.einsum("ij,ij->i", points - origin, normals)[:, None] - normals @ (positions - origin).T
+        np.reciprocal(distance, out=distance)
+        height *= distance
+        flux = np.multiply(fluence, height)
+        flux *= -self.diffusion * (self.wave_number + distance)
+        return fluence, flux
+
+
+def _distances(points: FloatArray, positions: FloatArray) -> FloatArray:
+    """Distances between points (n, 3) and positions (c, 3), (n, c)."""
+    # |x - p|² from |x|² + |p|² - 2 x.p would lose digits close to a charge.
+    square: FloatArray = np.square(points[:, :1] - positions[:, 0])
+    square += np.square(points[:, 1:2] - positions[:, 1])
+    square += np.square(points[:, 2:] - positions[:, 2])
+    return np.asarray(np.sqrt(square, out=square))
+
+
+def _rows(positions: FloatArray) -> int:
+    return max(1, PAIRS // max(1, len(positions)))
+
+
+def equation_of(medium: Medium) -> Equation:
+    """The equation of steady light in a medium."""
+    return Equation(medium.sigma_tr, medium.diffusion, medium.boundary_factor)

@@ -1,0 +1,39 @@
+"""Integrals over a smooth surface: points of it and the areas that they stand for."""
+
+import numpy as np
+
+from tetlux.fem.charges.samples import Cells, Samples, Spacing, cells_of
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface import Surface, longest_sides
+
+# Cells longer than this share of the spacing have three points, the middles of their sides (exact for quadratics).
+COARSE = 0.5
+MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
+# Share of a cell's sides over which its stretching is told.
+STEP = 1e-5
+
+
+def quadrature(surface: Surface, spacing: Spacing) -> Samples:
+    """Points of the smooth surface and the areas they stand for, to integrate what changes over a spacing."""
+    cells = cells_of(surface, spacing).cut(spacing, 1.0)
+    coarse = longest_sides(cells.corners) > COARSE * cells.spacing
+    fine, rule = np.flatnonzero(~coarse), np.repeat(np.flatnonzero(coarse), 3)
+    at_middle = cells.corners[fine].mean(axis=1)
+    at_sides = np.einsum("pi,mij->mpj", MIDDLES, cells.corners[coarse]).reshape(-1, 3)
+    return _stretched(
+        surface,
+        cells,
+        np.concatenate([fine, rule]),
+        np.vstack([at_middle, at_sides]),
+        np.concatenate([np.ones(len(fine)), np.full(len(rule), 1.0 / 3.0)]),
+    )
+
+
+def _stretched(surface: Surface, cells: Cells, own: IntArray, flat: FloatArray, shares: FloatArray) -> Samples:
+    """Points of cells taken to the smooth surface, with the area that their share of the cell has there."""
+    faces, corners = cells.faces[own], cells.corners[own]
+    points, normals = surface.on_curve(faces, flat)
+    sides = [corners[:, i] - corners[:, 0] for i in (1, 2)]
+    first, second = ((surface.on_curve(faces, flat + STEP * side)[0] - points) / STEP for side in sides)
+    areas = 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
+    return Samples(points, normals, shares * areas, cells.spacing[own])

@@ -1,0 +1,162 @@
+"""Points spread over a surface, densely where light changes within little space: where charges and equations go.
+
+The surface is cut into cells about as large as the wanted spacing. Candidates are drawn from these cells in their
+order, each cell as often as its area asks for, and then thinned: a candidate stays unless one of higher priority that
+stays is too near (Poisson-disc sampling by dart throwing; with a radius that varies, Mitchell et al. 2012). Points that
+face away from each other, on the two sides of a plate, do not thin each other.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
+from tetlux.meshing.subdivide import quartered
+from tetlux.meshing.surface import Surface, longest_sides
+
+# Candidates to each square of the spacing.
+CANDIDATES = 4.0
+# Points that stay are farther apart than this times the spacing.
+APART = 0.8
+# Neighbours looked at when thinning; within that radius there are 8 candidates in the mean.
+NEIGHBOURS = 20
+# Cells are no longer than this times the spacing, unless they are whole triangles.
+COARSEST = 1.5
+_CUTS = 40
+
+# The wanted distance between points (n, 3) of the surface, (n,), unit.
+Spacing = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Points of the smooth surface.
+
+    Attributes
+    ----------
+    points, normals : (n, 3) ndarray
+        Outward unit normals.
+    areas : (n,) ndarray
+        What each stands for, unit².
+    spacing : (n,) ndarray
+        Wanted distance to the next one, unit.
+    """
+
+    points: FloatArray
+    normals: FloatArray
+    areas: FloatArray
+    spacing: FloatArray
+
+    def __getitem__(self, some: BoolArray | IntArray) -> "Samples":
+        return Samples(self.points[some], self.normals[some], self.areas[some], self.spacing[some])
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Parts of a surface's triangles.
+
+    Attributes
+    ----------
+    faces : (m,) ndarray
+        The triangle of each.
+    corners : (m, 3, 3) ndarray
+    spacing : (m,) ndarray
+        Wanted distance between points there, unit.
+    """
+
+    faces: IntArray
+    corners: FloatArray
+    spacing: FloatArray
+
+    @property
+    def areas(self) -> FloatArray:
+        """Their areas (m,), unit²."""
+        first, second = (self.corners[:, i] - self.corners[:, 0] for i in (1, 2))
+        return np.asarray(0.5 * np.linalg.norm(np.cross(first, second), axis=1))
+
+    @property
+    def load(self) -> float:
+        """How many squares of the spacing there are."""
+        return float((self.areas / self.spacing**2).sum())
+
+    def scaled(self, scale: float) -> "Cells":
+        """The same for a spacing so many times as large."""
+        return replace(self, spacing=scale * self.spacing)
+
+    def cut(self, spacing: Spacing, size: float = COARSEST) -> "Cells":
+        """Cut them until none is longer than `size` times the spacing in its middle."""
+        faces, corners, wanted = self.faces, self.corners, self.spacing
+        done: list[tuple[IntArray, FloatArray, FloatArray]] = []
+        for cut in range(_CUTS + 1):
+            small = (longest_sides(corners) <= size * wanted) | (cut == _CUTS)
+            done.append((faces[small], corners[small], wanted[small]))
+            if small.all():
+                break
+            faces, corners = np.repeat(faces[~small], 4), quartered(corners[~small])
+            wanted = spacing(corners.mean(axis=1))
+        faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
+        # Parts of one triangle side by side, so that drawing in order spreads points evenly.
+        order = np.argsort(faces, kind="stable")
+        return Cells(faces[order], corners[order], wanted[order])
+
+
+def cells_of(surface: Surface, spacing: Spacing) -> Cells:
+    """The triangles of a surface."""
+    corners = surface.points[surface.faces]
+    return Cells(np.arange(len(corners)), corners, spacing(corners.mean(axis=1)))
+
+
+def draw(surface: Surface, cells: Cells, rng: np.random.Generator, density: float = CANDIDATES) -> Samples:
+    """Draw points from cells, so many to each square of the spacing."""
+    load = cells.areas / cells.spacing**2
+    drawn = np.diff(np.floor(np.cumsum(load) * density + rng.random()), prepend=0.0)
+    own = np.repeat(np.arange(len(load)), drawn.astype(np.int64))
+    first, second = rng.random((2, len(own)))
+    root = np.sqrt(first)
+    weights = np.column_stack([1.0 - root, root * (1.0 - second), root * second])
+    flat = np.einsum("qi,qij->qj", weights, cells.corners[own])
+    points, normals = surface.on_curve(cells.faces[own], flat)
+    wanted = cells.spacing[own]
+    return Samples(points, normals, wanted**2 / density, wanted)
+
+
+def thin(samples: Samples, radii: FloatArray) -> BoolArray:
+    """Which of some samples in random order stay, so that none is within the radius (n,) of an earlier one."""
+    count = len(samples)
+    if count < 2:
+        return np.ones(count, dtype=bool)
+    tree = cKDTree(samples.points)
+    found = tree.query(samples.points, k=min(NEIGHBOURS, count))
+    distance, near = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
+    close = distance < np.minimum(radii[:, None], radii[near])
+    close &= np.einsum("ij,ikj->ik", samples.normals, samples.normals[near]) > 0.0
+    first, place = np.nonzero(close)
+    second = near[first, place]
+    earlier = second < first
+    late, early = first[earlier], second[earlier]
+    kept, open_ = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    while open_.any():
+        # One stays once all earlier ones near it have gone.
+        waiting = np.zeros(count, dtype=bool)
+        waiting[late[open_[early]]] = True
+        stays = open_ & ~waiting
+        kept |= stays
+        open_ &= ~stays
+        gone = late[stays[early]]
+        open_[gone] = False
+    return kept
+
+
+def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
+    """Points about a spacing apart, in random order, and the candidates that were not taken."""
+    drawn = draw(surface, cells, rng)
+    drawn = drawn[rng.permutation(len(drawn))]
+    kept = thin(drawn, APART * drawn.spacing)
+    chosen = drawn[kept]
+    nearest = np.asarray(cKDTree(chosen.points).query(drawn.points)[1])
+    return replace(chosen, areas=summed(nearest, drawn.areas, len(chosen))), drawn[~kept]

@@ -1,0 +1,140 @@
+"""Lights in a body of even regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tetlux.fem.body import Body
+from tetlux.fem.charges.adapt import MOST
+from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
+from tetlux.fem.coefficients import AnyMedium
+from tetlux.fem.lights.deposit import Deposit, Light
+from tetlux.fem.medium import Medium
+from tetlux.fem.partition import SurfacePartition
+from tetlux.fem.region import Region, only_medium
+from tetlux.fem.solution import Power
+from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.validity import check_media
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.regions import check_regions
+from tetlux.meshing.surface import Surface
+
+# Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
+NEAREST = 1e-3
+_INSTEAD = 'solve it with model "full".'
+
+
+def solve_with_charges(
+    surface: Surface,
+    medium: AnyMedium,
+    lights: Sequence[Light],
+    *,
+    regions: Sequence[Region] = (),
+    tolerance: float = 0.02,
+    most: int = MOST,
+) -> ChargeSolution:
+    """Solve for lights in a body of even regions, without a mesh.
+
+    Parameters
+    ----------
+    surface : Surface
+    medium : Medium
+    lights : sequence of Light
+        Points, beams that are points, and diffuse light; they add up.
+    regions : sequence of Region
+        Parts of the body with media of their own; with these there is no diffuse light.
+    tolerance : float
+        Wanted relative L2 error of the exitance.
+    most : int
+        Charges at which fitting ends even if the tolerance is not met; the solution then carries a warning.
+
+    Returns
+    -------
+    ChargeSolution
+
+    Raises
+    ------
+    InputError
+        If a light or a region does not go with the body, or is none of those.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PencilBeam
+    >>> from tetlux.meshing import sphere
+    >>> tissue = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> solution = solve_with_charges(sphere(10.0), tissue, [PencilBeam((0, 0, 20), (0, 0, -1))])
+    >>> solution.error_estimate < 0.02
+    True
+    """
+    watch = Stopwatch()
+    with watch.stage("surface"):
+        inner = [(region.surface, _even(only_medium(region))) for region in regions]
+        body = _even(medium)
+        for each in (surface, *(own for own, _ in inner)):
+            _check_simple(each)
+        check_regions(surface, [each for each, _ in inner])
+        whole = Body(surface, (body, *(each for _, each in inner)), SurfacePartition([each for each, _ in inner]))
+        check_media(whole)
+        deposits = [_deposit(light, whole) for light in lights]
+    with watch.stage("solve"):
+        owners = np.repeat(np.arange(len(deposits)), [len(deposit.points) for deposit in deposits])
+        powers = np.zeros((len(owners), len(deposits)))
+        powers[np.arange(len(owners)), owners] = np.concatenate([deposit.powers for deposit in deposits])
+        points = np.vstack([deposit.points for deposit in deposits])
+        _check_apart(points, body, [each for each, _ in inner])
+        entries = [_entry(deposit) for deposit in deposits]
+        solution = charge_solution(surface, body, points, powers, entries, inner=inner, tolerance=tolerance, most=most)
+    warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
+    if not solution.error_estimate <= tolerance:
+        warnings.append(
+            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
+            f"{solution.charges} charges; {_INSTEAD}"
+        )
+    return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
+
+
+def _entry(deposit: Deposit) -> Entry:
+    known = Power(deposit.incident, deposit.specular, deposit.absorbed, 0.0, deposit.ballistic)
+    return Entry(known, float(deposit.irradiance), float(deposit.transmitted_irradiance))
+
+
+def _check_simple(surface: Surface) -> None:
+    if surface.overlaps:
+        raise InputError(
+            f'{surface.name} crosses itself or holds a body within, and model "charges" needs a surface all of which '
+            f"bounds the body; {_INSTEAD}"
+        )
+
+
+def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -> None:
+    """Refuse sources on the surfaces of regions, where fluence has a pole on both sides."""
+    for number, surface in enumerate(inner, 1):
+        away = np.linalg.norm(surface.project(points)[0] - points, axis=1)
+        if (away < NEAREST * medium.mean_free_path).any():
+            place = ", ".join(f"{x:.4g}" for x in points[away.argmin()])
+            raise InputError(
+                f'a source at ({place}) lies on the surface of region {number}, where model "charges" has none; '
+                f"move it by {NEAREST:g} of a mean free path, or {_INSTEAD}"
+            )
+
+
+def _even(medium: AnyMedium) -> Medium:
+    if isinstance(medium, Medium):
+        return medium
+    raise InputError(f'the medium varies within the body, and model "charges" has even ones; {_INSTEAD}')
+
+
+def _deposit(light: Light, body: Body) -> Deposit:
+    """What a light leaves, if that is points and even diffuse light."""
+    deposit, name = light.deposit_in(body), type(light).__name__
+    if len(deposit.starts) or deposit.on_mesh is not None:
+        raise InputError(f'{name} leaves light along lines or by facets, and model "charges" has points; {_INSTEAD}')
+    if np.any(deposit.emission):
+        raise InputError(f'{name} emits light throughout, and model "charges" has points; {_INSTEAD}')
+    if np.ndim(deposit.irradiance) or np.ndim(deposit.transmitted_irradiance):
+        raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
+    if deposit.irradiance and body.only_medium is None:
+        raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
+    return deposit

@@ -1,0 +1,298 @@
+"""Charges fitted to the boundary: how good, how fast, and are they honest? ``python -m tests.benchmarks.charges``.
+
+Without arguments: a pencil beam as a point on each body, with 100, 300 and 800 charges. `--scenes N` draws N scenes,
+300 charges each: a body, a source .3 to 10 mean free paths below a random point of it, albedo .8 to .9999, index 1 to
+1.5, the body 10 to 80 mean free paths across. Further arguments are files of surfaces, which join the bodies.
+
+`--remainder` adds finite elements for what charges leave, on the mesher's own mesh, and `solve` at .02 and .005 beside
+them. `--head` is a head of four layers against its series.
+
+Seconds are of the processor, of all threads, the least of three runs, from a surface whose trees are built. The truth
+is the series for balls, and elsewhere the same method with as many charges as `--truth` says, whose own bound is
+printed: the error is known to a share of that, about as much as the estimate is smaller than the bound.
+"""
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.fem import Medium, PencilBeam, PointSource, Power, solve
+from tetlux.fem.body import Body
+from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_charges
+from tetlux.fem.charges.check import norm
+from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.charges.places import distance_from
+from tetlux.fem.charges.places import scaled as scaled_spacing
+from tetlux.fem.charges.remainder import solve_remainder
+from tetlux.fem.charges.samples import cells_of, draw
+from tetlux.fem.charges.solution import Entry, charge_solution
+from tetlux.fem.exact import layered_ball
+from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, tetrahedralize, torus
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.surface import triangle_areas
+
+TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+DARKER = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
+HARE = Path(__file__).parents[2] / "cases" / "library" / "hare.stl"
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A body, a medium and a point source; the radius of a ball, whose source lies on the z axis."""
+
+    name: str
+    surface: Surface
+    medium: Medium
+    source: FloatArray
+    radius: float | None = None
+
+    def fit(self, charges: int) -> FittedCharges:
+        """About so many charges."""
+        drive = Drive(self.source, np.ones((1, 1)), np.zeros(1))
+        return fit_charges(self.surface, equation_of(self.medium), drive, tolerance=0.0, most=charges)
+
+    def truth_at(self, points: FloatArray, charges: int) -> tuple[FloatArray, float]:
+        """The exitance at points (n, 3), and the bound of its error."""
+        if self.radius is None:
+            best = self.fit(charges)
+            return best.field.exitance(points)[:, 0], best.quality.bound
+        gamma = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
+        depth = float(self.source[0, 2])
+        return exact_sphere.point_exitance(self.medium, radius=self.radius, source_radius=depth, gamma=gamma), 0.0
+
+
+def lit(name: str, surface: Surface, medium: Medium, beam: PencilBeam, radius: float | None = None) -> Scene:
+    """A pencil beam as a point."""
+    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).points, radius)
+
+
+def named(files: list[str]) -> list[Scene]:
+    """The bodies of the table."""
+    down = PencilBeam((0, 0, 100), (0, 0, -1))
+    hare = read_surface(HARE)
+    scenes = [
+        lit("ball 10", sphere(10.0), TISSUE, down, 10.0),
+        lit("ball 30", sphere(30.0), TISSUE, down, 30.0),
+        lit("torus", torus(10.0, 4.0), TISSUE, PencilBeam((25, 0, 15), (-1, 0, -1))),
+        lit("box", box((20.0, 20.0, 20.0)), TISSUE, PencilBeam((3, 2, 20), (0, 0, -1))),
+        lit("cylinder", cylinder(5.0, 20.0), DARKER, PencilBeam((20, 0, 1), (-1, 0, 0))),
+        lit("hare, ear", hare, TISSUE, PencilBeam((2, -30, 30), (0.08, 1, -0.1))),
+        lit("hare, back", hare, TISSUE, PencilBeam((-40, 0, 12), (1, 0, 0))),
+        lit("hare, side", hare, TISSUE, PencilBeam((0, -30, 10), (0, 1, 0))),
+    ]
+    for file in files:
+        surface = scaled(read_surface(file))
+        middles = surface.points[surface.faces].mean(axis=1)
+        for axis in range(3):
+            direction = -np.eye(3)[axis]
+            # Aimed at the triangle nearest to the middle.
+            away = np.linalg.norm(np.delete(middles - middles.mean(axis=0), axis, axis=1), axis=1)
+            start = middles[away.argmin()] - 30.0 * direction
+            beam = PencilBeam(tuple(start.tolist()), tuple(direction.tolist()))
+            scenes.append(lit(f"{Path(file).stem} from {'xyz'[axis]}", surface, TISSUE, beam))
+    return scenes
+
+
+def scaled(surface: Surface) -> Surface:
+    """The same, 26 mm from corner to corner."""
+    return surface_from_arrays(surface.points * (26.0 / surface.diagonal), surface.faces, name=surface.name)
+
+
+def ellipsoid(axes: FloatArray) -> Surface:
+    """A sphere stretched along its axes."""
+    ball = sphere(1.0)
+    return surface_from_arrays(ball.points * axes, ball.faces, name="ellipsoid")
+
+
+def random_scenes(count: int, files: list[str], first: int) -> Iterator[Scene]:
+    """Scenes drawn from their numbers, so that one of them can be looked at again."""
+    hare, others = read_surface(HARE), [read_surface(file) for file in files]
+    bodies: list[Callable[[np.random.Generator], Surface]] = [
+        lambda _: sphere(1.0),
+        lambda rng: ellipsoid(rng.uniform(0.4, 1.0, 3)),
+        lambda rng: torus(1.0, rng.uniform(0.2, 0.7)),
+        lambda rng: box(tuple(rng.uniform(0.3, 1.0, 3))),
+        lambda rng: cylinder(1.0, rng.uniform(0.5, 5.0)),
+        lambda rng: slab(1.0, rng.uniform(0.1, 0.3)),
+        lambda _: hare,
+        *(lambda _, surface=surface: surface for surface in others),
+    ]
+    for number in range(first, first + count):
+        rng = np.random.default_rng(number)
+        surface = bodies[number % len(bodies)](rng)
+        albedo, eta = 1.0 - 10.0 ** rng.uniform(-4.0, np.log10(0.2)), rng.uniform(1.0, 1.5)
+        free_path = surface.diagonal / 10.0 ** rng.uniform(1.0, np.log10(80.0))
+        medium = Medium(sigma_a=(1.0 - albedo) / free_path, sigma_s_prime=albedo / free_path, eta=eta)
+        ball = number % len(bodies) == 0
+        depth, source = 0.0, np.zeros((1, 3))
+        while not depth:
+            depth = free_path * 10.0 ** rng.uniform(np.log10(0.3), 1.0)
+            source = np.array([[0.0, 0.0, 1.0 - depth]]) if ball else below(surface, depth, rng)
+            away = float(np.linalg.norm(surface.closest(source)[0] - source))
+            # Not through the other side, nor much nearer to it.
+            if not surface.contains(source)[0] or away < 0.7 * depth or (ball and depth > 1.0):
+                depth = 0.0
+        name = f"{number} {surface.name}, albedo {albedo:.4f}, n {eta:.2f}, "
+        name += f"{surface.diagonal / free_path:.0f} mfp across, source {depth / free_path:.2g} deep"
+        yield Scene(name, surface, medium, source, 1.0 if ball else None)
+
+
+def below(surface: Surface, depth: float, rng: np.random.Generator) -> FloatArray:
+    """A point so deep below a random one of the surface, (1, 3)."""
+    areas = triangle_areas(surface.points, surface.faces)[1]
+    face = np.array([rng.choice(len(areas), p=areas / areas.sum())])
+    flat = np.einsum("i,ij->j", rng.dirichlet([1.0, 1.0, 1.0]), surface.points[surface.faces[face[0]]])
+    point, normal = surface.on_curve(face, flat[None])
+    return np.asarray(point - depth * normal)
+
+
+def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, float, float]:
+    """A line of the table; estimate and bound as multiples of the error."""
+    scene.surface.rays.first(scene.source, np.array([[0.0, 0.0, 1.0]]))
+    scene.surface.project(scene.source)
+    seconds = []
+    for _ in range(repeats):
+        started = time.process_time()
+        fitted = scene.fit(charges)
+        seconds.append(time.process_time() - started)
+    samples, quality = fitted.places.checked, fitted.quality
+    exitance = fitted.field.exitance(samples.points)[:, 0]
+    right, bound = scene.truth_at(samples.points, truth)
+    size = norm(samples.areas, right)
+    error = norm(samples.areas, exitance - right) / size
+    bright = right > 1e-6 * right.max()
+    faint = bright & (right < 0.01 * right.max())
+    off = np.abs(exitance - right)
+    median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
+    columns = [
+        scene.name,
+        str(len(fitted.places.charges)),
+        f"{min(seconds):.2f}",
+        f"{error:.4%}",
+        f"{quality.estimate:.4%}",
+        f"{quality.estimate / error:.2f}",
+        f"{quality.bound:.3%}",
+        f"{quality.bound / error:.1f}",
+        f"{bound:.3%}",
+        f"{median:.2%}",
+        f"{(off[bright] / right[bright]).max():.1%}",
+    ]
+    text = "| " + " | ".join(columns) + " |"
+    return text, quality.estimate / error, quality.bound / error
+
+
+def remainder_rows(scene: Scene, truth: int) -> Iterator[str]:
+    """Lines of the table of what finite elements add."""
+    mesh = tetrahedralize(scene.surface)
+    distance = distance_from(scene.surface, scene.source)
+    spacing = scaled_spacing(distance, 0.2)
+    samples = draw(scene.surface, cells_of(scene.surface, spacing).cut(spacing), np.random.default_rng(3))
+    right, bound = scene.truth_at(samples.points, truth)
+    faint = (right < 0.01 * right.max()) & (right > 1e-6 * right.max())
+
+    def line(name: str, nodes: int, started: float, exitance: FloatArray) -> str:
+        off = np.abs(exitance - right)
+        error = norm(samples.areas, off) / norm(samples.areas, right)
+        return (
+            f"| {scene.name} | {name} | {nodes} | {time.process_time() - started:.2f} | {error:.4%} | "
+            f"{np.median(off[faint] / right[faint]):.2%} | {bound:.3%} |"
+        )
+
+    for charges in (100, 300):
+        started = time.process_time()
+        fitted = scene.fit(charges)
+        yield line(f"{charges} charges", 0, started, fitted.field.exitance(samples.points)[:, 0])
+        started = time.process_time()
+        both = solve_remainder(mesh, scene.surface, scene.medium, fitted)
+        yield line(f"{charges} charges, with u", len(mesh.points), started, both.exitance_on(samples.points))
+    light = PointSource(tuple(scene.source[0].tolist()))
+    for tolerance in (0.02, 0.005):
+        started = time.process_time()
+        solution = solve(scene.surface, scene.medium, [light], tolerance=tolerance)
+        yield line(f"solve at {tolerance}", len(solution.mesh.points), started, solution.exitance_on(samples.points))
+
+
+def head_rows() -> Iterator[str]:
+    """Lines of the table of a head of four layers, for more and more charges."""
+    radii = (36.8, 34.8, 32.0, 31.2)
+    media = [
+        Medium(sigma_a=a, sigma_s_prime=s, eta=1.4) for a, s in ((0.018, 1.9), (0.016, 1.6), (0.004, 0.3), (0.036, 2.2))
+    ]
+    outer, *inner = (sphere(radius) for radius in radii)
+    depth = radii[0] - media[0].mean_free_path
+    gamma = np.radians([0.0, 10.0, 20.0, 30.0, 45.0])
+    points = radii[0] * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
+    right = layered_ball.point_exitance(media[::-1], radii[::-1], source_radius=depth, gamma=gamma)
+    entry = Entry(Power(1.0, 0.0, 0.0, 0.0, 0.0))
+    for most in (700, 1050):
+        started = time.process_time()
+        solution = charge_solution(
+            outer,
+            media[0],
+            np.array([[0.0, 0.0, depth]]),
+            np.ones((1, 1)),
+            [entry],
+            inner=list(zip(inner, media[1:], strict=True)),
+            tolerance=0.0,
+            most=most,
+        )
+        seconds = time.process_time() - started
+        off = " | ".join(f"{each:.3%}" for each in solution.exitance_on(points) / right - 1.0)
+        yield f"| {solution.charges} | {seconds:.1f} | {solution.error_estimate:.4%} | {off} |"
+
+
+HEAD = """| body | charges | seconds | error | estimate | over error | bound | over error | bound of truth | \
+median error below 1 % of the brightest | worst within six decades |
+|---|---|---|---|---|---|---|---|---|---|---|"""
+
+
+def main() -> None:
+    """Print the table asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=0)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--truth", type=int, default=1600)
+    parser.add_argument("--charges", type=int, nargs="+", default=[100, 300, 800])
+    parser.add_argument("files", nargs="*")
+    parser.add_argument("--remainder", action="store_true")
+    parser.add_argument("--head", action="store_true")
+    given = parser.parse_args()
+    if given.head:
+        print(
+            "| charges | seconds | estimate | error at 0° | 10° | 20° | 30° | 45° |\n|---|---|---|---|---|---|---|---|"
+        )
+        for text in head_rows():
+            print(text, flush=True)
+        return
+    if given.remainder:
+        print("| body | by | nodes | seconds | error | median error where faint | bound of truth |")
+        print("|---|---|---|---|---|---|---|")
+        for scene in named(given.files):
+            for text in remainder_rows(scene, given.truth):
+                print(text, flush=True)
+        return
+    print(HEAD)
+    if not given.scenes:
+        for scene in named(given.files):
+            for charges in given.charges:
+                print(row(scene, charges, given.truth, 3)[0], flush=True)
+        return
+    ratios = []
+    for scene in random_scenes(given.scenes, given.files, given.first):
+        text, estimate, bound = row(scene, 300, given.truth, 1)
+        ratios.append((estimate, bound))
+        print(text, flush=True)
+    estimates, bounds = np.array(ratios).T
+    print(f"estimate over error: {np.quantile(estimates, [0.0, 0.05, 0.5, 0.95, 1.0]).round(2)}")
+    print(f"not within .5 to 4: {int(((estimates < 0.5) | (estimates > 4.0)).sum())} of {len(estimates)}")
+    print(f"bound over error: least {bounds.min():.2f}, median {np.median(bounds):.1f}")
+
+
+if __name__ == "__main__":
+    main()
