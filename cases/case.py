@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.cases.channels import ALL, channel_names, check_different
-from tetlux.cases.compare import Comparison, comparison_for
+from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.document import Document, Key, read_document
 from tetlux.cases.lighting import BODY, keys_of, light_names, light_of
 from tetlux.cases.media import media_of

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tetlux.cases.case import Case
-from tetlux.cases.compare import as_json, compare
-from tetlux.cases.compare_picture import draw_comparison
+from tetlux.cases.compare.comparison import as_json, compare
+from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.picture import Scene, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply

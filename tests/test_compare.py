@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from tetlux.cases.case import Case, load_cases
-from tetlux.cases.compare import compare, source_model
+from tetlux.cases.compare.comparison import compare, source_model
 from tetlux.cases.run import run_case
 from tetlux.fem import Medium, Solution, solve
 from tetlux.meshing import InputError, RunError

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tetlux.cases.compare import FLOOR, MEANINGS, Compared
+from tetlux.cases.compare.comparison import FLOOR, MEANINGS, Compared
 
 COLORS = {"robin": "#d1495b", "series": "#d1495b", "images": "#2e86ab", "dipole": "#3a7d44"}
 DOTS = "#30343f"

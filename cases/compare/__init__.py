@@ -1,0 +1,1 @@
+"""A run held against closed forms: what `compare:` in a case file asks for."""
