@@ -114,7 +114,7 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart import DEFAULT_CASES, chart  # noqa: PLC0415
+    from tetlux.cases.chart.command import DEFAULT_CASES, chart  # noqa: PLC0415
 
     return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
 

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 
-from tetlux.cases.chart_picture import INK
+from tetlux.cases.chart.picture import INK
 from tetlux.cases.stress_panels import Axis, Panel, Value
 from tetlux.cases.stress_rules import broken, is_warned, violations
 from tetlux.cases.stress_runs import Run

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.cases.chart_measure import surface_samples
-from tetlux.cases.chart_scene import Samples, on_true_sphere
+from tetlux.cases.chart.benchmark import Samples, on_true_sphere
+from tetlux.cases.chart.measure import surface_samples
 from tetlux.cases.stress_meshes import ball_of_layers, spoiled
 from tetlux.cases.stress_shapes import SHAPES
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region

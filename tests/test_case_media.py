@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.conftest import block
 from tetlux.cases.case import Case, load_cases
-from tetlux.cases.chart_scene import scene_of
+from tetlux.cases.chart.benchmark import scene_of
 from tetlux.cases.cli import main
 from tetlux.fem import Medium, PencilBeam, PointSource
 from tetlux.fem.materials import material

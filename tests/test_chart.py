@@ -16,16 +16,16 @@ from PIL import Image
 
 from tests.conftest import TISSUE
 from tetlux import cases, fem, meshing
-from tetlux.cases import chart as chart_module
-from tetlux.cases import chart_methods, chart_peers, chart_runs, chart_scene
 from tetlux.cases.case import find_case_file, load_cases
-from tetlux.cases.chart_measure import fitted_exponent, pareto_front, relative_error, surface_samples
-from tetlux.cases.chart_methods import FINITE_ELEMENTS, OURS, Method, Outcome
-from tetlux.cases.chart_models import MODELS, MONTE_CARLO
-from tetlux.cases.chart_peers import PEERS, Peer, answer
-from tetlux.cases.chart_picture import LOOKS
-from tetlux.cases.chart_runs import Run, exponents, runs_on
-from tetlux.cases.chart_scene import Reference, Samples, Scene, scene_of
+from tetlux.cases.chart import benchmark, methods, peers
+from tetlux.cases.chart import command as chart_module
+from tetlux.cases.chart.benchmark import Reference, Samples, Scene, scene_of
+from tetlux.cases.chart.measure import fitted_exponent, pareto_front, relative_error, surface_samples
+from tetlux.cases.chart.methods import FINITE_ELEMENTS, OURS, Method, Outcome
+from tetlux.cases.chart.models import MODELS, MONTE_CARLO
+from tetlux.cases.chart.peers import PEERS, Peer, answer
+from tetlux.cases.chart.picture import LOOKS
+from tetlux.cases.chart.runs import LONGEST_RUN, Run, exponents, runs_on
 from tetlux.cases.cli import main
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere
@@ -136,7 +136,7 @@ def test_the_slab_is_measured_on_both_faces() -> None:
 
 
 def test_without_a_closed_form_the_reference_is_a_finer_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chart_scene, "QUICK_TOLERANCES", (0.1,))
+    monkeypatch.setattr(benchmark, "QUICK_TOLERANCES", (0.1,))
     (tmp_path / "block.yaml").write_text(
         "surface: {box: {size: [10, 10, 10]}}\n"
         "medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}\n"
@@ -203,7 +203,7 @@ def fake(name: str, seconds: list[float], off: list[float], *, comparable: bool 
 
 def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_scene: Scene) -> None:
     methods = [
-        fake("slow", [1.0, 1.1 * chart_runs.LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
+        fake("slow", [1.0, 1.1 * LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
         fake("broken", [1.0, 2.0, 3.0], [0.4, math.nan, 0.2]),
         fake("other model", [1e-3], [0.01], comparable=False),
     ]
@@ -382,7 +382,7 @@ def test_a_case_that_fails_does_not_take_the_others_with_it(
     def failing(*_: object) -> Reference:
         raise RunError("the mesher failed.")
 
-    monkeypatch.setattr(chart_scene, "_finer_run", failing)
+    monkeypatch.setattr(benchmark, "_finer_run", failing)
     assert main(["chart", "torus", "sphere", "--out", str(tmp_path)]) == 1
     assert {row["case"] for row in table(tmp_path)} == {"sphere"}
     assert capsys.readouterr().err == "tetlux: torus failed: the mesher failed.\n"
@@ -434,9 +434,9 @@ def test_nothing_is_remembered_from_run_to_run(ball_scene: Scene, monkeypatch: p
         seen.append((set(vars(surface)), cache))
         raise RunError("seen")
 
-    monkeypatch.setattr(chart_methods, "tetrahedralize", stopped)
-    monkeypatch.setattr(chart_methods, "solve", stopped)
-    monkeypatch.setattr(chart_peers, "tetrahedralize", stopped)
+    monkeypatch.setattr(methods, "tetrahedralize", stopped)
+    monkeypatch.setattr(methods, "solve", stopped)
+    monkeypatch.setattr(peers, "tetrahedralize", stopped)
     redbird = next(m for peer in PEERS for m in peer.methods if m.name == "redbirdpy P1")
     assert ball_scene.case.surface.diagonal > 0
     for name in ("P1, uniform", "P1, adaptive", "free-space subtracted, adaptive", OURS):

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tetlux.cases.chart_methods import Method, Outcome, quickest
-from tetlux.cases.chart_scene import Scene
+from tetlux.cases.chart.methods import Method, Outcome, quickest
+from tetlux.cases.chart.benchmark import Scene
 from tetlux.fem.exact import dipole, half_space, monte_carlo
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.chart_methods import MOST_TETRAHEDRA, REPEAT_SECONDS, Method, Outcome
-from tetlux.cases.chart_scene import Scene
+from tetlux.cases.chart.methods import MOST_TETRAHEDRA, REPEAT_SECONDS, Method, Outcome
+from tetlux.cases.chart.benchmark import Scene
 from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Power, Solution
 from tetlux.meshing.errors import RunError

@@ -4,10 +4,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from tetlux.cases.chart_measure import fitted_exponent, pareto_front
-from tetlux.cases.chart_methods import Method
-from tetlux.cases.chart_models import MONTE_CARLO
-from tetlux.cases.chart_scene import Scene
+from tetlux.cases.chart.measure import fitted_exponent, pareto_front
+from tetlux.cases.chart.methods import Method
+from tetlux.cases.chart.models import MONTE_CARLO
+from tetlux.cases.chart.benchmark import Scene
 from tetlux.meshing.errors import TetluxError
 
 # After a run that took longer than this, seconds, nothing finer of its method is run.

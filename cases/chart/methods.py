@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.cases.chart_scene import COARSER, Scene
+from tetlux.cases.chart.benchmark import COARSER, Scene
 from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve

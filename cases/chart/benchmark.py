@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tetlux.cases.case import Case
-from tetlux.cases.chart_measure import relative_error, surface_samples
+from tetlux.cases.chart.measure import relative_error, surface_samples
 from tetlux.cases.compare.comparison import are_points, comparison_for
 from tetlux.cases.document import read_document
 from tetlux.cases.schema import CaseSpec, SurfaceSpec

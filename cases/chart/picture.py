@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from tetlux.cases.chart_methods import OURS
-from tetlux.cases.chart_models import MONTE_CARLO
-from tetlux.cases.chart_runs import Charted, Run, exponents
+from tetlux.cases.chart.methods import OURS
+from tetlux.cases.chart.models import MONTE_CARLO
+from tetlux.cases.chart.runs import Charted, Run, exponents
 
 INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
 # Inches: the picture's width, a row's height and what of it is above and below the panels, and where these begin and

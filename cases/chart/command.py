@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from tetlux.cases.batch import load_all
-from tetlux.cases.chart_methods import FINITE_ELEMENTS, Method
-from tetlux.cases.chart_models import MODELS, MONTE_CARLO, monte_carlo_installed
-from tetlux.cases.chart_peers import PEERS
-from tetlux.cases.chart_picture import draw_chart
-from tetlux.cases.chart_runs import Charted, Run, exponents, runs_on
-from tetlux.cases.chart_scene import scene_of, spec_of
+from tetlux.cases.chart.methods import FINITE_ELEMENTS, Method
+from tetlux.cases.chart.models import MODELS, MONTE_CARLO, monte_carlo_installed
+from tetlux.cases.chart.peers import PEERS
+from tetlux.cases.chart.picture import draw_chart
+from tetlux.cases.chart.runs import Charted, Run, exponents, runs_on
+from tetlux.cases.chart.benchmark import scene_of, spec_of
 from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
 from tetlux.cases.summary import LIBRARIES
 from tetlux.fem import Medium, PointSource, solve
