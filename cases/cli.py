@@ -120,7 +120,7 @@ def _chart(options: argparse.Namespace) -> int:
 
 
 def _stress(options: argparse.Namespace) -> int:
-    from tetlux.cases.stress import stress  # noqa: PLC0415
+    from tetlux.cases.stress.command import stress  # noqa: PLC0415
 
     return stress(options.out, quick=options.quick)
 

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import stress as stress_module
-from tetlux.cases import stress_scenes as scenes
 from tetlux.cases.cli import main
-from tetlux.cases.stress import COLUMNS, FILES, stress
-from tetlux.cases.stress_measure import CONSISTENT, DEFAULT, NOTHING, PLAIN, Figures, Method, measured
-from tetlux.cases.stress_meshes import ball_of_layers, spoiled
-from tetlux.cases.stress_panels import PANELS, Axis, Panel, Value
-from tetlux.cases.stress_rules import broken, violations
-from tetlux.cases.stress_runs import Run
-from tetlux.cases.stress_words import in_words
+from tetlux.cases.stress import command as stress_module
+from tetlux.cases.stress import scenes
+from tetlux.cases.stress.command import COLUMNS, FILES, stress
+from tetlux.cases.stress.measure import CONSISTENT, DEFAULT, NOTHING, PLAIN, Figures, Method, measured
+from tetlux.cases.stress.meshes import ball_of_layers, spoiled
+from tetlux.cases.stress.panels import PANELS, Axis, Panel, Value
+from tetlux.cases.stress.report import in_words
+from tetlux.cases.stress.rules import broken, violations
+from tetlux.cases.stress.runs import Run
 from tetlux.fem import linear
 
 GOOD = Figures(

@@ -15,10 +15,10 @@ from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 
 from tetlux.cases.chart.picture import INK
-from tetlux.cases.stress_panels import Axis, Panel, Value
-from tetlux.cases.stress_rules import broken, is_warned, violations
-from tetlux.cases.stress_runs import Run
-from tetlux.cases.stress_scenes import TOLERANCE
+from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.rules import broken, is_warned, violations
+from tetlux.cases.stress.runs import Run
+from tetlux.cases.stress.scenes import TOLERANCE
 
 # Inches: the picture's width, a map, the gap between two, what is left and right of a panel's maps, above and below
 # them, more of it where an axis has words for values, and what the legend needs.

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
-from tetlux.cases.stress_panels import PANELS, Panel
-from tetlux.cases.stress_picture import draw_map
-from tetlux.cases.stress_rules import broken, violations
-from tetlux.cases.stress_runs import TIME_LIMIT, Run, runs_of
-from tetlux.cases.stress_scenes import TOLERANCE
-from tetlux.cases.stress_words import in_words
+from tetlux.cases.stress.panels import PANELS, Panel
+from tetlux.cases.stress.picture import draw_map
+from tetlux.cases.stress.report import in_words
+from tetlux.cases.stress.rules import broken, violations
+from tetlux.cases.stress.runs import TIME_LIMIT, Run, runs_of
+from tetlux.cases.stress.scenes import TOLERANCE
 
 # Runs between two lines that say how far it is.
 PROGRESS = 50

@@ -2,9 +2,9 @@
 
 import math
 
-from tetlux.cases.stress_measure import Figures
-from tetlux.cases.stress_runs import Run
-from tetlux.cases.stress_scenes import TOLERANCE
+from tetlux.cases.stress.measure import Figures
+from tetlux.cases.stress.runs import Run
+from tetlux.cases.stress.scenes import TOLERANCE
 
 # Of the largest fluence; of the incident power; of a linear system's load; of the bound; of the largest exitance.
 DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8

@@ -7,8 +7,8 @@ import numpy as np
 
 from tetlux.cases.chart.benchmark import Samples, on_true_sphere
 from tetlux.cases.chart.measure import surface_samples
-from tetlux.cases.stress_meshes import ball_of_layers, spoiled
-from tetlux.cases.stress_shapes import SHAPES
+from tetlux.cases.stress.meshes import ball_of_layers, spoiled
+from tetlux.cases.stress.shapes import SHAPES
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
 from tetlux.fem.exact import concentric, slab, sphere, sphere_light
 from tetlux.fem.grading import lit_points

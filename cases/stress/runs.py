@@ -10,8 +10,8 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from tetlux.cases.stress_measure import Figures, Method, measured
-from tetlux.cases.stress_panels import Panel, Value
+from tetlux.cases.stress.measure import Figures, Method, measured
+from tetlux.cases.stress.panels import Panel, Value
 from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import TetluxError
 

@@ -10,7 +10,7 @@ from unittest.mock import patch
 import numpy as np
 
 from tetlux.cases.chart.measure import relative_error
-from tetlux.cases.stress_scenes import TOLERANCE, Scene
+from tetlux.cases.stress.scenes import TOLERANCE, Scene
 from tetlux.fem import linear
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from tetlux.cases import stress_scenes as scenes
-from tetlux.cases.stress_measure import DEFAULT, FREE_SPACE, NOTHING, OF_SIGN, PLAIN, Method
-from tetlux.cases.stress_scenes import Scene
-from tetlux.cases.stress_shapes import SHAPES
+from tetlux.cases.stress import scenes
+from tetlux.cases.stress.measure import DEFAULT, FREE_SPACE, NOTHING, OF_SIGN, PLAIN, Method
+from tetlux.cases.stress.scenes import Scene
+from tetlux.cases.stress.shapes import SHAPES
 
 Value = float | str
 

@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
-from tetlux.cases.stress_measure import Figures
-from tetlux.cases.stress_panels import Axis, Panel, Value
-from tetlux.cases.stress_rules import broken, is_warned, violations
-from tetlux.cases.stress_runs import Run
+from tetlux.cases.stress.measure import Figures
+from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.rules import broken, is_warned, violations
+from tetlux.cases.stress.runs import Run
 
 HEADS = (
     "panel",
