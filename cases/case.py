@@ -24,6 +24,7 @@ from tetlux.fem.validity import check_media, check_size
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
+from tetlux.meshing.notes import Note, in_region
 from tetlux.meshing.paths import exists
 from tetlux.meshing.read import SUFFIXES
 from tetlux.meshing.regions import check_regions
@@ -73,7 +74,9 @@ class Case:
     reading_seconds : float
         Spent on reading and checking the surface.
     comparison : Comparison, optional
-        Closed forms to hold the run against.
+        Closed forms to compare the run with.
+    from_sweep : bool
+        Whether it is one of the runs of a sweep.
     """
 
     name: str
@@ -88,6 +91,7 @@ class Case:
     camera: Vector | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
+    from_sweep: bool = False
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -106,12 +110,15 @@ class Case:
 
     def named(self, warning: str) -> str:
         """A warning with the name of the region that it numbers."""
-        number, colon, rest = warning.partition(":")
+        if not isinstance(warning, Note) or warning.region is None:
+            return warning
         names = {f"region {i}": region.surface.name for i, region in enumerate(self.regions, 1)}
-        return f"{names.get(number, number)}{colon}{rest}"
+        return warning.in_region(names.get(warning.region, warning.region))
 
     def _of_surfaces(self, name: str) -> tuple[str, ...]:
-        inner = [f"{region.surface.name}: {note}" for region in self.regions for note in getattr(region.surface, name)]
+        inner = [
+            in_region(note, region.surface.name) for region in self.regions for note in getattr(region.surface, name)
+        ]
         return (*getattr(self.surface, name), *inner)
 
     @property
@@ -171,7 +178,8 @@ def load_cases(path: Path) -> list[Case]:
         name = one.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise single.error(("name",), "this makes no name of a folder, or too long a one; give a short name.")
-        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader))
+        case = _case(single, one, name if label is None else f"{name}/{label}", reader)
+        cases.append(replace(case, from_sweep=label is not None))
     return cases
 
 
@@ -195,7 +203,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case
         if spec.compare:
             if len(media) > 1 or regions or not isinstance(media[0], Medium):
                 raise InputError("closed forms are those of one channel and one even medium; leave compare out.")
-            comparison = comparison_for(spec.surface, media[0], deposits, spec.compare)
+            comparison = comparison_for(surface.shape, media[0], deposits, spec.compare)
     check_different(document, "detectors", [detector.name for detector in spec.detectors])
     sensors = []
     for i, detector in enumerate(spec.detectors):

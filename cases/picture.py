@@ -22,6 +22,7 @@ from tetlux.cases.picture_stage import (
     exitance_range,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.notes import Note
 from tetlux.meshing.scratch import run_child, scratch
 
 __all__ = ["Ray", "Scene", "draw"]
@@ -33,9 +34,10 @@ RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process
 # Seconds; 50,000 triangles take about two without a graphics card.
 TIME_LIMIT = 120.0
 # Measured on a bare Debian 12: either package alone is not enough.
-WITHOUT_PYVISTA = (
+WITHOUT_PYVISTA = Note(
+    "no-pyvista",
     "the picture was drawn without PyVista, which could not render on this machine; "
-    "on Debian, `apt-get install libgl1 libegl1` brings what it needs."
+    "on Debian, `apt-get install libgl1 libegl1` brings what it needs.",
 )
 
 
@@ -93,7 +95,7 @@ def draw(scene: Scene, path: Path) -> list[str]:
     colours = None if scene.colours is None else scene.colours[0] / 255.0
     stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights, colours)
     image = _drawn_with_pyvista(stage)
-    warnings = [] if image is not None else [WITHOUT_PYVISTA]
+    warnings: list[str] = [] if image is not None else [WITHOUT_PYVISTA]
     unfinished = path.with_name(path.name + ".part")
     try:
         frame(

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.lights.point import as_vector
 from tetlux.fem.radiance import collected_share
-from tetlux.fem.solution import Solution
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
@@ -124,7 +124,7 @@ class Reading:
     power: float | None = None
 
 
-def read(detector: Detector, solution: Solution) -> Reading:
+def read(detector: Detector, solution: ExitanceField) -> Reading:
     """Read a detector.
 
     A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
@@ -134,7 +134,7 @@ def read(detector: Detector, solution: Solution) -> Reading:
     Parameters
     ----------
     detector : PointDetector, DiscDetector or FibreDetector
-    solution : Solution
+    solution : Solution or another ExitanceField
 
     Returns
     -------
@@ -168,7 +168,9 @@ def read(detector: Detector, solution: Solution) -> Reading:
     return Reading(_vector(place), _vector(normal), exitance, area, share * exitance * area)
 
 
-def _on_surface(solution: Solution, name: str, given: Vector, reach: float, what: str) -> tuple[FloatArray, FloatArray]:
+def _on_surface(
+    solution: ExitanceField, name: str, given: Vector, reach: float, what: str
+) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
     wanted = as_vector(given, name)
     (place,), (normal,) = solution.surface.project(wanted[None])

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, csr_matrix
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS, at_once
 from tetlux.meshing.errors import RunError
+from tetlux.meshing.notes import Note
 
 # The iteration aims here; a true residual above the second is refused.
 AIM = 1e-11
@@ -41,10 +42,16 @@ class Product:
     Parameters
     ----------
     matrix : (n, n) csr_array
+
+    Attributes
+    ----------
+    iterations : int
+        Most that conjugate gradients with these products have taken; 0 if there were none.
     """
 
     def __init__(self, matrix: csr_array) -> None:
         self.matrix = matrix
+        self.iterations = 0
         threads = THREADS if matrix.nnz >= ENTRIES_FOR_THREADS else 1
         limits = np.searchsorted(matrix.indptr, np.linspace(0, matrix.nnz, threads + 1)[1:-1])
         cuts = [0, *limits.tolist(), matrix.shape[0]]
@@ -185,7 +192,8 @@ def conjugate_gradients(product: Product, precondition: Method, loads: FloatArra
     result, rest = np.zeros_like(loads), loads.copy()
     step = precondition(rest)
     size = _dots(rest, step)
-    for _ in range(ITERATIONS):
+    for number in range(ITERATIONS):
+        product.iterations = max(product.iterations, number + 1)
         image = product(step)
         length = _ratio(size, _dots(step, image))
         result += length * step
@@ -224,7 +232,9 @@ class Solver:
     Attributes
     ----------
     note : str
-        A sentence for the user where the first method was not enough; else nothing.
+        A `Note` for the user where the first method was not enough; else empty.
+    residual : float
+        Largest relative residual that a solution was returned with.
     """
 
     def __init__(self, matrix: csr_array, methods: Sequence[Callable[[Product], Method]]) -> None:
@@ -234,6 +244,12 @@ class Solver:
         self._ready = [methods[0](self._product)]
         self._row_sums = np.asarray(matrix.sum(axis=1))[:, None]
         self.note = ""
+        self.residual = 0.0
+
+    @property
+    def iterations(self) -> int:
+        """Most iterations that a solution took; 0 if all were direct."""
+        return self._product.iterations
 
     @property
     def cycle(self) -> Method | None:
@@ -284,9 +300,10 @@ class Solver:
             if residual <= AIM:
                 break
             if residual > REFUSED and number > 0:
-                self.note = (
+                self.note = Note(
+                    "solver-fallback",
                     f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
-                    "takes longer: coefficients are far apart, or tetrahedra flat."
+                    "takes longer: coefficients are far apart, or tetrahedra flat.",
                 )
             if number == len(self._ready):
                 self._ready.append(method(self._product))
@@ -308,6 +325,7 @@ class Solver:
                 f"the linear solver stopped at a relative residual of {residual:.1e}, above {REFUSED:.0e}; "
                 "the mesh is too badly shaped or the coefficients too far apart: try a finer or cleaner mesh."
             )
+        self.residual = max(self.residual, residual)
         return np.asarray(result * size)
 
 

@@ -75,6 +75,10 @@ class Solution:
         What each light adds, in their order, if there are several.
     validity : Validity, optional
         How far the diffusion approximation itself is to be trusted; of all lights together.
+    residual : float
+        Largest relative residual of the linear systems on this mesh, computed from their solutions.
+    iterations : int
+        Most iterations that one of them took; 0 if all were solved directly.
     """
 
     mesh: TetMesh
@@ -90,6 +94,8 @@ class Solution:
     moved: float = 0.0
     of_lights: "tuple[Solution, ...]" = ()
     validity: Validity | None = None
+    residual: float = np.nan
+    iterations: int = 0
 
     @cached_property
     def exitance(self) -> FloatArray:

@@ -133,8 +133,9 @@ class System:
         watch = Stopwatch()
         with watch.stage("surface"):
             sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
-        solution, *_ = self._solved(sources, watch, None)
-        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
+        solution, _, parts = self._solved(sources, watch, None)
+        warnings = [*solution.warnings, *sources.warnings]
+        return replace(self._with_residual(solution, parts), seconds=watch.read(), warnings=warnings)
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
@@ -156,7 +157,13 @@ class System:
             ]
         shares = np.sum([each.shares for each in estimates], axis=0)
         estimate = Estimate(shares, np.sum([each.power_shares for each in estimates], axis=0))
-        return Step(replace(solution, error_estimate=estimate.error), estimate, good)
+        return Step(replace(self._with_residual(solution, parts), error_estimate=estimate.error), estimate, good)
+
+    def _with_residual(self, solution: Solution, parts: "list[_Part]") -> Solution:
+        """A solution with what the linear solvers that it took report."""
+        solvers = {self.plain.solver, *(part.equations.solver for part in parts)}
+        residual, iterations = max(one.residual for one in solvers), max(one.iterations for one in solvers)
+        return replace(solution, residual=residual, iterations=iterations)
 
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None

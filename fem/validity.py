@@ -7,6 +7,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.fem.validity_tables import far_error
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface import Surface
 
 # Bodies of fewer or more mean free paths than these are a mistaken unit, not a scene.
@@ -79,12 +80,17 @@ def warnings_for(surface: Surface, validity: Validity) -> list[str]:
     as ``python -m tests.tables.diffusion_against_monte_carlo`` prints them; all others are those of
     `tetlux.fem.validity_tables`.
     """
-    medium, found = validity.medium, []
+    medium = validity.medium
+    found: list[str] = []
     if medium.albedo < LOW_ALBEDO:
         found.append(
-            f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for: expect "
-            "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at an "
-            "index of 1.4, and by more close to the light."
+            Note(
+                "low-albedo",
+                f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for: expect "
+                "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at "
+                "an index of 1.4, and by more close to the light.",
+                value=medium.albedo,
+            )
         )
     found += _of_thin_parts(surface, validity)
     distances, near = validity.distances(validity.middles), validity.near_errors(validity.middles)
@@ -92,14 +98,21 @@ def warnings_for(surface: Surface, validity: Validity) -> list[str]:
     if (near[close] > WORTH_SAYING).any():
         error = validity.mean(near * close) / validity.mean(close)
         found.append(
-            f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
-            f"diffusion itself is off by about {error:.0%}, whatever the mesh."
+            Note(
+                "near-light",
+                f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
+                f"diffusion itself is off by about {error:.0%}, whatever the mesh.",
+                value=error,
+            )
         )
     dim = far_error(medium, distances) > DIM
     if validity.mean(dim) > NEGLIGIBLE_PART:
         found.append(
-            f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
-            f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}."
+            Note(
+                "strong-absorption",
+                f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
+                f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}.",
+            )
         )
     return found
 
@@ -110,34 +123,52 @@ def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
     errors = validity.thin_errors
     if mean < THIN:
         return [
-            f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: expect "
-            f"the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more."
+            Note(
+                "thin-body",
+                f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: "
+                f"expect the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more.",
+                value=mean,
+            )
         ]
     thin = validity.thickness < THIN
     share = validity.mean(thin)
     if share <= NEGLIGIBLE_PART or validity.mean(errors * thin) < WORTH_SAYING * share:
         return []
     return [
-        f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there off "
-        f"by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more."
+        Note(
+            "thin-parts",
+            f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there "
+            f"off by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more.",
+            value=share,
+        )
     ]
 
 
 def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]) -> list[str]:
     """The same of the media of regions, the body's own first, in short."""
     outer, *inner = map(base_of, media)
-    found = []
+    found: list[str] = []
     for number, (surface, medium) in enumerate(zip(surfaces, inner, strict=True), 1):
         across = 4.0 * surface.volume / surface.area / medium.mean_free_path
         if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
             found.append(
-                f"region {number}: it is {across:.2g} of its mean free paths thick and scatters much less than what is "
-                "around it; light does not diffuse through such a void, and what comes through or past it is only a "
-                "guess."
+                Note(
+                    "void",
+                    f"it is {across:.2g} of its mean free paths thick and scatters much less than what is "
+                    "around it; light does not diffuse through such a void, and what comes through or past it is only "
+                    "a guess.",
+                    region=f"region {number}",
+                    value=across,
+                )
             )
         elif medium.albedo < LOW_ALBEDO:
             found.append(
-                f"region {number}: the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
-                "is good for; light that is absorbed there is only roughly right."
+                Note(
+                    "low-albedo",
+                    f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion "
+                    "is good for; light that is absorbed there is only roughly right.",
+                    region=f"region {number}",
+                    value=medium.albedo,
+                )
             )
     return found

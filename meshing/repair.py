@@ -6,6 +6,7 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.proximity import winding_number
 from tetlux.meshing.surface import UNITS, Surface, signed_volume, triangle_areas
 
@@ -76,8 +77,11 @@ def surface_from_arrays(
     crossing = count_self_intersections(points, faces)
     if crossing is None:
         warnings.append(
-            "whether the surface crosses itself was not looked at, since too many of its triangles lie side by side, "
-            "like the needles of a fan; evenly shaped triangles are quicker and more accurate."
+            Note(
+                "crossing-unchecked",
+                "whether the surface crosses itself was not looked at, since too many of its triangles lie side by "
+                "side, like the needles of a fan; evenly shaped triangles are quicker and more accurate.",
+            )
         )
     elif crossing > max(TANGLE[0], TANGLE[1] * len(faces)):
         raise InputError(
@@ -85,11 +89,21 @@ def surface_from_arrays(
             "body; repair it in a mesh editor."
         )
     elif crossing:
-        warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
+        warnings.append(
+            Note(
+                "crossing",
+                f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.",
+                value=crossing,
+            )
+        )
     if rounding > COARSE:
         warnings.append(
-            f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its size; "
-            "move it to the origin where it was made, and write it again."
+            Note(
+                "far-from-origin",
+                f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its "
+                "size; move it to the origin where it was made, and write it again.",
+                value=rounding,
+            )
         )
     # Walls between bodies that touch count on both sides.
     overlaps = nested or bool(crossing) or bool((Edges(faces).triangles > 2).any())
@@ -230,7 +244,13 @@ def _closed(
             "repair it in a mesh editor."
         )
     if crowded:
-        warnings.append(f"{crowded} edges are shared by more than two triangles (touching parts).")
+        warnings.append(
+            Note(
+                "edges-shared",
+                f"{crowded} edges are shared by more than two triangles (touching parts).",
+                value=crowded,
+            )
+        )
     return points, faces
 
 
@@ -335,7 +355,13 @@ def _oriented(
             inner.append(i + 1)
     if inner:
         which = f"body {inner[0]} of {count} lies" if len(inner) == 1 else f"{len(inner)} bodies of {count} lie"
-        warnings.append(f"{which} inside another and {'changes' if len(inner) == 1 else 'change'} nothing.")
+        warnings.append(
+            Note(
+                "nested-bodies",
+                f"{which} inside another and {'changes' if len(inner) == 1 else 'change'} nothing.",
+                value=len(inner),
+            )
+        )
     if inward.any():
         several = int(inward.sum())
         repairs.append(
@@ -345,7 +371,13 @@ def _oriented(
         )
     outer = count - len(inner)
     if outer > 1:
-        warnings.append(f"the surface consists of {outer} bodies; light does not pass between those that are apart.")
+        warnings.append(
+            Note(
+                "several-bodies",
+                f"the surface consists of {outer} bodies; light does not pass between those that are apart.",
+                value=outer,
+            )
+        )
     return np.where(inward[body][:, None], faces[:, ::-1], faces), bool(inner)
 
 

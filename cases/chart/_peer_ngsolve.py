@@ -28,29 +28,23 @@ def main(job_path: str, result_path: str) -> None:
     seconds: list[float] = []
     while not seconds or (len(seconds) < job["repeats"] and sum(seconds) < job["repeat_seconds"]):
         started = time.perf_counter()
-        mesh, fluence = _solved(job)
+        mesh, fluence = _solve(job)
         seconds.append(time.perf_counter() - started)
     np.savez(
         result_path,
-        exitance=float(job["robin"]) * _at_surface(mesh, fluence, job["samples"]),
+        exitance=float(job["robin"]) * _evaluate_on_surface(mesh, fluence, job["samples"]),
         seconds=min(seconds),
         unknowns=fluence.space.ndof,
         tetrahedra=mesh.ne,
     )
 
 
-def _solved(job: dict[str, Any]) -> tuple[Any, Any]:
-    """A mesh as fine as ``resolution`` (netgen's grading) says, and the fluence on it."""
+def _solve(job: dict[str, Any]) -> tuple[Any, Any]:
+    """Make a mesh and the fluence on it."""
     import ngsolve as ng  # noqa: PLC0415
-    from netgen.meshing import MeshingParameters  # noqa: PLC0415
 
-    order, grading = int(job["order"]), float(job["resolution"])
-    settings = MeshingParameters(maxh=float(job["longest"]), grading=grading)
-    for (x, y, z), length in zip(job["points"].tolist(), job["lengths_to_resolve"].tolist(), strict=True):
-        settings.RestrictH(x=x, y=y, z=z, h=grading / 3.0 * length)
-    mesh = ng.Mesh(_geometry(job).GenerateMesh(mp=settings))
-    if order > 1:
-        mesh.Curve(order)
+    order = int(job["order"])
+    mesh = _mesh(job)
     with ng.TaskManager():
         space = ng.H1(mesh, order=order)
         u, v = space.TnT()
@@ -68,6 +62,21 @@ def _solved(job: dict[str, Any]) -> tuple[Any, Any]:
         solver = ng.CGSolver(system.mat, preconditioner.mat, tol=RESIDUAL, maxiter=2000)
         fluence.vec.data = solver * load.vec
     return mesh, fluence
+
+
+def _mesh(job: dict[str, Any]) -> Any:
+    """Mesh the exact shape, as finely as ``resolution`` (netgen's grading) says; curved from the second order on."""
+    import ngsolve as ng  # noqa: PLC0415
+    from netgen.meshing import MeshingParameters  # noqa: PLC0415
+
+    order, grading = int(job["order"]), float(job["resolution"])
+    settings = MeshingParameters(maxh=float(job["longest"]), grading=grading)
+    for (x, y, z), length in zip(job["points"].tolist(), job["lengths_to_resolve"].tolist(), strict=True):
+        settings.RestrictH(x=x, y=y, z=z, h=grading / 3.0 * length)
+    mesh = ng.Mesh(_geometry(job).GenerateMesh(mp=settings))
+    if order > 1:
+        mesh.Curve(order)
+    return mesh
 
 
 def _geometry(job: dict[str, Any]) -> Any:
@@ -90,7 +99,7 @@ def _geometry(job: dict[str, Any]) -> Any:
     return geometry
 
 
-def _at_surface(mesh: Any, fluence: Any, samples: Any) -> Any:
+def _evaluate_on_surface(mesh: Any, fluence: Any, samples: Any) -> Any:
     """Fluence on the curved facets where they are nearest to samples (n, 3), (n,)."""
     import ngsolve as ng  # noqa: PLC0415
 

@@ -20,12 +20,12 @@ def main(job_path: str, result_path: str) -> None:
     seconds: list[float] = []
     while not seconds or (len(seconds) < job["repeats"] and sum(seconds) < job["repeat_seconds"]):
         started = time.perf_counter()
-        fluence = _solved(redbirdpy, job)
+        fluence = _solve(redbirdpy, job)
         seconds.append(time.perf_counter() - started)
     np.savez(result_path, fluence=fluence, seconds=min(seconds))
 
 
-def _solved(redbirdpy: Any, job: dict[str, Any]) -> Any:
+def _solve(redbirdpy: Any, job: dict[str, Any]) -> Any:
     nodes, cells = job["nodes"], job["tetrahedra"]
     # Its boundary term is (1 - R)/(1 + R)/2, ours 1/(2A).
     reflection = (1.0 - 2.0 * float(job["robin"])) / (1.0 + 2.0 * float(job["robin"]))

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.chart.methods import MOST_TETRAHEDRA, REPEAT_SECONDS, Method, Outcome
-from tetlux.cases.chart.benchmark import Scene
-from tetlux.fem.grading import graded_towards
-from tetlux.fem.solution import Power, Solution
+from tetlux.cases.chart.benchmark import Benchmark
+from tetlux.cases.chart.finite_elements import GRADINGS, graded_mesh
+from tetlux.cases.chart.methods import REPEAT_SECONDS, Method, Outcome
+from tetlux.fem.exitance_field import LinearFluence
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.scratch import run_child, scratch
+from tetlux.meshing.solids import Slab, Sphere, Torus
 
 # Seconds until a peer is stopped.
 TIME_LIMIT = 300.0
@@ -47,24 +47,24 @@ class Peer:
         return importlib.util.find_spec(self.package) is not None
 
 
-def _problem(scene: Scene) -> dict[str, Any]:
+def _problem(benchmark: Benchmark) -> dict[str, Any]:
     """The equation and its sources, as any solver needs them."""
-    medium = scene.case.medium
+    medium = benchmark.case.medium
     return {
         "diffusion": medium.diffusion,
         "sigma_a": medium.sigma_a,
         "robin": 1.0 / (2.0 * medium.boundary_factor),
         "eta": medium.eta,
-        "points": np.array([point for point, _ in scene.sources]),
-        "powers": np.array([power for _, power in scene.sources]),
-        "lengths_to_resolve": scene.lit[1],
-        "repeats": scene.repeats,
+        "points": np.array([point for point, _ in benchmark.sources]),
+        "powers": np.array([power for _, power in benchmark.sources]),
+        "lengths_to_resolve": benchmark.lit[1],
+        "repeats": benchmark.repeats,
         "repeat_seconds": REPEAT_SECONDS,
     }
 
 
-def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
-    """Run a script of this folder on a job in a process of its own.
+def run_peer(script: str, job: dict[str, Any]) -> dict[str, Any]:
+    """Run a script of this folder on a job in a process of its own, and return what it leaves.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
     with scratch("peer") as folder:
         job_path, result_path = folder / "job.npz", folder / "result.npz"
         np.savez(job_path, **job)
-        # -P: the names of this folder's modules are not to hide those of others.
+        # -P: modules of this folder must not be imported in place of others of the same name.
         command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
         try:
             done = run_child(command, folder, TIME_LIMIT)
@@ -87,57 +87,57 @@ def answer(script: str, job: dict[str, Any]) -> dict[str, Any]:
             return {key: data[key] for key in data.files}
 
 
-def _ngsolve(order: int) -> Callable[[Scene, float], Outcome]:
+def _exact_shape(benchmark: Benchmark) -> dict[str, Any]:
+    """The shape of the body, as ``_peer_ngsolve.py`` makes it."""
+    shape = benchmark.shape
+    if isinstance(shape, Sphere):
+        return {"kind": "sphere", "sizes": [shape.radius], "center": shape.center}
+    if isinstance(shape, Torus):
+        return {"kind": "torus", "sizes": [shape.major, shape.minor], "center": shape.center}
+    assert isinstance(shape, Slab)
+    return {"kind": "slab", "sizes": [shape.width, shape.depth], "center": (0.0, 0.0, 0.0)}
+
+
+def _ngsolve(order: int) -> Callable[[Benchmark, float], Outcome]:
     """Netgen on the exact shape, graded towards the source; curved elements from the second order on."""
 
-    def run(scene: Scene, grading: float) -> Outcome:
-        shape, surface = scene.shape, scene.case.surface
-        if shape.sphere:
-            sizes, center = [shape.sphere.radius], shape.sphere.center
-        elif shape.torus:
-            sizes, center = [shape.torus.major, shape.torus.minor], shape.torus.center
-        else:
-            assert shape.slab is not None
-            sizes, center = [shape.slab.width, shape.slab.depth], (0.0, 0.0, 0.0)
-        result = answer(
-            "_peer_ngsolve.py",
-            _problem(scene)
-            | {
-                "kind": shape.kind,
-                "sizes": sizes,
-                "center": center,
-                "order": order,
-                "resolution": grading,
-                "longest": LONGEST * 2.0 * surface.volume / surface.area,
-                "samples": scene.samples.points,
-            },
-        )
+    def run(benchmark: Benchmark, grading: float) -> Outcome:
+        surface = benchmark.case.surface
+        job = {
+            "order": order,
+            "resolution": grading,
+            "longest": LONGEST * 2.0 * surface.volume / surface.area,
+            "samples": benchmark.samples.points,
+        }
+        result = run_peer("_peer_ngsolve.py", _problem(benchmark) | _exact_shape(benchmark) | job)
         return Outcome(result["exitance"], float(result["seconds"]), int(result["unknowns"]), int(result["tetrahedra"]))
 
     return run
 
 
-def _redbird(scene: Scene, longest: float) -> Outcome:
-    """Our own graded mesh, whose seconds count, and its solver."""
-    surface = replace(scene.case.surface)
+def _redbird(benchmark: Benchmark, longest: float) -> Outcome:
+    """Its solver on this project's graded mesh, whose seconds count."""
+    surface = replace(benchmark.case.surface)
     started = time.perf_counter()
-    mesh = tetrahedralize(surface, cache=False)
-    mesh = graded_towards(mesh, surface, *scene.lit, MOST_TETRAHEDRA, longest=longest)
+    mesh = graded_mesh(benchmark, surface, longest)
     meshing = time.perf_counter() - started
-    result = answer("_peer_redbird.py", _problem(scene) | {"nodes": mesh.points, "tetrahedra": mesh.tetrahedra})
-    # Evaluated at the samples as our own fluence is.
-    nothing = Power(0.0, 0.0, 0.0, 0.0, 0.0)
-    solution = Solution(mesh, surface, scene.case.medium, result["fluence"], nothing)
+    job = {"nodes": mesh.points, "tetrahedra": mesh.tetrahedra}
+    result = run_peer("_peer_redbird.py", _problem(benchmark) | job)
+    field = LinearFluence(mesh, surface, benchmark.case.medium, result["fluence"])
     return Outcome(
-        solution.exitance_at(scene.samples.points),
+        field.exitance_on(surface.project(benchmark.samples.points)[0]),
         meshing + float(result["seconds"]),
         len(mesh.points),
         len(mesh.tetrahedra),
     )
 
 
-def _has_exact_shape(scene: Scene) -> bool:
-    return scene.in_points and scene.shape.kind in ("sphere", "slab", "torus")
+def _in_points(benchmark: Benchmark) -> bool:
+    return benchmark.in_points
+
+
+def _has_exact_shape(benchmark: Benchmark) -> bool:
+    return benchmark.in_points and isinstance(benchmark.shape, Sphere | Slab | Torus)
 
 
 PEERS = (
@@ -153,14 +153,6 @@ PEERS = (
     Peer(
         "redbirdpy",
         "redbirdpy",
-        (
-            Method(
-                "redbirdpy P1",
-                "longest edge over distance",
-                (2.0, 1.0, 0.7, 0.5, 0.35, 0.25),
-                _redbird,
-                lambda scene: scene.in_points,
-            ),
-        ),
+        (Method("redbirdpy P1", "longest edge over distance", GRADINGS[:-1], _redbird, _in_points),),
     ),
 )

@@ -1,4 +1,4 @@
-"""The picture of a chart: a row for each case, with error and seconds and unknowns against each other."""
+"""The picture of a chart: a row for each case, of error against seconds, and both against unknowns."""
 
 import math
 import textwrap
@@ -12,9 +12,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from tetlux.cases.chart.methods import OURS
+from tetlux.cases.chart.benchmark import Benchmark
+from tetlux.cases.chart.finite_elements import OURS
 from tetlux.cases.chart.models import MONTE_CARLO
-from tetlux.cases.chart.runs import Charted, Run, exponents
+from tetlux.cases.chart.runs import Charted, Measurement, exponents
 
 INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
 # Inches: the picture's width, a row's height and what of it is above and below the panels, and where these begin and
@@ -22,8 +23,10 @@ INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
 WIDTH, ROW, ABOVE, BELOW = 16.0, 4.7, 0.6, 0.7
 PANELS = ((1.1, 3.7), (5.9, 2.4), (9.05, 2.4), (11.7, 4.2))
 WIDEST = 150  # characters of a line of notes
+# Columns of the key by their places: what their exponents are of, and their heads.
+KEY_COLUMNS = {0.89: ("error", "p"), 1.0: ("seconds", "q")}
 NOTE = (
-    "Seconds: from the surface in memory to the exitance at the surface, meshing included, nothing remembered. "
+    "Seconds: from the surface in memory to the exitance at the surface, meshing included, with nothing cached. "
     "Error: relative L2 over the surface (of a slab with a closed form, both faces away from the rim). "
     "NGSolve is given the exact shape, all others its triangles. "
     "p, q: error ~ unknowns^p, seconds ~ unknowns^q, by least squares over the runs shown."
@@ -73,11 +76,7 @@ def draw_chart(charted: Sequence[Charted], path: Path) -> None:
     path : Path
         Where the PNG goes, 2000 pixels wide.
     """
-    lines = textwrap.wrap(NOTE, WIDEST)
-    if any(run.method == MONTE_CARLO.name for one in charted for run in one.runs):
-        lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
-    if any(one.scene.reference.error > 0 for one in charted):
-        lines += textwrap.wrap(NOTE_OF_FINER_RUN, WIDEST)
+    lines = _notes(charted)
     foot = 0.35 + 0.25 * len(lines)
     rows = len(charted)
     height = ROW * rows + foot
@@ -90,43 +89,50 @@ def draw_chart(charted: Sequence[Charted], path: Path) -> None:
             for x, width in PANELS
         )
         _draw_runs(one.runs, left, middle, right)
-        for axes in (left, middle):
-            # Below it the reference is no better than what is measured against it.
-            low, high = axes.get_ylim()
-            if low < one.scene.reference.error < high:
-                axes.axhline(one.scene.reference.error, color=INK, linestyle="--", linewidth=1.2, zorder=1.5)
+        _draw_reference(one.benchmark, left, middle)
         _draw_key(one.runs, key)
-        name = left.annotate(
-            one.scene.case.name, (0.0, 1.06), xycoords="axes fraction", fontsize=18, fontweight="bold", color=INK
-        )
-        left.annotate(
-            f"reference: {one.scene.reference.told}",
-            (1.0, 0.0),
-            (16.0, 0.0),
-            xycoords=name,
-            textcoords="offset points",
-            va="bottom",
-            fontsize=13,
-            color=INK,
-        )
     figure.text(
         PANELS[0][0] / WIDTH, 0.2 / height, "\n".join(lines), fontsize=12.5, color=INK, va="bottom", linespacing=1.3
     )
     figure.savefig(path)
 
 
-def _draw_runs(runs: Sequence[Run], left: Axes, middle: Axes, right: Axes) -> None:
-    front = sorted((run for run in runs if run.on_front), key=lambda run: run.seconds)
-    left.step(
-        [run.seconds for run in front],
-        [run.error for run in front],
-        where="post",
-        color=FRONT,
-        linewidth=8.0,
-        solid_capstyle="round",
-        solid_joinstyle="round",
-        zorder=1,
+def _notes(charted: Sequence[Charted]) -> list[str]:
+    """What is to be read with the picture, in lines."""
+    lines = textwrap.wrap(NOTE, WIDEST)
+    if any(run.method == MONTE_CARLO.name for one in charted for run in one.runs):
+        lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
+    if any(one.benchmark.reference.error > 0 for one in charted):
+        lines += textwrap.wrap(NOTE_OF_FINER_RUN, WIDEST)
+    return lines
+
+
+def _draw_reference(benchmark: Benchmark, left: Axes, middle: Axes) -> None:
+    """Title a row with its case and reference, and draw the reference's own error."""
+    reference = benchmark.reference
+    for axes in (left, middle):
+        # Below this line the reference is no better than what is measured against it.
+        low, high = axes.get_ylim()
+        if low < reference.error < high:
+            axes.axhline(reference.error, color=INK, linestyle="--", linewidth=1.2, zorder=1.5)
+    name = left.annotate(
+        benchmark.case.name, (0.0, 1.06), xycoords="axes fraction", fontsize=18, fontweight="bold", color=INK
     )
+    left.annotate(
+        f"reference: {reference.description}",
+        (1.0, 0.0),
+        (16.0, 0.0),
+        xycoords=name,
+        textcoords="offset points",
+        va="bottom",
+        fontsize=13,
+        color=INK,
+    )
+
+
+def _draw_runs(runs: Sequence[Measurement], left: Axes, middle: Axes, right: Axes) -> None:
+    """Error over seconds, error over unknowns, seconds over unknowns."""
+    _draw_front(runs, left)
     for name, look in LOOKS.items():
         mine = [run for run in runs if run.method == name]
         sized = [run for run in mine if run.unknowns is not None]
@@ -136,15 +142,34 @@ def _draw_runs(runs: Sequence[Run], left: Axes, middle: Axes, right: Axes) -> No
         _line(right, look, unknowns, [run.seconds for run in sized])
     error = "relative L2 error of exitance"
     for axes, below, beside in ((left, "seconds", error), (middle, "unknowns", error), (right, "unknowns", "seconds")):
-        axes.set(xscale="log", yscale="log")
-        axes.set_xlabel(below, fontsize=14, color=INK)
-        axes.set_ylabel(beside, fontsize=14, color=INK)
-        _tick(axes.xaxis, axes.get_xlim(), below)
-        _tick(axes.yaxis, axes.get_ylim(), beside)
-        axes.tick_params(which="both", labelsize=13, colors=INK)
-        axes.grid(which="major", alpha=0.35)
-        axes.grid(which="minor", alpha=0.12)
-        axes.spines[["top", "right"]].set_visible(False)
+        _style(axes, below, beside)
+
+
+def _draw_front(runs: Sequence[Measurement], axes: Axes) -> None:
+    front = sorted((run for run in runs if run.on_front), key=lambda run: run.seconds)
+    axes.step(
+        [run.seconds for run in front],
+        [run.error for run in front],
+        where="post",
+        color=FRONT,
+        linewidth=8.0,
+        solid_capstyle="round",
+        solid_joinstyle="round",
+        zorder=1,
+    )
+
+
+def _style(axes: Axes, below: str, beside: str) -> None:
+    """Logarithmic axes with their labels."""
+    axes.set(xscale="log", yscale="log")
+    axes.set_xlabel(below, fontsize=14, color=INK)
+    axes.set_ylabel(beside, fontsize=14, color=INK)
+    _tick(axes.xaxis, axes.get_xlim(), below)
+    _tick(axes.yaxis, axes.get_ylim(), beside)
+    axes.tick_params(which="both", labelsize=13, colors=INK)
+    axes.grid(which="major", alpha=0.35)
+    axes.grid(which="minor", alpha=0.12)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _line(axes: Axes, look: Look, x: list[float], y: list[float]) -> None:
@@ -163,7 +188,7 @@ def _line(axes: Axes, look: Look, x: list[float], y: list[float]) -> None:
 
 
 def _tick(axis: Axis, limits: tuple[float, float], quantity: str) -> None:
-    """Few and plain numbers: at powers of ten, and between them where there are hardly two of these."""
+    """Label powers of ten, and values between them where an axis spans fewer than two."""
     decades = math.log10(limits[1] / limits[0])
     between = (1.0, 2.0, 5.0) if decades < 1.0 else (1.0, 3.0) if decades < 2.0 else (1.0,)
     axis.set_major_locator(LogLocator(subs=between, numticks=12))
@@ -178,25 +203,28 @@ def _tick(axis: Axis, limits: tuple[float, float], quantity: str) -> None:
     axis.set_major_formatter(FuncFormatter(text))
 
 
-def _draw_key(runs: Sequence[Run], axes: Axes) -> None:
+def _draw_key(runs: Sequence[Measurement], axes: Axes) -> None:
     """Methods with their exponents, in columns."""
     fitted = exponents(runs)
     shown = [name for name in LOOKS if name in fitted]
     axes.set(xlim=(0.0, 1.0), ylim=(len(LOOKS), -1.0))
     axes.axis("off")
-    columns = {0.89: "error", 1.0: "seconds"}
-    for (x, quantity), head in zip(columns.items(), ("p", "q"), strict=True):
+    for x, (quantity, head) in KEY_COLUMNS.items():
         if any(fitted[name][quantity] is not None for name in shown):
             axes.text(x, -1.0, head, fontsize=13, style="italic", ha="right", va="center", color=INK)
     for y, name in enumerate(shown):
-        look = LOOKS[name]
-        _line(axes, look._replace(marker="", size=0.0), [0.0, 0.08], [y, y])
-        _line(axes, look, [0.04], [y])
-        axes.text(0.12, y, name, fontsize=12, va="center", color=INK, fontweight="bold" if name == OURS else None)
-        for x, quantity in columns.items():
-            exponent = fitted[name][quantity]
-            if exponent is not None:
-                text = f"{exponent:.1f}".replace("-", "\N{MINUS SIGN}")
-                axes.text(x, y, text, fontsize=12, ha="right", va="center", color=INK)
+        _draw_key_of(name, fitted[name], y, axes)
     axes.plot([0.0, 0.08], [len(shown)] * 2, color=FRONT, linewidth=8.0, solid_capstyle="round", clip_on=False)
     axes.text(0.12, len(shown), "not beaten (Pareto front)", fontsize=12, va="center", color=INK)
+
+
+def _draw_key_of(name: str, fitted: dict[str, float | None], y: float, axes: Axes) -> None:
+    look = LOOKS[name]
+    _line(axes, look._replace(marker="", size=0.0), [0.0, 0.08], [y, y])
+    _line(axes, look, [0.04], [y])
+    axes.text(0.12, y, name, fontsize=12, va="center", color=INK, fontweight="bold" if name == OURS else None)
+    for x, (quantity, _) in KEY_COLUMNS.items():
+        exponent = fitted[quantity]
+        if exponent is not None:
+            text = f"{exponent:.1f}".replace("-", "\N{MINUS SIGN}")
+            axes.text(x, y, text, fontsize=12, ha="right", va="center", color=INK)

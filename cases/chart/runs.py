@@ -1,13 +1,12 @@
-"""Runs of methods on a scene, and what they add up to: the front of the best, and exponents."""
+"""Runs of methods on a benchmark, and what they add up to."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from tetlux.cases.chart.measure import fitted_exponent, pareto_front
-from tetlux.cases.chart.methods import Method
-from tetlux.cases.chart.models import MONTE_CARLO
-from tetlux.cases.chart.benchmark import Scene
+from tetlux.cases.chart.benchmark import Benchmark
+from tetlux.cases.chart.methods import Method, Outcome
+from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
 from tetlux.meshing.errors import TetluxError
 
 # After a run that took longer than this, seconds, nothing finer of its method is run.
@@ -15,7 +14,7 @@ LONGEST_RUN = 8.0
 
 
 @dataclass(frozen=True)
-class Run:
+class Measurement:
     """One run of a method: a row of ``chart.csv``.
 
     Attributes
@@ -48,60 +47,70 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Charted:
-    """A scene and the runs on it."""
+    """A benchmark and the runs on it."""
 
-    scene: Scene
-    runs: list[Run]
+    benchmark: Benchmark
+    runs: list[Measurement]
 
 
-def runs_on(scene: Scene, methods: Sequence[Method], *, quick: bool, report: Callable[[str], None]) -> list[Run]:
-    """Run the methods that fit a scene, each from coarse to fine."""
-    runs: list[Run] = []
+def measure_methods(
+    benchmark: Benchmark, methods: Sequence[Method], *, quick: bool, report: Callable[[str], None]
+) -> list[Measurement]:
+    """Run the methods that fit a benchmark, each from coarse to fine."""
+    runs: list[Measurement] = []
     competing: list[int] = []
     for method in methods:
-        if not method.fits(scene):
+        if not method.fits(benchmark):
             continue
-        ladder = method.ladder_for(scene)
-        if method is MONTE_CARLO:
-            method.run(scene, 1.0)  # compiles it
-        for value in ladder[: method.quick] if quick else ladder:
-            name = f"{method.name} {method.labelled(value)}".strip()
-            try:
-                outcome = method.run(scene, value)
-            except TetluxError as failure:
-                report(f"  {name}: failed: {failure}")
-                continue
-            error = scene.error_of(outcome.exitance)
-            if not math.isfinite(error):
-                report(f"  {name}: failed: its exitance is not finite")
-                continue
+        for run in _measure(benchmark, method, quick=quick, report=report):
             if method.comparable:
                 competing.append(len(runs))
-            runs.append(
-                Run(
-                    scene.case.name,
-                    method.name,
-                    method.labelled(value),
-                    outcome.seconds,
-                    outcome.unknowns,
-                    outcome.tetrahedra,
-                    error,
-                    outcome.estimate,
-                    None,
-                    scene.reference.kind,
-                )
-            )
-            size = "" if outcome.unknowns is None else f", {outcome.unknowns:,} unknowns"
-            report(f"  {name}: {outcome.seconds:.3g} s, error {error:.2%}{size}")
-            if outcome.seconds > LONGEST_RUN:
-                break
+            runs.append(run)
     front = pareto_front([runs[i].seconds for i in competing], [runs[i].error for i in competing])
     for index, on_front in zip(competing, front.tolist(), strict=True):
         runs[index] = replace(runs[index], on_front=on_front)
     return runs
 
 
-def exponents(runs: Sequence[Run]) -> dict[str, dict[str, float | None]]:
+def _measure(
+    benchmark: Benchmark, method: Method, *, quick: bool, report: Callable[[str], None]
+) -> Iterator[Measurement]:
+    """Run one method, from coarse to fine, until a run takes too long."""
+    method.warm_up(benchmark)
+    for value in method.ladder_for(benchmark, quick=quick):
+        name = f"{method.name} {method.label(value)}".strip()
+        try:
+            outcome = method.run(benchmark, value)
+        except TetluxError as failure:
+            report(f"  {name}: failed: {failure}")
+            continue
+        error = benchmark.error_of(outcome.exitance)
+        if not math.isfinite(error):
+            report(f"  {name}: failed: its exitance is not finite")
+            continue
+        size = "" if outcome.unknowns is None else f", {outcome.unknowns:,} unknowns"
+        report(f"  {name}: {outcome.seconds:.3g} s, error {error:.2%}{size}")
+        yield _row(benchmark, method, value, outcome, error)
+        if outcome.seconds > LONGEST_RUN:
+            break
+
+
+def _row(benchmark: Benchmark, method: Method, value: float, outcome: Outcome, error: float) -> Measurement:
+    return Measurement(
+        benchmark.case.name,
+        method.name,
+        method.label(value),
+        outcome.seconds,
+        outcome.unknowns,
+        outcome.tetrahedra,
+        error,
+        outcome.estimate,
+        None,
+        benchmark.reference.kind,
+    )
+
+
+def exponents(runs: Sequence[Measurement]) -> dict[str, dict[str, float | None]]:
     """By method: the exponents p of ``error ~ unknowns^p`` and ``seconds ~ unknowns^p``, where they can be fitted."""
     found = {}
     for name in dict.fromkeys(run.method for run in runs):

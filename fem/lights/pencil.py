@@ -15,6 +15,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, beyond, entered, follow
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -115,13 +116,20 @@ class PencilBeam:
         apart = self.radius * math.sqrt(math.pi / count) / medium.mean_free_path
         if apart > 1.0:
             warnings.append(
-                f"the beam is so wide that the {count} thin ones it is made of lie {apart:.2g} mean free paths "
-                "apart: its exitance is spotted close to where it enters."
+                Note(
+                    "beam-spotted",
+                    f"the beam is so wide that the {count} thin ones it is made of lie {apart:.2g} mean free paths "
+                    "apart: its exitance is spotted close to where it enters.",
+                    value=apart,
+                )
             )
         if self.deposit == "line":
             warnings.append(
-                "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
-                "or read its exitance a mean free path away."
+                Note(
+                    "beam-singular",
+                    "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
+                    "or read its exitance a mean free path away.",
+                )
             )
         return replace(deposit, warnings=tuple(warnings))
 
@@ -192,8 +200,11 @@ def _as_points(rays: Rays, surface: Surface, medium: Medium) -> Deposit:
     warnings: tuple[str, ...] = ()
     if (depths < mean_free_path).any():
         warnings = (
-            "the beam crosses less than two mean free paths of the body, too little for one point of deposit; "
-            'use deposit: "line".',
+            Note(
+                "too-thin-for-point",
+                "the beam crosses less than two mean free paths of the body, too little for one point of deposit; "
+                'use deposit: "line".',
+            ),
         )
     return Deposit(
         absorbed=(1.0 - medium.albedo) * float(rays.powers.sum()),
@@ -254,5 +265,6 @@ def _as_line(rays: Rays, surface: Surface, medium: Medium, *, uniform: bool) -> 
     return replace(segment, on_mesh=rest_on)
 
 
-def _partly_missed(share: float) -> str:
-    return f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."
+def _partly_missed(share: float) -> Note:
+    text = f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."
+    return Note("beam-partly-missed", text, value=share)
