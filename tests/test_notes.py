@@ -5,6 +5,7 @@ import pickle
 from copy import copy
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from tests.conftest import TISSUE
@@ -71,8 +72,9 @@ def test_a_note_of_a_region_names_it() -> None:
 
 
 def test_warnings_of_a_surface_are_notes(ball: Surface) -> None:
-    far = surface_from_arrays(ball.points + 1e13, ball.faces)
-    assert codes_of(far.warnings) == {"far-from-origin"}
+    points, faces = np.vstack([ball.points, ball.points + 30.0]), np.vstack([ball.faces, ball.faces + len(ball.points)])
+    two = surface_from_arrays(points, faces)
+    assert [parts(warning) for warning in two.warnings] == [("several-bodies", None, 2)]
 
 
 def test_an_error_keeps_what_is_wrong_and_what_to_do() -> None:

@@ -1,28 +1,19 @@
-"""`tetlux stress`: scenes to the edges and beyond, and a map of what breaks there."""
+"""`tetlux stress`: scenarios to the edges and beyond, and a map of what breaks there."""
 
-import csv
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-from tetlux.cases.publish import cannot_write, check_writable, claimed, publish
-from tetlux.cases.stress.panels import PANELS, Panel
-from tetlux.cases.stress.picture import draw_map
-from tetlux.cases.stress.report import in_words
-from tetlux.cases.stress.rules import broken, violations
-from tetlux.cases.stress.runs import TIME_LIMIT, Run, runs_of
-from tetlux.cases.stress.scenes import TOLERANCE
+from tetlux.cases.publish import check_writable
+from tetlux.cases.stress.files import FILES, write_map
+from tetlux.cases.stress.grid import PANELS
+from tetlux.cases.stress.panels import Panel
+from tetlux.cases.stress.report import as_markdown
+from tetlux.cases.stress.rules import violations
+from tetlux.cases.stress.trials import TIME_LIMIT, Trial, run_trials
 
-# Runs between two lines that say how far it is.
+# Trials between two lines that say how far it is.
 PROGRESS = 50
-FILES = ("stress.csv", "stress.md", "stress.png")
-COLUMNS = (
-    *("panel", "x_name", "x", "y_name", "y", "method", "outcome", "message", "broken", "violation"),
-    *("lowest", "overshoot", "ledger", "residual", "iterations", "estimate", "tolerance", "error", "scaling"),
-    *("nodes", "seconds", "warnings"),
-)
 
 
 def stress(
@@ -33,7 +24,7 @@ def stress(
     time_limit: float = TIME_LIMIT,
     report: Callable[[str], None] = print,
 ) -> int:
-    """Run the grid of scenes; write ``stress.csv``, ``stress.md`` and ``stress.png``.
+    """Run the grid of scenarios; write ``stress.csv``, ``stress.md`` and ``stress.png``.
 
     Parameters
     ----------
@@ -43,14 +34,14 @@ def stress(
         Few values on each axis.
     panels : sequence of Panel
     time_limit : float
-        Seconds after which a scene counts as hung.
+        Seconds after which a trial counts as hung.
     report : callable
         Called with lines of text on the way, and with the map in words.
 
     Returns
     -------
     int
-        0 if no rule is broken by a method that may not, else 1.
+        0 if no rule is broken by a variant that may not, else 1.
 
     Raises
     ------
@@ -61,63 +52,29 @@ def stress(
     """
     check_writable(out)
     panels = [panel.quick() for panel in panels] if quick else panels
-    total = sum(len(panel.places()) * len(panel.methods) for panel in panels)
+    total = sum(len(panel.places()) * len(panel.variants) for panel in panels)
     report(f"{total} runs on {len(panels)} pairs of axes")
-    runs: list[Run] = []
-    # None of an earlier version.
+    trials: list[Trial] = []
+    # An empty folder, so that no mesh is that of an earlier version of the mesher.
     with tempfile.TemporaryDirectory(prefix="tetlux-stress-") as meshes:
-        for run in runs_of(panels, meshes=Path(meshes), time_limit=time_limit):
-            runs.append(run)
-            if len(runs) % PROGRESS == 0:
-                report(f"{len(runs)} of {total}, {sum(map(bool, map(violations, runs)))} of them violations")
-    runs = _in_order(runs, panels)
-    words = in_words(runs)
-    _write(runs, words, out)
+        for trial in run_trials(panels, meshes=Path(meshes), time_limit=time_limit):
+            trials.append(trial)
+            if len(trials) % PROGRESS == 0:
+                report(f"{len(trials)} of {total}, {sum(map(bool, map(violations, trials)))} of them violations")
+    trials = _sort(trials, panels)
+    words = as_markdown(trials)
+    write_map(trials, words, out)
     report(words)
     report(f"written to {out}: {', '.join(FILES)}")
-    return 1 if any(map(violations, runs)) else 0
+    return 1 if any(map(violations, trials)) else 0
 
 
-def _in_order(runs: list[Run], panels: Sequence[Panel]) -> list[Run]:
-    """Runs as they stand on the map, and not as they ended."""
+def _sort(trials: list[Trial], panels: Sequence[Panel]) -> list[Trial]:
+    """Sort trials by their places on the map."""
     names = [panel.name for panel in panels]
 
-    def key(run: Run) -> tuple[int, int, int]:
-        panel = run.panel
-        return names.index(panel.name), panel.methods.index(run.method), panel.places().index((run.x, run.y))
+    def key(trial: Trial) -> tuple[int, int, int]:
+        panel = trial.panel
+        return names.index(panel.name), panel.variants.index(trial.variant), panel.places().index((trial.x, trial.y))
 
-    return sorted(runs, key=key)
-
-
-def _write(runs: Sequence[Run], words: str, out: Path) -> None:
-    """Write the files, whole: into a folder beside them first."""
-    with claimed(out, ".") as folder:
-        try:
-            with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
-                writer.writeheader()
-                writer.writerows(map(_as_row, runs))
-            (folder / "stress.md").write_text(words, encoding="utf-8")
-            draw_map(runs, folder / "stress.png")
-            publish(folder, out, FILES)
-        except OSError as error:
-            raise cannot_write(out, error) from error
-
-
-def _as_row(run: Run) -> dict[str, Any]:
-    figures = {} if run.figures is None else asdict(run.figures)
-    return {
-        **figures,
-        "panel": run.panel.name,
-        "x_name": run.panel.x.name,
-        "x": run.x,
-        "y_name": run.panel.y.name,
-        "y": run.y,
-        "method": run.method.name,
-        "outcome": run.outcome,
-        "message": run.message,
-        "broken": "; ".join(f"{rule}: {figure}" for rule, figure in broken(run).items()),
-        "violation": bool(violations(run)),
-        "tolerance": TOLERANCE,
-        "warnings": " ".join(figures.get("warnings", ())),
-    }
+    return sorted(trials, key=key)

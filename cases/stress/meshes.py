@@ -1,13 +1,13 @@
-"""Meshes of a ball that are the same on every machine: layers of tetrahedra, and the same with bad ones among them."""
+"""Meshes of a ball that are the same on every machine: layers of tetrahedra, good ones or with bad ones among them."""
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.shapes import sphere
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 
-# No node is moved next to one that was, so that each makes a bad tetrahedron of its own; these are so many at most.
-MOST_SPOILED = 60
+# Nodes that are moved, at most. None is next to another, so that each makes a bad tetrahedron of its own.
+MOST_DEGRADED = 60
 HALVINGS = 40
 
 
@@ -34,7 +34,7 @@ def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0)
     outward = shell.points / np.linalg.norm(shell.points, axis=1)[:, None]
     shares = np.arange(layers, 0, -1) / layers
     points = np.vstack([*(radius * share * outward for share in shares), np.zeros(3)])
-    # Cut by the order of nodes, prisms side by side agree on the diagonals between them.
+    # Prisms are cut by the order of their nodes, so that neighbours agree on the diagonals between them.
     a, b, c = np.sort(shell.faces, axis=1).T
     prism = np.concatenate(
         [
@@ -46,19 +46,19 @@ def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0)
     middle = np.column_stack([shell.faces + (layers - 1) * count, np.full(len(shell.faces), layers * count)])
     tetrahedra = np.vstack([*(prism + layer * count for layer in range(layers - 1)), middle])
     regions = np.repeat(np.arange(layers), [len(prism)] * (layers - 1) + [len(middle)]) >= layers - core
-    return TetMesh(points, oriented(points, tetrahedra), regions=regions.astype(np.int64))
+    return TetMesh(points, orient(points, tetrahedra), regions=regions.astype(np.int64))
 
 
-def oriented(points: FloatArray, tetrahedra: IntArray) -> IntArray:
-    """The same tetrahedra with positive volumes."""
+def orient(points: FloatArray, tetrahedra: IntArray) -> IntArray:
+    """Reorder corners so that all volumes are positive."""
     turned = tetrahedra.copy()
     inverted = tetrahedron_volumes(points, tetrahedra) < 0
     turned[inverted, :2] = tetrahedra[inverted][:, [1, 0]]
     return turned
 
 
-def spoiled(mesh: TetMesh, quality: float) -> TetMesh:
-    """The same mesh with bad tetrahedra in it: slivers and needles, in turn.
+def degrade(mesh: TetMesh, quality: float) -> TetMesh:
+    """Make some tetrahedra of a mesh bad: slivers and needles, in turn.
 
     An inner node is moved towards the opposite face of one of its tetrahedra (a sliver), or along one of its edges (a
     needle), as far as it takes to make that tetrahedron as bad as is asked for and leave no other worse.
@@ -73,36 +73,50 @@ def spoiled(mesh: TetMesh, quality: float) -> TetMesh:
     -------
     TetMesh
     """
-    points = mesh.points.copy()
-    around: list[list[int]] = [[] for _ in points]
-    for cell, corners in enumerate(mesh.tetrahedra.tolist()):
-        for corner in corners:
-            around[corner].append(cell)
-    fixed = np.zeros(len(points), dtype=bool)
-    fixed[mesh.boundary_nodes] = True
-    # The faces between regions are to stay where they are.
-    fixed[mesh.interfaces[0]] = True
+    points, fixed = mesh.points.copy(), _fixed_nodes(mesh)
     moved = np.zeros(len(points), dtype=bool)
     done = 0
-    for node, cells in enumerate(around):
-        if done == MOST_SPOILED:
+    for node, cells in enumerate(_cells_of_nodes(mesh)):
+        if done == MOST_DEGRADED:
             break
         near = mesh.tetrahedra[cells]
         if fixed[node] or moved[near].any():
             continue
-        for cell in range(len(cells)):
-            others = points[near[cell][near[cell] != node]]
-            aim = others.mean(axis=0) if done % 2 == 0 else others[0]
-            place = _place(points, near, node, aim, quality)
-            if place is not None:
-                points[node], moved[node] = place, True
-                done += 1
-                break
+        place = _bad_place(points, near, node, quality, sliver=done % 2 == 0)
+        if place is not None:
+            points[node], moved[node] = place, True
+            done += 1
     return TetMesh(points, mesh.tetrahedra, mesh.unit, mesh.regions)
 
 
+def _cells_of_nodes(mesh: TetMesh) -> list[list[int]]:
+    around: list[list[int]] = [[] for _ in mesh.points]
+    for cell, corners in enumerate(mesh.tetrahedra.tolist()):
+        for corner in corners:
+            around[corner].append(cell)
+    return around
+
+
+def _fixed_nodes(mesh: TetMesh) -> BoolArray:
+    """Nodes on the boundary and between regions, (n,)."""
+    fixed = np.zeros(len(mesh.points), dtype=bool)
+    fixed[mesh.boundary_nodes] = True
+    fixed[mesh.interfaces[0]] = True
+    return fixed
+
+
+def _bad_place(points: FloatArray, near: IntArray, node: int, quality: float, *, sliver: bool) -> FloatArray | None:
+    """Where to move a node of tetrahedra `near` it for one of them to be a sliver, or a needle; None if nowhere."""
+    for cell in near:
+        others = points[cell[cell != node]]
+        place = _place(points, near, node, others.mean(axis=0) if sliver else others[0], quality)
+        if place is not None:
+            return place
+    return None
+
+
 def _place(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quality: float) -> FloatArray | None:
-    """Where a node of tetrahedra goes for the worst of them to be of a quality; None if it does not get there."""
+    """Move a node towards `aim` until the worst tetrahedron has the quality wanted; None if that is never so."""
     local = np.unique(near)
     cells = np.searchsorted(local, near)
     own = int(np.searchsorted(local, node))
@@ -116,5 +130,5 @@ def _place(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quali
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if worst(middle) > quality else (low, middle)
-    # Where a tetrahedron is turned inside out before any is bad, there is no such place.
+    # A tetrahedron may be turned inside out before any is bad.
     return np.asarray(points[node] + low * (aim - points[node])) if worst(low) < 2.0 * quality else None

@@ -1,4 +1,4 @@
-"""The stress map as a picture: for each panel a map of each method, coloured by error, with what breaks marked."""
+"""The stress map as a picture: for each panel a map of each variant, coloured by error; broken rules are marked."""
 
 import math
 import re
@@ -16,9 +16,9 @@ from matplotlib.patheffects import withStroke
 
 from tetlux.cases.chart.picture import INK
 from tetlux.cases.stress.panels import Axis, Panel, Value
-from tetlux.cases.stress.rules import broken, is_warned, violations
-from tetlux.cases.stress.runs import Run
-from tetlux.cases.stress.scenes import TOLERANCE
+from tetlux.cases.stress.rules import broken_rules, is_warned, violations
+from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.trials import Trial
 
 # Inches: the picture's width, a map, the gap between two, what is left and right of a panel's maps, above and below
 # them, more of it where an axis has words for values, and what the legend needs.
@@ -31,22 +31,22 @@ Colour = str | tuple[float, float, float, float]
 REFUSED, FAILED, VIOLATION = "#d5d7db", "#22252c", "#e6004c"
 NOTE = (
     "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted where there is none: "
-    "the method's own estimate. All axes step by factors, evenly in the picture. A cross: fluence below -1e-12 of its "
+    "the solver's own estimate. All axes step by factors, evenly in the picture. A cross: fluence below -1e-12 of its "
     "maximum where the source has no first moment or above the maximum principle, a ledger off by 1e-9, a residual "
     "above 1e-8, figures that change with the unit of length, or an error above the tolerance without a warning."
 )
 
 
-def draw_map(runs: Sequence[Run], path: Path) -> None:
+def draw_map(trials: Sequence[Trial], path: Path) -> None:
     """Draw all panels.
 
     Parameters
     ----------
-    runs : sequence of Run
+    trials : sequence of Trial
     path : Path
         Where the PNG goes.
     """
-    panels = list({run.panel.name: run.panel for run in runs}.values())
+    panels = list({trial.panel.name: trial.panel for trial in trials}.values())
     rows = _rows(panels)
     heights = [max(map(_height, row)) for row in rows]
     height = sum(heights) + LEGEND
@@ -56,28 +56,28 @@ def draw_map(runs: Sequence[Run], path: Path) -> None:
     for row, tall in zip(rows, heights, strict=True):
         left = 0.0
         for panel in row:
-            _draw_panel(figure, panel, [run for run in runs if run.panel.name == panel.name], left, top)
+            _draw_panel(figure, panel, [trial for trial in trials if trial.panel.name == panel.name], left, top)
             left += _width(panel)
         top -= tall
     _draw_legend(figure, height)
     figure.savefig(path)
 
 
-def _in_words(axis: Axis) -> bool:
+def _has_words(axis: Axis) -> bool:
     return any(isinstance(value, str) for value in axis.values)
 
 
 def _width(panel: Panel) -> float:
-    left = LEFT + WORDS_LEFT * _in_words(panel.y)
-    return left + len(panel.methods) * (_map_width(panel) + GAP) + RIGHT
+    left = LEFT + WORDS_LEFT * _has_words(panel.y)
+    return left + len(panel.variants) * (_map_width(panel) + GAP) + RIGHT
 
 
 def _map_width(panel: Panel) -> float:
-    return WORDS_MAP if _in_words(panel.x) else MAP[0]
+    return WORDS_MAP if _has_words(panel.x) else MAP[0]
 
 
 def _height(panel: Panel) -> float:
-    return ABOVE + MAP[1] + BELOW + WORDS_BELOW * _in_words(panel.x)
+    return ABOVE + MAP[1] + BELOW + WORDS_BELOW * _has_words(panel.x)
 
 
 def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
@@ -93,23 +93,23 @@ def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
     return rows
 
 
-def _draw_panel(figure: Figure, panel: Panel, runs: list[Run], left: float, top: float) -> None:
+def _draw_panel(figure: Figure, panel: Panel, trials: list[Trial], left: float, top: float) -> None:
     height = figure.get_figheight()
-    start = left + LEFT + WORDS_LEFT * _in_words(panel.y)
+    start = left + LEFT + WORDS_LEFT * _has_words(panel.y)
     figure.text(
         (left + 0.2) / WIDTH, (top - 0.32) / height, panel.name, fontsize=15, fontweight="bold", color=INK, va="bottom"
     )
-    told = _symbols(textwrap.shorten(panel.told, int(14.5 * (_width(panel) - 0.3))))
-    figure.text((left + 0.2) / WIDTH, (top - 0.35) / height, told, fontsize=10.5, color=INK, va="top")
-    for number, method in enumerate(panel.methods):
+    description = _symbols(textwrap.shorten(panel.description, int(14.5 * (_width(panel) - 0.3))))
+    figure.text((left + 0.2) / WIDTH, (top - 0.35) / height, description, fontsize=10.5, color=INK, va="top")
+    for number, variant in enumerate(panel.variants):
         wide = _map_width(panel)
         x = start + number * (wide + GAP)
         axes = figure.add_axes((x / WIDTH, (top - ABOVE - MAP[1]) / height, wide / WIDTH, MAP[1] / height))
-        axes.set_title(method.name, fontsize=11, color=INK, pad=4, fontweight="bold" if method.counts else None)
+        axes.set_title(variant.name, fontsize=11, color=INK, pad=4, fontweight="bold" if variant.counts else None)
         axes.set(xlim=(0, len(panel.x.values)), ylim=(0, len(panel.y.values)))
-        for run in runs:
-            if run.method.name == method.name:
-                _draw_cell(axes, run)
+        for trial in trials:
+            if trial.variant.name == variant.name:
+                _draw_cell(axes, trial)
         _label(axes, panel, first=number == 0)
 
 
@@ -121,7 +121,7 @@ def _label(axes: Axes, panel: Panel, *, first: bool) -> None:
     axes.set_ylabel(_symbols(y.name) if first else "", fontsize=11, color=INK)
     axes.tick_params(length=0, labelsize=9.5, colors=INK)
     axes.spines[:].set_color("#9aa0aa")
-    if _in_words(x):
+    if _has_words(x):
         for label in axes.get_xticklabels():
             label.set(rotation=40, horizontalalignment="right", rotation_mode="anchor")
 
@@ -131,7 +131,7 @@ def _symbols(name: str) -> str:
 
 
 def _text(value: Value) -> str:
-    """A value as it stands at an axis."""
+    """A value as an axis shows it."""
     if isinstance(value, str):
         return value
     power = round(math.log10(abs(value))) if value else 0
@@ -140,28 +140,28 @@ def _text(value: Value) -> str:
     return f"{value:g}".replace("-", "\N{MINUS SIGN}").replace("0.", ".") if abs(value) < 1 else f"{value:g}"
 
 
-def _draw_cell(axes: Axes, run: Run) -> None:
-    x, y = run.panel.x.values.index(run.x), run.panel.y.values.index(run.y)
-    figures = run.figures
-    if figures is None:
-        failed = run.outcome == "failed"
+def _draw_cell(axes: Axes, trial: Trial) -> None:
+    x, y = trial.panel.x.values.index(trial.x), trial.panel.y.values.index(trial.y)
+    found = trial.diagnostics
+    if found is None:
+        failed = trial.outcome == "failed"
         _fill(axes, x, y, FAILED if failed else REFUSED, "" if failed else "/////", "#a4a8b0")
     else:
-        value = figures.estimate if figures.error is None else figures.error
+        value = found.estimate if found.error is None else found.error
         _fill(
             axes,
             x,
             y,
             FAILED if math.isnan(value) else COLOURS(_norm()(value)),
-            "...." if figures.error is None else "",
+            "...." if found.error is None else "",
             "#ffffff",
         )
-        if is_warned(figures):
+        if is_warned(found):
             axes.plot(x + 0.84, y + 0.8, "o", markersize=3.2, color="white", markeredgecolor=INK, markeredgewidth=0.7)
-    if violations(run):
+    if violations(trial):
         axes.add_patch(Rectangle((x + 0.04, y + 0.04), 0.92, 0.92, fill=False, edgecolor=VIOLATION, linewidth=1.6))
         _cross(axes, x, y, VIOLATION, 2.4)
-    elif broken(run):
+    elif broken_rules(trial):
         _cross(axes, x, y, INK, 1.2)
 
 
@@ -180,7 +180,7 @@ def _norm() -> LogNorm:
 
 
 def _draw_legend(figure: Figure, height: float) -> None:
-    """The colours and the marks, and what they mean."""
+    """The colours and the marks, with words."""
     from matplotlib.cm import ScalarMappable  # noqa: PLC0415
 
     bar = figure.add_axes((0.8 / WIDTH, 1.28 / height, 4.2 / WIDTH, 0.22 / height))
@@ -190,7 +190,12 @@ def _draw_legend(figure: Figure, height: float) -> None:
     colours.ax.minorticks_off()
     bar.tick_params(labelsize=10.5, colors=INK)
     bar.set_title("relative error of the exitance", fontsize=11, color=INK, pad=4)
-    marks = figure.add_axes((5.7 / WIDTH, 1.05 / height, 11.0 / WIDTH, 0.5 / height))
+    _draw_marks(figure.add_axes((5.7 / WIDTH, 1.05 / height, 11.0 / WIDTH, 0.5 / height)))
+    figure.text(0.8 / WIDTH, 0.12 / height, "\n".join(textwrap.wrap(NOTE, 205)), fontsize=10.5, color=INK, va="bottom")
+
+
+def _draw_marks(marks: Axes) -> None:
+    """The marks of cells, with words."""
     marks.set(xlim=(0, 22), ylim=(0, 1))
     marks.axis("off")
     cell = COLOURS(0.3)
@@ -207,4 +212,3 @@ def _draw_legend(figure: Figure, height: float) -> None:
     _cross(marks, 0.0, 0.0, VIOLATION, 2.4)
     _cross(marks, 4.0, 0.0, INK, 1.2)
     marks.plot(9.2 + 0.84, 0.8, "o", markersize=3.2, color="white", markeredgecolor=INK, markeredgewidth=0.7)
-    figure.text(0.8 / WIDTH, 0.12 / height, "\n".join(textwrap.wrap(NOTE, 205)), fontsize=10.5, color=INK, va="bottom")

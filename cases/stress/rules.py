@@ -1,46 +1,58 @@
-"""What must hold of every run on the stress map."""
+"""What must hold of every trial on the stress map."""
 
 import math
+from collections.abc import Iterator
 
-from tetlux.cases.stress.measure import Figures
-from tetlux.cases.stress.runs import Run
-from tetlux.cases.stress.scenes import TOLERANCE
+from tetlux.cases.stress.measure import Diagnostics
+from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.trials import Trial
+from tetlux.meshing.notes import codes_of
 
-# Of the largest fluence; of the incident power; of a linear system's load; of the bound; of the largest exitance.
+# As shares: of the largest fluence; of the incident power; of a linear system's load; of the bound; of the largest
+# exitance.
 DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8
-# What warnings say that are of how well the equation was solved, and not of how good it is, or of the surface.
-REASONS = ("was not met", "below zero", "the mesh's facets", "far too coarse", "no light leaves")
+# Codes of warnings that name a reason for an error of the discretisation, not of the model or the surface.
+REASONS = {
+    "tolerance-missed",
+    "fluence-negative",
+    "power-moved",
+    "exitance-negative",
+    "power-negative",
+    "source-depth-off",
+    "no-light-leaves",
+}
 
 
-def broken(run: Run) -> dict[str, str]:
-    """What a run breaks: the rule, and by how much."""
-    if run.figures is None:
-        return {"failure": run.message} if run.outcome == "failed" else {}
-    figures = run.figures
-    numbers = (figures.lowest, figures.ledger, figures.residual, figures.estimate)
-    if not figures.finite or not all(map(math.isfinite, numbers)):
+def broken_rules(trial: Trial) -> dict[str, str]:
+    """The rules that a trial breaks, and by how much."""
+    if trial.diagnostics is None:
+        return {"failure": trial.message} if trial.outcome == "failed" else {}
+    found = trial.diagnostics
+    if not found.finite or not all(map(math.isfinite, (found.lowest, found.ledger, found.residual, found.estimate))):
         return {"not a number": "in fluence, exitance or their sums"}
-    found = {}
-    if figures.lowest < -DIP and not figures.dips:
-        found["negative fluence"] = f"{figures.lowest:.1e} of its maximum"
-    if figures.overshoot is not None and figures.overshoot > OVERSHOOT:
-        found["maximum principle"] = f"fluence {figures.overshoot:.1e} above its bound"
-    if abs(figures.ledger) > LEDGER:
-        found["ledger"] = f"{figures.ledger:.1e} of the power is missing"
-    if figures.residual > RESIDUAL:
-        found["residual"] = f"{figures.residual:.1e} of the load"
-    if figures.scaling is not None and figures.scaling > SCALING:
-        found["scaling"] = f"{figures.scaling:.1e} from the figures at scale 1"
-    if figures.error is not None and not figures.error <= TOLERANCE and not is_warned(figures):
-        found["silent error"] = f"{figures.error:.2g} without a warning"
-    return found
+    return dict(_broken_by(found))
 
 
-def violations(run: Run) -> dict[str, str]:
-    """What a run breaks, if it is of a method that may not."""
-    return broken(run) if run.method.counts else {}
+def _broken_by(found: Diagnostics) -> Iterator[tuple[str, str]]:
+    if found.lowest < -DIP and not found.may_be_negative:
+        yield "negative fluence", f"{found.lowest:.1e} of its maximum"
+    if found.overshoot is not None and found.overshoot > OVERSHOOT:
+        yield "maximum principle", f"fluence {found.overshoot:.1e} above its bound"
+    if abs(found.ledger) > LEDGER:
+        yield "ledger", f"{found.ledger:.1e} of the power is missing"
+    if found.residual > RESIDUAL:
+        yield "residual", f"{found.residual:.1e} of the load"
+    if found.scaling is not None and found.scaling > SCALING:
+        yield "scaling", f"{found.scaling:.1e} from the figures at scale 1"
+    if found.error is not None and not found.error <= TOLERANCE and not is_warned(found):
+        yield "silent error", f"{found.error:.2g} without a warning"
 
 
-def is_warned(figures: Figures) -> bool:
+def violations(trial: Trial) -> dict[str, str]:
+    """The rules that a trial breaks, if it is of a variant that may not."""
+    return broken_rules(trial) if trial.variant.counts else {}
+
+
+def is_warned(found: Diagnostics) -> bool:
     """Whether a warning names a reason for an error of the solution."""
-    return any(reason in warning for warning in figures.warnings for reason in REASONS)
+    return not REASONS.isdisjoint(codes_of(found.warnings))

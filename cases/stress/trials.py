@@ -1,4 +1,4 @@
-"""Scenes run in processes of their own, so that a crash or a hang of one ends none of the others."""
+"""Trials, each in a process of its own, so that a crash or a hang of one ends none of the others."""
 
 import contextlib
 import os
@@ -10,41 +10,42 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from tetlux.cases.stress.measure import Figures, Method, measured
+from tetlux.cases.stress.measure import Diagnostics, measure
 from tetlux.cases.stress.panels import Panel, Value
+from tetlux.cases.stress.variants import Variant
 from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import TetluxError
 
-# Seconds that a scene may take.
+# Seconds that a trial may take.
 TIME_LIMIT = 120.0
 _spawning = get_context("spawn")
 
 
 @dataclass(frozen=True)
-class Run:
-    """A scene, a method, and what came of it.
+class Trial:
+    """A scenario solved with a variant of the solver, and the outcome.
 
     Attributes
     ----------
     panel : Panel
     x, y : float or str
         Where on its axes.
-    method : Method
+    variant : Variant
     outcome : {"ran", "refused", "failed"}
-        Refused is what ended with one plain sentence.
+        "refused" is an error of one plain sentence.
     message : str
         That sentence, or what failed.
-    figures : Figures or None
+    diagnostics : Diagnostics or None
         Of what ran.
     """
 
     panel: Panel
     x: Value
     y: Value
-    method: Method
+    variant: Variant
     outcome: str
     message: str = ""
-    figures: Figures | None = None
+    diagnostics: Diagnostics | None = None
 
 
 @dataclass(frozen=True)
@@ -52,26 +53,28 @@ class _Job:
     panel: Panel
     x: Value
     y: Value
-    method: Method
+    variant: Variant
 
 
-# Outcome, message, figures.
-_Answer = tuple[str, str, Figures | None]
+# Outcome, message, diagnostics.
+_Answer = tuple[str, str, Diagnostics | None]
 
 
-def runs_of(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIME_LIMIT) -> Iterator[Run]:
-    """Run all methods on all scenes, some at a time, and yield them as they end.
+def run_trials(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIME_LIMIT) -> Iterator[Trial]:
+    """Run all variants on all scenarios, one a core, and yield the trials as they end.
 
     Parameters
     ----------
     panels : sequence of Panel
     meshes : Path
-        Folder where the mesher's meshes are kept: methods are compared on the same ones.
+        Folder where the mesher's meshes are kept: variants are compared on the same ones.
     time_limit : float
-        Seconds that a scene may take.
+        Seconds that a trial may take.
     """
-    # One method after the other: scenes of the same body at the same time would both have it meshed.
-    jobs = deque(_Job(panel, x, y, method) for panel in panels for method in panel.methods for x, y in panel.places())
+    # One variant after the other: two trials of the same body at the same time would both have it meshed.
+    jobs = deque(
+        _Job(panel, x, y, variant) for panel in panels for variant in panel.variants for x, y in panel.places()
+    )
     workers = [_Worker(meshes) for _ in range(min(THREADS, len(jobs)))]
     try:
         for worker in workers:
@@ -88,14 +91,14 @@ def runs_of(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIME_L
                 worker.job = None
                 if jobs:
                     worker.start(jobs.popleft(), time_limit)
-                yield Run(job.panel, job.x, job.y, job.method, *answer)
+                yield Trial(job.panel, job.x, job.y, job.variant, *answer)
     finally:
         for worker in workers:
             worker.stop()
 
 
 class _Worker:
-    """A process that solves one scene after the other; a new one takes the place of one that died."""
+    """A process that runs one trial after the other; a new one takes the place of one that died."""
 
     def __init__(self, meshes: Path) -> None:
         self._meshes = meshes
@@ -111,16 +114,16 @@ class _Worker:
         self._ready = False
 
     def start(self, job: _Job, time_limit: float) -> None:
-        """Have a job done; the time that the process takes to start does not count."""
-        # If it died meanwhile, its answer will be that.
+        """Send a job to the process; the time that it takes to start does not count."""
+        # If the process has died meanwhile, `answer` reports it.
         with contextlib.suppress(OSError, EOFError):
             if not self._ready:
                 self._ready = self.connection.recv()
-            self.connection.send((job.panel.make, job.x, job.y, job.method))
+            self.connection.send((job.panel.make, job.x, job.y, job.variant))
         self.job, self.deadline = job, time.monotonic() + time_limit
 
     def answer(self, time_limit: float) -> _Answer | None:
-        """What came of its job; None if it is still at it."""
+        """The outcome of its job; None while that runs."""
         if self.connection.poll():
             try:
                 answer: _Answer = self.connection.recv()
@@ -129,37 +132,37 @@ class _Worker:
                 self._process.join()
                 code = self._process.exitcode or 0
                 how = f"signal {-code}" if code < 0 else f"exit code {code}"
-                return self._anew(f"crashed: the process died of {how}")
+                return self._restart(f"crashed: the process died of {how}")
         if time.monotonic() >= self.deadline:
-            return self._anew(f"hung: stopped after {time_limit:g} s")
+            return self._restart(f"hung: stopped after {time_limit:g} s")
         return None
 
-    def _anew(self, message: str) -> _Answer:
+    def _restart(self, message: str) -> _Answer:
         self.stop()
         self._begin()
         return "failed", message, None
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process."""
         self._process.kill()
         self._process.join()
         self.connection.close()
 
 
 def _work(connection: Connection, meshes: Path) -> None:
-    """Solve what comes in, until there is no one left to answer."""
+    """Run what comes in, until the connection is closed."""
     os.environ["TETLUX_CACHE_DIR"] = str(meshes)
     with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
         connection.send(True)
         while True:
-            connection.send(_answered(*connection.recv()))
+            connection.send(_run_trial(*connection.recv()))
 
 
-def _answered(make: Callable[..., object], x: Value, y: Value, method: Method) -> _Answer:
+def _run_trial(make: Callable[..., object], x: Value, y: Value, variant: Variant) -> _Answer:
     try:
-        scene = make(x, y)
-        return "ran", "", measured(scene, method)  # type: ignore[arg-type]
+        scenario = make(x, y)
+        return "ran", "", measure(scenario, variant)  # type: ignore[arg-type]
     except TetluxError as error:
         return "refused", str(error), None
-    except Exception as error:  # whatever it is, it is a row of the table
+    except Exception as error:  # any error is a row of the table
         return "failed", f"{type(error).__name__}: {error}", None
