@@ -265,7 +265,7 @@ def _lights(
     lights: list[dict[str, Light]] = [{} for _ in media]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
-        with document.at(("lights", i), keys_of(light_spec, reader)):
+        with document.at(("lights", i), keys_of(light_spec)):
             for channel, medium in enumerate(media):
                 light = light_of(light_spec, channel, len(media), regions, reader)
                 if light is None:

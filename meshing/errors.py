@@ -35,6 +35,10 @@ class InputError(TetluxError, ValueError):
         super().__init__(text if remedy is None else f"{text}; {remedy}.")
         self.text, self.field, self.remedy = text, field, remedy
 
+    def about(self, field: str) -> "InputError":
+        """The same error, of a field that what raised it does not know."""
+        return InputError(self.text, field=field, remedy=self.remedy)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(InputError, field=self.field, remedy=self.remedy), (self.text,)
 

@@ -68,9 +68,9 @@ class PencilBeam:
         unit_vector(self.direction, "direction")
         check_positive(self.power, "power", "watts")
         if not math.isfinite(self.radius) or self.radius < 0:
-            raise InputError(f"radius is {self.radius:g}; give 0 or a length greater than 0.")
+            raise InputError(f"radius is {self.radius:g}; give 0 or a length greater than 0.", field="radius")
         if self.deposit not in ("point", "line"):
-            raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".')
+            raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".', field="deposit")
 
     def entry(self, surface: Surface) -> FloatArray:
         """Where the middle of the beam meets the surface, (3,).

@@ -21,7 +21,7 @@ def as_vector(value: Vector, name: str) -> FloatArray:
     """Three finite coordinates as an array, or an InputError that names them."""
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} is {value}; give three finite coordinates.")
+        raise InputError(f"{name} is {value}; give three finite coordinates.", field=name)
     return vector
 
 
@@ -30,7 +30,7 @@ def unit_vector(value: Vector, name: str) -> FloatArray:
     vector = as_vector(value, name)
     largest = np.abs(vector).max()
     if not largest > 0:
-        raise InputError(f"{name} is zero; give the {name} in which the light travels.")
+        raise InputError(f"{name} is zero; give the {name} in which the light travels.", field=name)
     vector = vector / largest  # its square may be out of range
     vector[np.abs(vector) < 1e-30] = 0.0  # and what is divided by it
     return np.asarray(vector / np.linalg.norm(vector))
@@ -39,9 +39,10 @@ def unit_vector(value: Vector, name: str) -> FloatArray:
 def check_positive(value: float, name: str, unit: str) -> None:
     """Refuse what is not a positive number."""
     if not math.isfinite(value) or value <= 0:
-        raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.")
+        raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.", field=name)
     if not FAINTEST <= value <= 1.0 / FAINTEST:
-        raise InputError(f"{name} is {value:g}; give a number of {unit} between {FAINTEST:g} and {1.0 / FAINTEST:g}.")
+        limits = f"between {FAINTEST:g} and {1.0 / FAINTEST:g}"
+        raise InputError(f"{name} is {value:g}; give a number of {unit} {limits}.", field=name)
 
 
 @dataclass(frozen=True)
