@@ -104,7 +104,8 @@ def _values(name: str, field: Field | None, constant: float, points: FloatArray)
         raise InputError(f"{name} gives no numbers at points (n, 3): {error}.", field=name) from error
     if values.shape != (len(points),):
         raise InputError(
-            f"{name} gives an array of shape {values.shape} for {len(points)} points; it must give one for each.",
+            f"{name} gives an array of shape {values.shape} for {len(points)} points; it must give one number "
+            "for each.",
             field=name,
         )
     _refuse(name, values, ~np.isfinite(values), "a coefficient must be a finite number", points)

@@ -115,9 +115,7 @@ FINITE_ELEMENTS = (
         _has_light_to_grade_to,
     ),
     Method("P1, adaptive", "tolerance", TOLERANCES, _adaptive("nothing"), quick=2),
-    Method(
-        "free-space subtracted, adaptive", "tolerance", (*TOLERANCES, 0.005), _adaptive("free-space"), _in_points
-    ),
+    Method("free-space subtracted, adaptive", "tolerance", (*TOLERANCES, 0.005), _adaptive("free-space"), _in_points),
     Method(
         "half-space subtracted, uniform", "refinements", REFINEMENTS, _on_mesh(_uniform_mesh, "half-space"), _in_points
     ),

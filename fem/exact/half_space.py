@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
-from tetlux.fem.exact.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import BeamSource, Source, beam_source
-from tetlux.fem.exact.bessel import inner_ratios, wall_rates
-from tetlux.fem.exact.legendre import legendre_sum
-from tetlux.fem.exact.quadrature import CUTOFF, composite_rule, graded_rule, two_decays
+from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.legendre import legendre_sum
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule, graded_rule, two_decays
 from tetlux.fem.exact.sphere import CHUNK, HALF, chord, residual_weight
 from tetlux.fem.fresnel import moments
 from tetlux.fem.medium import Medium

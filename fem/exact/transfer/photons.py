@@ -1,4 +1,4 @@
-"""The random walk of a photon packet, compiled by numba: what `monte_carlo` runs.
+"""The random walk of a photon packet, compiled by numba: what `batches` runs.
 
 Directions and positions are plain numbers, z of the slab is depth, the ball is centred at the origin. All in
 one file, because numba's cache does not see a change in another one.
@@ -15,7 +15,7 @@ from tetlux.meshing.arrays import FloatArray
 
 # Position, or direction of unit length.
 Vector = tuple[float, float, float]
-# Where light starts.
+# Kinds of light.
 PENCIL, BEAM, POINT = 0, 1, 2
 # The first entries of a tally; the bins of the front and of the back follow, each with one for what misses its bins.
 SPECULAR, ABSORBED, BALLISTIC, LEDGER = 0, 1, 2, 3
@@ -60,7 +60,7 @@ def henyey_greenstein(rng: np.random.Generator, g: float) -> float:
 
 
 @compiled
-def turned(way: Vector, cosine: float, azimuth: float) -> Vector:
+def rotate(way: Vector, cosine: float, azimuth: float) -> Vector:
     """Turn a direction by an angle of the given cosine, to the given azimuth."""
     u, v, w = way
     sine = math.sqrt(1.0 - cosine**2)
@@ -77,12 +77,12 @@ def turned(way: Vector, cosine: float, azimuth: float) -> Vector:
 
 
 @compiled
-def start(
+def launch(
     rng: np.random.Generator, ball: bool, size: float, light: int, depth: float, eta: float
 ) -> tuple[Vector, Vector, float]:
-    """Where a packet starts, which way, and the share that is reflected before it is inside."""
+    """Position and direction of a new packet inside, and the share that is reflected as it enters."""
     if light == POINT:
-        way = turned((0.0, 0.0, 1.0), 2.0 * rng.random() - 1.0, 2.0 * math.pi * rng.random())
+        way = rotate((0.0, 0.0, 1.0), 2.0 * rng.random() - 1.0, 2.0 * math.pi * rng.random())
         return (0.0, 0.0, size - depth if ball else depth), way, 0.0
     if not ball:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), fresnel(1.0, 1.0 / eta)
@@ -94,7 +94,7 @@ def start(
 
 
 @compiled
-def to_surface(ball: bool, size: float, place: Vector, way: Vector) -> float:
+def distance_to_surface(ball: bool, size: float, place: Vector, way: Vector) -> float:
     """Distance along `way` from inside a ball of radius `size`, or a slab of that thickness, to its surface."""
     x, y, z = place
     u, v, w = way
@@ -117,7 +117,7 @@ def normal_at(ball: bool, size: float, place: Vector, way: Vector) -> Vector:
 
 
 @compiled
-def spared(rng: np.random.Generator, weight: float) -> float:
+def roulette(rng: np.random.Generator, weight: float) -> float:
     """Russian roulette: the weight with which a packet goes on, the same in the mean."""
     if weight >= FAINT:
         return weight
@@ -125,7 +125,7 @@ def spared(rng: np.random.Generator, weight: float) -> float:
 
 
 @compiled
-def bin_of(edges: FloatArray, value: float) -> int:
+def bin_index(edges: FloatArray, value: float) -> int:
     """Index of the bin that holds `value`, the number of bins if none does."""
     index = int(np.searchsorted(edges, value, side="right")) - 1
     return index if 0 <= index < edges.size - 1 else edges.size - 1
@@ -177,20 +177,20 @@ def trace(
     """
     tally = np.zeros(LEDGER + 2 * edges.size)
     for _ in range(photons):
-        place, way, specular = start(rng, ball, size, light, depth, eta)
+        place, way, specular = launch(rng, ball, size, light, depth, eta)
         tally[SPECULAR] += specular
         weight = 1.0 - specular
         scattered = light == POINT
         while weight > 0.0:
             step = rng.standard_exponential() / extinction
-            reach = to_surface(ball, size, place, way)
+            reach = distance_to_surface(ball, size, place, way)
             length = min(step, reach)
             place = (place[0] + length * way[0], place[1] + length * way[1], place[2] + length * way[2])
             if step < reach:
-                left = spared(rng, weight * albedo)
+                left = roulette(rng, weight * albedo)
                 tally[ABSORBED] += weight - left
                 weight = left
-                way = turned(way, henyey_greenstein(rng, g), 2.0 * math.pi * rng.random())
+                way = rotate(way, henyey_greenstein(rng, g), 2.0 * math.pi * rng.random())
                 scattered = True
                 continue
             normal = normal_at(ball, size, place, way)
@@ -206,7 +206,7 @@ def trace(
                 continue
             if scattered:
                 where = math.acos(min(max(normal[2], -1.0), 1.0)) if ball else math.hypot(place[0], place[1])
-                tally[LEDGER + (edges.size if back else 0) + bin_of(edges, where)] += weight
+                tally[LEDGER + (edges.size if back else 0) + bin_index(edges, where)] += weight
             else:
                 tally[BALLISTIC] += weight
             weight = 0.0

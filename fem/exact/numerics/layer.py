@@ -11,7 +11,7 @@ import numpy as np
 from scipy import special
 
 from tetlux.fem.exact.half_space import mirror_flux, sink_line
-from tetlux.fem.exact.quadrature import CUTOFF, graded_rule, in_chunks
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks
 from tetlux.meshing.arrays import FloatArray
 
 
