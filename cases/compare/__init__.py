@@ -1,1 +1,1 @@
-"""A run held against closed forms: what `compare:` in a case file asks for."""
+"""Comparison of a run with closed forms, which `compare:` in a case file asks for."""

@@ -1,4 +1,4 @@
-"""What the closed forms ask of their arguments; a violation is an `InputError` in one sentence."""
+"""Checks of arguments of the closed forms; a violation is an `InputError` of one sentence, which names the argument."""
 
 import math
 
@@ -12,7 +12,7 @@ from tetlux.meshing.errors import InputError
 def positive(name: str, value: float) -> float:
     """Return `value` if it is finite and greater than 0."""
     if not (math.isfinite(value) and value > 0):
-        raise InputError(f"{name} is {value:g}; give a finite number greater than 0.")
+        raise InputError(f"{name} is {value:g}; give a finite number greater than 0.", field=name)
     return float(value)
 
 

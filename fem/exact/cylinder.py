@@ -1,6 +1,6 @@
 """An infinite cylinder along z in the diffusion approximation, with the exact (Robin) boundary.
 
-The axis is the z axis; sources lie at the angle 0. Every function returns what unit power gives, or unit
+The axis is the z axis; sources lie at the angle 0. All functions return values for unit power, or unit
 power for each unit of length of a line. Exitance is ``M = phi/(2A)``. With ``k = sigma_tr``, radius a,
 ``beta = zb/a``, ``rho_m(r) = I_m(kappa r)/I_m(kappa a)`` and the logarithmic derivatives u, v of
 `bessel.WallRates` at ``kappa a``, a point source at radius r0 gives
@@ -53,6 +53,13 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
     ------
     InputError
         If the radius is not positive, or the line not inside or less than 1e-4 of the radius below the surface.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> line_exitance(medium, radius=5.0, source_radius=4.0, theta=[0.0, 1.0]).round(6).tolist()
+    [0.131746, 0.021549]
     """
     a, t = _source(radius, source_radius)
     angle = checks.numbers("theta", theta)
@@ -67,7 +74,7 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
 def line_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a cylinder of a line source of 1 W/unit at x = source_radius, y = 0.
 
-    The line's field without a boundary, ``K_0(k d)/(2 pi D)``, and the wall's answer as a series.
+    The free field of the line, ``K_0(k d)/(2 pi D)``, and the reflection by the surface as a series.
 
     Parameters
     ----------
@@ -86,13 +93,14 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     Raises
     ------
     InputError
-        As `line_exitance`, or if a point is outside.
+        If the radius is not positive, a point outside, or the line not inside or less than 1e-4 of the radius below the
+        surface.
     """
     a, t = _source(radius, source_radius)
     fraction, theta, distance, _ = _places(points, a, t)
     x = medium.sigma_tr * a
     order = _line_order(x, t)
-    weight = _wall_answer(medium.extrapolation_length / a, np.array([x]), order)
+    weight = _reflection(medium.extrapolation_length / a, np.array([x]), order)
     if x == 0.0:
         # Order 0 has its logarithm in the free field: K_0(x d) + order 0 -> log(1/d) + beta.
         weight[0] = medium.extrapolation_length / a
@@ -110,8 +118,24 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
 def line_total(medium: Medium, *, radius: float, source_radius: float) -> float:
     """Power that leaves the cylinder, of 1 W from a point or from a unit of a line.
 
-    ``I_0(k r0)/[I_0(k a) + zb k I_1(k a)]``. The rest is absorbed. Parameters and errors are those of
-    `line_exitance`.
+    ``I_0(k r0)/[I_0(k a) + zb k I_1(k a)]``. The rest is absorbed.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of.
+    radius, source_radius : float
+        Radius of the cylinder, distance of the source from the axis, unit.
+
+    Returns
+    -------
+    float
+        Between 0 and 1, W.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive or the source not inside.
     """
     a, t = _source(radius, source_radius)
     x = np.array([medium.sigma_tr * a])
@@ -126,7 +150,7 @@ def point_exitance(
     """Give the exitance of a cylinder that holds an isotropic point source of unit power at z = 0.
 
     The integral over q is a sum with equal steps: that is the field of a row of sources so far apart that
-    they do not see each other, and converges exponentially.
+    their fields do not overlap, and converges exponentially.
 
     Parameters
     ----------
@@ -150,6 +174,13 @@ def point_exitance(
     InputError
         If the radius is not positive, or the source not inside or so close below the surface, about 1/500
         of the radius, that the sum gets too long.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, radius=5.0, source_radius=4.0, theta=0.0, z=[0.0, 5.0]).round(6).tolist()
+    [0.042886, 0.001306]
     """
     a, t = _source(radius, source_radius)
     angle, height = np.broadcast_arrays(checks.numbers("theta", theta), checks.numbers("z", z))
@@ -182,7 +213,7 @@ def point_exitance(
 def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a cylinder of an isotropic point source of unit power at (source_radius, 0, 0).
 
-    The source's field without a boundary, and the wall's answer as an integral and a series.
+    The free field of the source, and the reflection by the surface as an integral over a series.
 
     Parameters
     ----------
@@ -202,7 +233,8 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     Raises
     ------
     InputError
-        As `point_exitance`, or if a point is outside.
+        If the radius is not positive, a point outside, or the source not inside or too close below the surface for the
+        series.
     """
     a, t = _source(radius, source_radius)
     fraction, theta, distance, z = _places(points, a, t)
@@ -220,7 +252,7 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
             "use half_space for a source as close as that."
         )
     wall = np.hypot(x, q)
-    answer = _wall_answer(medium.extrapolation_length / a, wall, order)
+    answer = _reflection(medium.extrapolation_length / a, wall, order)
     answer *= inner_ratios(order, wall, np.full(wall.shape, t), HALF)
     with np.errstate(divide="ignore"):
         total = np.exp(-x * np.hypot(distance, z)) / np.hypot(distance, z)
@@ -232,13 +264,13 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
 
 
 def _source(radius: float, source_radius: float) -> tuple[float, float]:
-    """Check the source; return the radius, and the source's as a fraction of it."""
+    """Check the source; return the radius, and the source's distance from the axis as a fraction of it."""
     a = checks.positive("radius", radius)
     return a, checks.within("source_radius", source_radius, -1e-300, a, "cylinder") / a
 
 
 def _line_order(x: float, t: float) -> int:
-    """Order at which the series may end, if it ends."""
+    """Order at which the series is truncated; an error if that is too large."""
     order = order_needed(x, t, HALF, CUTOFF)
     if order > LINE_ORDERS:
         raise InputError(
@@ -249,7 +281,7 @@ def _line_order(x: float, t: float) -> int:
 
 
 def _reach(k: float, a: float, t: float) -> float:
-    """Largest q that counts, 1/unit: ``e^{-(kappa - k)(a - r0)}`` is the cutoff's there."""
+    """Largest q to integrate to, 1/unit: ``e^{-(kappa - k)(a - r0)}`` has fallen to the cutoff there."""
     rest = CUTOFF / (a * (1.0 - t))
     return math.sqrt(rest * (rest + 2.0 * k))
 
@@ -267,7 +299,7 @@ def _multiplicity(order: int) -> FloatArray:
     return np.asarray(np.where(np.arange(order + 1) == 0, 1.0, 2.0))
 
 
-def _wall_answer(beta: float, x: FloatArray, order: int) -> FloatArray:
+def _reflection(beta: float, x: FloatArray, order: int) -> FloatArray:
     """``e_m (beta v - 1)/[(1 + beta u)(u + v)]``, of shape (order + 1, len(x))."""
     rates = wall_rates(order, x, HALF)
     u, v = rates.growth, rates.decay

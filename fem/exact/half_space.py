@@ -1,7 +1,7 @@
 """The half-space z >= 0 in the diffusion approximation, with the exact (Robin) boundary.
 
-The medium fills z >= 0, so z is depth and the surface's outward normal is -z. Every function returns what
-unit power, or unit irradiance, gives. Exitance is ``M = phi/(2A)`` in W/unit².
+The medium fills z >= 0, so z is depth and the surface's outward normal is -z. All functions return values for
+unit power, or unit irradiance. Exitance is ``M = phi/(2A)`` in W/unit².
 """
 
 import math
@@ -83,6 +83,13 @@ def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> Float
     ------
     InputError
         If the source is outside, or a distance negative.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, depth=1.0, rho=[0.0, 5.0]).round(6).tolist()
+    [0.041846, 0.001425]
     """
     z0 = checks.positive("depth", depth)
     distance = checks.numbers("rho", rho, low=0.0)
@@ -99,6 +106,11 @@ def point_total(medium: Medium, *, depth: float) -> float:
         What fills the half-space.
     depth : float
         Depth of the source, greater than 0, unit.
+
+    Returns
+    -------
+    float
+        Between 0 and 1, W.
 
     Raises
     ------
@@ -135,6 +147,13 @@ def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "del
     ------
     InputError
         If a distance is not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> pencil_exitance(medium, rho=[1.0, 5.0]).round(6).tolist()
+    [0.024604, 0.001297]
     """
     distance = checks.numbers("rho", rho, low=np.finfo(float).tiny)
     beam = beam_source(medium, source)

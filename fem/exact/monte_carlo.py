@@ -1,8 +1,8 @@
-"""Radiative transfer itself, by Monte Carlo: what diffusion approximates, in a ball and in a slab.
+"""Radiative transfer by Monte Carlo in a ball and in a slab: what diffusion approximates.
 
 Packets of light scatter by Henyey and Greenstein's phase function and obey Fresnel's and Snell's laws at every
-crossing of the surface, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). Absorption takes its
-share of a packet at each collision, with Russian roulette for the faint ones. Needs numba:
+crossing of the surface, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). A share of a packet is
+absorbed at each collision; faint packets play Russian roulette. Needs numba:
 ``pip install "tetlux[montecarlo]"``.
 
 A medium given by sigma_s' alone scatters isotropically. Every run is made of `BATCHES` independent ones with
@@ -154,7 +154,7 @@ def slab(
     photons: int = 200_000,
     seed: int = 0,
 ) -> SlabResult:
-    """Give what an infinite slab 0 <= z <= L gives back and lets through, by radiative transfer.
+    """Give the reflectance and transmittance of an infinite slab 0 <= z <= L by radiative transfer.
 
     A half-space is a slab so thick that nothing comes through.
 

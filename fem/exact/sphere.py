@@ -1,6 +1,6 @@
 """A ball in the diffusion approximation, with the exact (Robin) boundary.
 
-The ball is centred at the origin. Every function returns what unit power, or unit irradiance, gives.
+The ball is centred at the origin. All functions return values for unit power, or unit irradiance.
 Exitance is ``M = phi/(2A)`` in W/unit². With ``k = sigma_tr``, radius a, ``beta = zb/a``, and the
 logarithmic derivatives u and v of `bessel.WallRates` at k a, a point source at radius r0 gives
 
@@ -53,6 +53,13 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
     ------
     InputError
         If the radius is not positive, the source not inside, or an angle not finite.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, radius=10.0, source_radius=9.0, gamma=[0.0, 0.5]).round(6).tolist()
+    [0.042908, 0.001929]
     """
     a = checks.positive("radius", radius)
     angle = checks.numbers("gamma", gamma)
@@ -66,7 +73,7 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
 def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a ball of an isotropic point source of unit power at (0, 0, source_radius).
 
-    The source's field without a boundary in closed form, and the wall's answer as a series,
+    The free field of the source in closed form, and the reflection by the surface as a series,
 
         4 pi D a phi = a e^{-k d}/d + sum_l (2l+1) P_l rho_l(r0) rho_l(r) (beta v_l - 1)/[(1 + beta u_l)(u_l + v_l)]
 
@@ -90,11 +97,18 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     ------
     InputError
         If the source or a point is outside, or the source is less than 1e-4 of the radius below the surface.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_fluence(medium, radius=10.0, source_radius=9.0, points=[[0.0, 0.0, 5.0]]).round(6).tolist()
+    [0.026082]
     """
     a = checks.positive("radius", radius)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
     where = checks.points(points) / a
-    # A point computed to lie on the surface may miss it by rounding.
+    # A point that was computed to lie on the surface may lie outside by rounding.
     fraction = np.minimum(checks.numbers("|points|/radius", np.linalg.norm(where, axis=1), high=1 + 1e-12), 1.0)
     x = medium.sigma_tr * a
     order = order_needed(x, t, HALF, CUTOFF)
@@ -140,6 +154,13 @@ def point_total(medium: Medium, *, radius: float, source_radius: float) -> float
     ------
     InputError
         If the radius is not positive or the source not inside.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(point_total(medium, radius=10.0, source_radius=9.0), 6)
+    0.790333
     """
     a = checks.positive("radius", radius)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
@@ -161,8 +182,8 @@ def _direct(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -
 def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
     """``4 pi a² M`` for a source close below the surface: singular part, and a series that converges.
 
-    The singular part is twice the source's field without a boundary, and the sum of the series at k = 0
-    without that; what is left falls like l^-3.
+    The singular part is twice the free field of the source, and the sum of the series at k = 0 without that; the
+    remaining coefficients fall like l^-3.
     """
     x = np.array([medium.sigma_tr * a])
     order = min(order, int(max(4000, 40.0 * x[0])))

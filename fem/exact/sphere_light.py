@@ -29,7 +29,7 @@ def pencil_exitance(
 
     `sphere.point_exitance` integrated along the diameter from the entry at gamma = 0. The derivative of the
     first moment goes to the ends of the path, and the singular parts there are split off as for a point:
-    twice the field without a boundary, and the series at k = 0. What is left falls like l^-3.
+    twice the free field, and the series at k = 0. The remaining coefficients fall like l^-3.
 
     Parameters
     ----------
@@ -53,6 +53,13 @@ def pencil_exitance(
     ------
     InputError
         If the radius is not positive, or an angle not between 0 and pi.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> pencil_exitance(medium, radius=10.0, gamma=[0.1, 1.0]).round(6).tolist()
+    [0.02648, 0.000308]
     """
     a = checks.positive("radius", radius)
     tiny = np.finfo(float).tiny
@@ -91,7 +98,26 @@ def pencil_exitance(
 def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
     """Power that leaves a ball which a pencil beam crosses, without the ballistic share ``e^{-2 sigma a}``.
 
-    Parameters, result and errors are those of `pencil_exitance`, summed over the surface.
+    `pencil_exitance` integrated over the surface.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius of the ball, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered, between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive.
     """
     a = checks.positive("radius", radius)
     beam = beam_source(medium, source)
@@ -142,7 +168,26 @@ def beam_exitance(
 def beam_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
     """Power that leaves a ball in a beam, of the pi a² that meet it, without the ballistic share.
 
-    Parameters, result and errors are those of `beam_exitance`, summed over the surface.
+    `beam_exitance` integrated over the surface.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of; its index must be 1.
+    radius : float
+        Radius of the ball, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        W for 1 W/unit².
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, or the medium's index not 1.
     """
     a = checks.positive("radius", radius)
     return float(_beam_series(medium, a, beam_source(medium, source), 0)[0])
@@ -184,7 +229,29 @@ def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -
 def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     """Flux that leaves a ball in unit diffuse irradiance, ``M = 1 - D dphi/dr`` for each unit of surface.
 
-    Parameters and errors are those of `diffuse_fluence`. Without absorption it is 1.
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius of the ball, unit.
+
+    Returns
+    -------
+    float
+        W/unit² for 1 W/unit² that passes into the ball; 1 without absorption.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(diffuse_exitance(medium, radius=10.0), 6)
+    0.795337
     """
     a = checks.positive("radius", radius)
     growth = wall_rates(0, np.array(medium.sigma_tr * a), HALF).growth[0]
@@ -197,6 +264,18 @@ def glow_exitance(medium: Medium, *, radius: float) -> float:
 
     ``phi = (1 - C i_0(k r)/i_0(k a))/sigma_a`` with ``phi + zb dphi/dr = 0`` at the surface, so that
     ``2 A M = q/((1 + q) sigma_a)`` with ``q = zb (k coth(k a) - 1/a)``; without absorption ``M = a/3``.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius a of the ball, unit.
+
+    Returns
+    -------
+    float
+        W/unit² for 1 W/unit³.
 
     Raises
     ------
@@ -224,7 +303,7 @@ def _along_diameter(x: float, extinction: float, gamma: FloatArray, order: int) 
     singular : (n,) ndarray
     """
     nodes, weights = graded_rule(30, 12)
-    # Nothing is left of the beam beyond its cutoff.
+    # The beam has faded beyond its cutoff.
     reach = min(1.0, CUTOFF / extinction)
     missing = np.concatenate([reach * nodes, nodes])
     density = np.concatenate(

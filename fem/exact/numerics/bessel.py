@@ -32,8 +32,8 @@ class WallRates:
 def successive(order: int, x: FloatArray, half: float) -> FloatArray:
     """``H_l = I_{nu+1}(x)/(x I_nu(x))`` for l = 0..order, by the downward continued fraction.
 
-    Downwards is the stable direction, and the fraction forgets where it started by a factor 6 a step
-    once the order exceeds x. At x = 0 the value is ``1/(2 nu + 2)``.
+    Downward recurrence is the stable direction; the error of its start falls by a factor of 6 a step once the order
+    exceeds x. At x = 0 the value is ``1/(2 nu + 2)``.
 
     Parameters
     ----------
@@ -63,8 +63,22 @@ def successive(order: int, x: FloatArray, half: float) -> FloatArray:
 def wall_rates(order: int, x: FloatArray, half: float) -> WallRates:
     """Logarithmic derivatives of both solutions at argument `x`, for l = 0..order.
 
-    Parameters are those of `successive`; the decaying solution runs upwards, its stable direction. The
-    cylindrical rate of order 0 vanishes like ``1/log(1/x)`` at x = 0.
+    The decaying solution is computed by upward recurrence, its stable direction. The cylindrical rate of order 0
+    vanishes like ``1/log(1/x)`` at x = 0.
+
+    Parameters
+    ----------
+    order : int
+        Largest l.
+    x : (...) ndarray
+        Arguments, not negative.
+    half : float
+        0.5 for spherical functions, 0 for cylindrical ones.
+
+    Returns
+    -------
+    WallRates
+        With arrays of shape (order + 1, ...).
     """
     orders = np.arange(order + 1, dtype=float).reshape(-1, *(1,) * x.ndim)
     growth = orders + x**2 * successive(order, x, half)
@@ -110,13 +124,13 @@ def inner_ratios(order: int, x: float | FloatArray, fraction: FloatArray, half: 
     result = np.empty((order + 1, *inner.shape))
     result[0] = first * np.exp(inner - wall)
     result[1:] = step
-    # Far orders underflow to 0, as they should.
+    # High orders underflow to 0, which is their value to rounding.
     with np.errstate(under="ignore"):
         return np.cumprod(result, axis=0, out=result)
 
 
 def order_needed(x: float, fraction: float, half: float, digits: float) -> int:
-    """Order from which on ``i_l(x t)/i_l(x)`` is ``exp(-digits)`` of its value at order 0.
+    """Order at which ``i_l(x t)/i_l(x)`` has fallen to ``exp(-digits)`` of its value at order 0.
 
     From the leading term of the uniform expansion of ``I_nu(nu z)`` (DLMF 10.41.3).
     """

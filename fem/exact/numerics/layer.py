@@ -1,7 +1,7 @@
-"""The field of a point source between two parallel planes, whichever boundary holds on them.
+"""The field of a point source between two parallel planes with Robin or zero boundary conditions.
 
-Up to a thickness from the source the answer is the source, what each plane answers alone, and an integral
-over what echoes between both; further out it is a sum over modes across the layer.
+Up to one thickness from the source it is the free field, the reflection by each plane alone, and a Hankel integral over
+multiple reflections; farther out it is a sum over modes across the layer.
 """
 
 import math
@@ -69,7 +69,7 @@ class Layer:
             for height in (d + z0, 2.0 * self.thickness - d - z0):
                 mirror = np.hypot(r, height)
                 field += 2.0 * sink_line(self.k, self.zb, r, height) - np.exp(-self.k * mirror) / mirror
-            result[near] = field + self._echoes(d, z0, r, slope=False)
+            result[near] = field + self._reflections(d, z0, r, slope=False)
         if not np.all(near):
             result[~near] = self._modes(z[~near], z0, rho[~near], slope=False)
         return result
@@ -81,15 +81,15 @@ class Layer:
             d, r = z[near], rho[near]
             slope = mirror_flux(self.k, r, d + z0) - mirror_flux(self.k, r, 2.0 * self.thickness - d - z0)
             slope -= mirror_flux(self.k, r, d - z0)
-            result[near] = slope + self._echoes(d, z0, r, slope=True)
+            result[near] = slope + self._reflections(d, z0, r, slope=True)
         if not np.all(near):
             result[~near] = self._modes(z[~near], z0, rho[~near], slope=True)
         return result
 
-    def _echoes(self, z: FloatArray, z0: float, rho: FloatArray, *, slope: bool) -> FloatArray:
-        """Sum the echoes between both planes by a Hankel integral over ``mu = sqrt(k² + q²)``.
+    def _reflections(self, z: FloatArray, z0: float, rho: FloatArray, *, slope: bool) -> FloatArray:
+        """Add up the reflections between both planes by a Hankel integral over ``mu = sqrt(k² + q²)``.
 
-        A plane reflects ``e^{-mu z}`` by ``G = (zb mu - 1)/(zb mu + 1)``, and the echoes are a geometric series in
+        A plane reflects ``e^{-mu z}`` by ``G = (zb mu - 1)/(zb mu + 1)``, and multiple reflections are a geometric series in
         ``G² e^{-2 mu L}``.
         """
         k, zb, thickness = self.k, self.zb, self.thickness

@@ -1,4 +1,4 @@
-"""Quadrature for integrands that are sharp at one end, whatever the scale of the sharp end."""
+"""Quadrature for integrands with a boundary layer at one end, of any width."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 
-# exp(-CUTOFF) is below the rounding of a double: where a factor has fallen that far, an integral may end.
+# exp(-CUTOFF) is below the rounding of a double: integrals end where a factor has fallen that far.
 CUTOFF = 40.0
 
 
