@@ -19,15 +19,14 @@ from scipy import special
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.cylindrical import CHUNK, HALF, cosine_sum, multiplicity, reach, reflection
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-HALF = 0.0  # the order of I_m is m itself
 LINE_ORDERS = 400_000
 POINT_TERMS = 200_000_000
-CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
 
 
 def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta: npt.ArrayLike) -> FloatArray:
@@ -67,8 +66,8 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
     order = _line_order(float(x[0]), t)
     growth = wall_rates(order, x, HALF).growth[:, 0]
     ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
-    series = _multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
-    return (_cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
+    series = multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
+    return (cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
 
 
 def line_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
@@ -100,7 +99,7 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     fraction, theta, distance, _ = _places(points, a, t)
     x = medium.sigma_tr * a
     order = _line_order(x, t)
-    weight = _reflection(medium.extrapolation_length / a, np.array([x]), order)
+    weight = reflection(medium.extrapolation_length / a, np.array([x]), order)
     if x == 0.0:
         # Order 0 has its logarithm in the free field: K_0(x d) + order 0 -> log(1/d) + beta.
         weight[0] = medium.extrapolation_length / a
@@ -111,7 +110,7 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     for start in range(0, fraction.size, chunk):
         part = slice(start, start + chunk)
         series = weight * inner_ratios(order, x, fraction[part], HALF)
-        field[part] += _cosine_sum(series, theta[part])
+        field[part] += cosine_sum(series, theta[part])
     return np.asarray(field / (2.0 * math.pi * medium.diffusion))
 
 
@@ -191,13 +190,13 @@ def point_exitance(
     slowest = math.hypot(k, math.sqrt(4.0 / (1.0 + 2.0 * beta)) / a)
     period = 2.0 * float(np.max(np.abs(heights), initial=0.0)) + CUTOFF / slowest
     step = 2.0 * math.pi / period
-    count = int(_reach(k, a, t) / step) + 2
+    count = int(reach(k, a, t) / step) + 2
     if order * count > POINT_TERMS:
         raise InputError(
             f"source_radius is {source_radius:g} and z goes to {np.max(np.abs(heights)):g}, which needs too long "
             "a sum; use half_space for a source close below the surface, and a smaller z."
         )
-    waves = np.cos(np.outer(angles, np.arange(order + 1))) * _multiplicity(order)
+    waves = np.cos(np.outer(angles, np.arange(order + 1))) * multiplicity(order)
     total = np.zeros(angles.size)
     chunk = max(1, CHUNK // (order + 1))
     for start in range(0, count, chunk):
@@ -240,10 +239,10 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     fraction, theta, distance, z = _places(points, a, t)
     x = medium.sigma_tr * a
     order = _line_order(x, t)
-    reach = _reach(medium.sigma_tr, a, t) * a
+    largest = reach(medium.sigma_tr, a, t) * a
     # Panels shrink towards q = 0, where order 0 is a logarithm, and resolve the oscillation along z.
-    panels = max(8, int(np.max(np.abs(z), initial=0.0) * reach / 8.0) + 1)
-    first = reach / panels
+    panels = max(8, int(np.max(np.abs(z), initial=0.0) * largest / 8.0) + 1)
+    first = largest / panels
     edges = np.concatenate([[0.0], first * 2.0 ** np.arange(-36, 0, dtype=float), first * np.arange(1, panels + 1)])
     q, weights = composite_rule(edges, 12)
     if order * q.size > CHUNK * 10:
@@ -252,7 +251,7 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
             "use half_space for a source as close as that."
         )
     wall = np.hypot(x, q)
-    answer = _reflection(medium.extrapolation_length / a, wall, order)
+    answer = reflection(medium.extrapolation_length / a, wall, order)
     answer *= inner_ratios(order, wall, np.full(wall.shape, t), HALF)
     with np.errstate(divide="ignore"):
         total = np.exp(-x * np.hypot(distance, z)) / np.hypot(distance, z)
@@ -280,38 +279,9 @@ def _line_order(x: float, t: float) -> int:
     return order
 
 
-def _reach(k: float, a: float, t: float) -> float:
-    """Largest q to integrate to, 1/unit: ``e^{-(kappa - k)(a - r0)}`` has fallen to the cutoff there."""
-    rest = CUTOFF / (a * (1.0 - t))
-    return math.sqrt(rest * (rest + 2.0 * k))
-
-
 def _places(points: npt.ArrayLike, a: float, t: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Distance from the axis, angle, distance from the source's line, z; lengths in radii."""
     where = checks.points(points) / a
     fraction = checks.numbers("|(x, y)|/radius of points", np.hypot(where[:, 0], where[:, 1]), high=1.0 + 1e-12)
     theta = np.arctan2(where[:, 1], where[:, 0])
     return np.minimum(fraction, 1.0), theta, np.hypot(where[:, 0] - t, where[:, 1]), where[:, 2]
-
-
-def _multiplicity(order: int) -> FloatArray:
-    """``e_m``: 1 for order 0, else 2."""
-    return np.asarray(np.where(np.arange(order + 1) == 0, 1.0, 2.0))
-
-
-def _reflection(beta: float, x: FloatArray, order: int) -> FloatArray:
-    """``e_m (beta v - 1)/[(1 + beta u)(u + v)]``, of shape (order + 1, len(x))."""
-    rates = wall_rates(order, x, HALF)
-    u, v = rates.growth, rates.decay
-    with np.errstate(divide="ignore"):  # order 0 at x = 0
-        return np.asarray(_multiplicity(order)[:, None] * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v)))
-
-
-def _cosine_sum(series: FloatArray, theta: FloatArray) -> FloatArray:
-    """``sum_m c_m cos(m theta)``; coefficients (orders, 1) for all angles, or (orders, n)."""
-    total = np.zeros_like(theta)
-    chunk = max(1, CHUNK // max(theta.size, 1))
-    for start in range(0, len(series), chunk):
-        m = np.arange(start, min(start + chunk, len(series)))
-        total += np.sum(series[m] * np.cos(np.outer(m, theta)), axis=0)
-    return total

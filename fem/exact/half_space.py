@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
+from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -191,22 +192,3 @@ def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float
     k = medium.sigma_tr
     escape = (beam.isotropic - k * beam.forward) / (beam.extinction + k)
     return escape / (1.0 + k * medium.extrapolation_length)
-
-
-def sink_line(k: float, zb: float, rho: FloatArray, height: FloatArray) -> FloatArray:
-    """``∫0..inf e^{-l/zb} w (1 + k R) e^{-k R}/R³ dl`` with ``w = height + l``; 0 at ``zb = 0``."""
-    if zb == 0.0:
-        return np.zeros_like(rho)
-    nodes, weights = graded_rule()
-    l = CUTOFF * zb * nodes[:, None]  # noqa: E741
-
-    def integral(part: FloatArray, above: FloatArray) -> FloatArray:
-        return np.asarray((CUTOFF * zb * weights) @ (np.exp(-l / zb) * mirror_flux(k, part, above + l)))
-
-    return in_chunks(integral, rho, height)
-
-
-def mirror_flux(k: float, rho: FloatArray, w: FloatArray) -> FloatArray:
-    """``-d/dw e^{-k R}/R = w (1 + k R) e^{-k R}/R³``."""
-    distance = np.hypot(rho, w)
-    return np.asarray(w * (1.0 + k * distance) * np.exp(-k * distance) / distance**3)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
+from tetlux.fem.exact.numerics.ball import CHUNK, HALF, chord, residual_weight
 from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
@@ -22,10 +23,8 @@ from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-HALF = 0.5  # i_l is I_{l + 1/2} but for a power of its argument
 DIRECT_ORDERS = 20_000
 POINT_ORDERS = 400_000
-CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
 
 
 def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma: npt.ArrayLike) -> FloatArray:
@@ -197,21 +196,9 @@ def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) ->
     return image + (1.0 - 2.0 / beta) * _static_sum(t, beta, gamma) + legendre_sum(residual, gamma)
 
 
-def residual_weight(order: int, x: FloatArray, beta: float) -> FloatArray:
-    """``1/(1 + beta u) - (2/beta)/(u + v)`` without the cancellation."""
-    rates = wall_rates(order, x, HALF)
-    u, v = rates.growth[:, 0], rates.decay[:, 0]
-    return np.asarray((beta * (v - u) - 2.0) / (beta * (1.0 + beta * u) * (u + v)))
-
-
 def _static_sum(t: float, beta: float, gamma: FloatArray) -> FloatArray:
     """``sum_l t^l P_l(cos gamma)/(1 + beta l)``: as images, with ``1/(1 + beta l) = ∫ e^{-s} e^{-beta l s} ds``."""
     nodes, weights = graded_rule()
     s = CUTOFF * nodes[:, None]
     missing = -np.expm1(-beta * s) * t + (1.0 - t)
     return np.asarray((CUTOFF * weights) @ (np.exp(-s) / chord(missing, gamma)))
-
-
-def chord(missing: FloatArray, gamma: FloatArray) -> FloatArray:
-    """Distance from the surface of the unit ball to a point at the radius ``1 - missing``, at the angle gamma."""
-    return np.asarray(np.hypot(missing, 2.0 * np.sqrt(1.0 - missing) * np.sin(0.5 * gamma)))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
-from tetlux.fem.exact.half_space import mirror_flux, sink_line
+from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks
 from tetlux.meshing.arrays import FloatArray
 
@@ -89,8 +89,8 @@ class Layer:
     def _reflections(self, z: FloatArray, z0: float, rho: FloatArray, *, slope: bool) -> FloatArray:
         """Add up the reflections between both planes by a Hankel integral over ``mu = sqrt(k² + q²)``.
 
-        A plane reflects ``e^{-mu z}`` by ``G = (zb mu - 1)/(zb mu + 1)``, and multiple reflections are a geometric series in
-        ``G² e^{-2 mu L}``.
+        A plane reflects ``e^{-mu z}`` by ``G = (zb mu - 1)/(zb mu + 1)``, and the reflections form a geometric
+        series in ``G² e^{-2 mu L}``.
         """
         k, zb, thickness = self.k, self.zb, self.thickness
         nodes, weights = graded_rule(30, 20)
