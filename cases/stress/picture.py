@@ -14,21 +14,20 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
 
-from tetlux.cases.chart.picture import INK
 from tetlux.cases.stress.panels import Axis, Panel, Value
 from tetlux.cases.stress.rules import broken_rules, is_warned, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 
-# Inches: the picture's width, a map, the gap between two, what is left and right of a panel's maps, above and below
-# them, more of it where an axis has words for values, and what the legend needs.
+# Inches: width of the picture, size of a map, gap between maps, margins of a panel (left, right, above, below), more of
+# them where the values of an axis are words, height of the legend.
 WIDTH, MAP, GAP, LEFT, RIGHT, ABOVE, BELOW = 17.0, (2.2, 1.75), 0.12, 0.85, 0.25, 0.85, 0.75
 WORDS_LEFT, WORDS_BELOW, WORDS_MAP, LEGEND = 0.75, 0.45, 3.8, 1.8
-# The tolerance is where the colours change: as many decades either way.
+# The colours change at the tolerance, and span as many decades on either side.
 DECADES = 1.5
 COLOURS = colormaps["BrBG_r"]
 Colour = str | tuple[float, float, float, float]
-REFUSED, FAILED, VIOLATION = "#d5d7db", "#22252c", "#e6004c"
+INK, REFUSED, FAILED, VIOLATION = "#30343f", "#d5d7db", "#22252c", "#e6004c"
 NOTE = (
     "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted where there is none: "
     "the solver's own estimate. All axes step by factors, evenly in the picture. A cross: fluence below -1e-12 of its "
