@@ -69,6 +69,7 @@ class Solution:
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
+        Plain sentences, each a `tetlux.meshing.notes.Note` with a code.
     moved : float
         Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.limiter`.
     of_lights : tuple of Solution
