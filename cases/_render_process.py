@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from tetlux.cases.picture_stage import see_through
 from tetlux.meshing._mesher_process import die_with
 
 if TYPE_CHECKING:
@@ -40,9 +41,9 @@ def main(job_path: str, image_path: str, parent: str) -> None:
         table = pyvista.LookupTable(values=np.round(255 * np.column_stack([job["table"], np.ones(256)])))
         table.scalar_range = (0.0, 1.0)
         plotter.add_mesh(body, scalars="share", cmap=table, interpolate_before_map=True, show_scalar_bar=False, **look)
+    arrows = None
     if len(job["arrows"]):
-        arrows = _soup(job["arrows"], job["arrow_normals"])
-        plotter.add_mesh(arrows, color=job["light"].tolist(), **look)
+        arrows = plotter.add_mesh(_soup(job["arrows"], job["arrow_normals"]), color=job["light"].tolist(), **look)
     camera = plotter.camera
     camera.parallel_projection = True
     camera.focal_point = center.tolist()
@@ -52,6 +53,10 @@ def main(job_path: str, image_path: str, parent: str) -> None:
     camera.parallel_scale = float(job["half_height"])
     plotter.renderer.ResetCameraClippingRange()
     image = np.asarray(plotter.screenshot(return_img=True))
+    if arrows is not None:
+        arrows.SetVisibility(False)
+        plotter.render()
+        image = see_through(image, np.asarray(plotter.screenshot(return_img=True)), job["background"])
     plotter.close()
     np.save(Path(image_path), image)
 

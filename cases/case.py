@@ -1,34 +1,31 @@
 """`Case`: one run, ready to be solved; and how a case file becomes a list of them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from tetlux.cases.body import CaseBody, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare.comparison import Comparison, comparison_for
-from tetlux.cases.document import Document, Key, read_document
-from tetlux.cases.lighting import BODY, keys_of, light_names, light_of
-from tetlux.cases.media import media_of
+from tetlux.cases.document import Document, read_document
+from tetlux.cases.lighting import keys_of, light_names, light_of
+from tetlux.cases.picture_view import UPRIGHT, toward_camera
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
 from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.lights import Deposit, Light
+from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.medium import Medium
 from tetlux.fem.region import Region
-from tetlux.fem.validity import check_media, check_size
-from tetlux.meshing.arrays import Vector
+from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.notes import Note, in_region
-from tetlux.meshing.paths import exists
-from tetlux.meshing.read import SUFFIXES
-from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +36,19 @@ class Channel:
     ----------
     name : str
     medium : Medium or VaryingMedium
-        Of the body.
+        Of the body, or of the outermost label of a mesh.
     lights : mapping of str to Light
         Those that are not dark in it, by name.
+    media : Medium, VaryingMedium, or mapping of int to these
+        The medium, or that of each label of a mesh.
     """
 
     name: str
     medium: AnyMedium
     lights: Mapping[str, Light]
+    media: AnyMedium | MediaByLabel
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +72,21 @@ class Case:
     sensors : tuple of Sensor
         The detectors, by name.
     camera : (3,) floats, optional
-        From where the surface is seen, unit.
+        Where radiance is wanted, unit; the picture is taken from there.
+    up : (3,) floats
+        What is up in the picture.
+    toward : (3,) ndarray, optional
+        Unit vector to the eye of the picture; chosen by the light if not given.
     reading_seconds : float
         Spent on reading and checking the surface.
+    mesh : TetMesh, optional
+        Tetrahedra that are used as they are; `surface` is then their boundary.
     comparison : Comparison, optional
         Closed forms to compare the run with.
-    from_sweep : bool
-        Whether it is one of the runs of a sweep.
+    spec : CaseSpec
+        What the case file says of this run.
+    swept : mapping of str to float or str
+        The values of this run of a sweep, by their dotted keys; empty if there is none.
     """
 
     name: str
@@ -87,11 +97,15 @@ class Case:
     regions: tuple[Region, ...]
     tolerance: float
     outputs: tuple[str, ...]
+    spec: CaseSpec
+    swept: Mapping[str, float | str]
     sensors: tuple[Sensor, ...] = ()
     camera: Vector | None = None
+    up: Vector = UPRIGHT
+    toward: FloatArray | None = None
     reading_seconds: float = 0.0
     comparison: Comparison | None = None
-    from_sweep: bool = False
+    mesh: TetMesh | None = None
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -100,8 +114,8 @@ class Case:
 
     @property
     def repairs(self) -> tuple[str, ...]:
-        """What was mended when its surfaces were read."""
-        return self._of_surfaces("repairs")
+        """What was mended when its surfaces, or its mesh, were read."""
+        return self.mesh.repairs if self.mesh else self._of_surfaces("repairs")
 
     @property
     def region_warnings(self) -> tuple[str, ...]:
@@ -124,7 +138,8 @@ class Case:
     @property
     def is_simple(self) -> bool:
         """Whether it is of one channel and one medium, the same everywhere."""
-        return len(self.channels) == 1 and not self.regions and isinstance(self.channels[0].medium, Medium)
+        channel = self.channels[0]
+        return len(self.channels) == 1 and not self.regions and self.mesh is None and isinstance(channel.medium, Medium)
 
     @property
     def medium(self) -> Medium:
@@ -136,25 +151,7 @@ class Case:
         """The lights of the first channel."""
         return tuple(self.channels[0].lights.values())
 
-
-def library_folder() -> Path:
-    """The folder of the case files that ship with the package."""
-    return Path(__file__).with_name("library")
-
-
-def find_case_file(request: str) -> Path:
-    """A path as given, or the shipped case file of that name where there is no such path."""
-    path = Path(request)
-    shipped = library_folder() / f"{request}.yaml"
-    known = exists(path)
-    if not known and path.name == request and shipped.is_file():
-        return shipped
-    if not known and path.name == request and not path.suffix:
-        names = ", ".join(sorted(p.stem for p in library_folder().glob("*.yaml")))
-        raise InputError(f"{request} is neither a file nor one of the cases that ship: {names}.")
-    if path.suffix.lower() in SUFFIXES:
-        raise InputError(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")
-    return path
+    __repr__ = one_line
 
 
 def load_cases(path: Path) -> list[Case]:
@@ -172,107 +169,81 @@ def load_cases(path: Path) -> list[Case]:
     spec = validated(document, document.data)
     reader = Reader(path.parent)
     cases = []
-    for label, data, keys in swept(document, spec):
-        single = document if label is None else Document(path, data, {**document.lines, **keys})
+    for label, values, data, keys in swept(document, spec):
+        single = document if label is None else Document(path, data, {**document.lines, **keys}, label)
         one = spec if label is None else validated(single, data)
         name = one.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise single.error(("name",), "this makes no name of a folder, or too long a one; give a short name.")
-        case = _case(single, one, name if label is None else f"{name}/{label}", reader)
-        cases.append(replace(case, from_sweep=label is not None))
+        cases.append(_case(single, one, name if label is None else f"{name}/{label}", reader, values))
     return cases
 
 
-def _case(document: Document, spec: CaseSpec, name: str, reader: Reader) -> Case:
+def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]) -> Case:
     reader.seconds = 0.0
-    with document.at(("surface",)):
-        surface = reader.surface(spec.surface, spec.unit)
-        check_thickness(surface)
     channels = channel_names(document, spec)
-    media = media_of(document, ("medium",), spec.medium, surface, len(channels), reader)
-    with document.at(("surface",)):
-        for medium in media:
-            check_size(surface, base_of(medium))
-    region_names, regions = _regions(document, spec, surface, media, reader)
+    body = body_of(document, spec, len(channels), reader)
+    surface, media = body.surface, body.media
     names = light_names(spec)
     check_different(document, "lights", names)
     _check_value_names(document, channels, names)
-    lights, deposits = _lights(document, spec, names, surface, media, region_names, channels, reader)
+    lights, deposits = _lights(document, spec, names, body, channels, reader)
     with document.at(("compare",)):
         comparison = None
         if spec.compare:
-            if len(media) > 1 or regions or not isinstance(media[0], Medium):
+            if len(media) > 1 or body.regions or not isinstance(media[0], Medium):
                 raise InputError("closed forms are those of one channel and one even medium; leave compare out.")
             comparison = comparison_for(surface.shape, media[0], deposits, spec.compare)
     check_different(document, "detectors", [detector.name for detector in spec.detectors])
     sensors = []
     for i, detector in enumerate(spec.detectors):
         with document.at(("detectors", i)):
-            sensors.append(sensor_of(detector, surface, base_of(media[0])))
-    if spec.camera and surface.contains(np.array([spec.camera.position]))[0]:
-        with document.at(("camera", "position")):
-            raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
+            sensors.append(sensor_of(detector, surface, body.of_channels[0].outer))
+    with document.at(("up",)):
+        unit_vector(spec.up, "up")
+    with document.at(("camera", "position")):
+        toward = toward_camera(spec.camera, surface, spec.up) if spec.camera else None
     return Case(
         name=name,
         source=document.path,
         surface=surface,
-        channels=tuple(map(Channel, channels, media, lights)),
+        channels=tuple(map(Channel, channels, media, lights, body.by_label or media)),
         light_names=names,
-        regions=regions,
+        regions=body.regions,
+        mesh=body.mesh,
         tolerance=spec.tolerance,
         outputs=tuple(dict.fromkeys(spec.outputs)),
+        spec=spec,
+        swept=values,
         sensors=tuple(sensors),
         camera=spec.camera.position if spec.camera else None,
+        up=spec.up,
+        toward=toward,
         reading_seconds=reader.seconds,
         comparison=comparison,
     )
-
-
-def _regions(
-    document: Document, spec: CaseSpec, surface: Surface, media: tuple[AnyMedium, ...], reader: Reader
-) -> tuple[tuple[str, ...], tuple[Region, ...]]:
-    """Names of the regions, and the regions."""
-    names = tuple(region.name or f"region_{i}" for i, region in enumerate(spec.regions, 1))
-    check_different(document, "regions", names)
-    if BODY in names:
-        raise document.error(("regions", names.index(BODY)), f'"{BODY}" is what is outside all regions; rename it.')
-    regions = []
-    for i, region in enumerate(spec.regions):
-        key: Key = ("regions", i)
-        with document.at((*key, "surface")):
-            inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
-        own = media_of(document, (*key, "medium"), region.medium, inner, len(media), reader)
-        with document.at((*key, "medium")):
-            for outside, inside in zip(media, own, strict=True):
-                check_media(surface, [base_of(outside), base_of(inside)])
-        regions.append(Region(inner, own))
-    with document.at(("regions",)):
-        check_regions(surface, [region.surface for region in regions])
-    return names, tuple(regions)
 
 
 def _lights(
     document: Document,
     spec: CaseSpec,
     names: tuple[str, ...],
-    surface: Surface,
-    media: tuple[AnyMedium, ...],
-    regions: tuple[str, ...],
+    body: CaseBody,
     channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
     """The lights of each channel by name, and what those of the first leave in the body."""
-    lights: list[dict[str, Light]] = [{} for _ in media]
+    bodies = body.of_channels
+    lights: list[dict[str, Light]] = [{} for _ in bodies]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
         with document.at(("lights", i), keys_of(light_spec)):
-            for channel, medium in enumerate(media):
-                light = light_of(light_spec, channel, len(media), regions, reader)
+            for channel, of_channel in enumerate(bodies):
+                light = light_of(light_spec, channel, len(bodies), body.parts, reader)
                 if light is None:
                     continue
                 lights[channel][names[i]] = light
-                uniform = not regions and isinstance(medium, Medium)
-                deposit = light.deposit_in(surface, base_of(medium), uniform=uniform)
+                deposit = light.deposit_in(of_channel)
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):

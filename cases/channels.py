@@ -62,7 +62,11 @@ def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
     """Everything that says how many channels there are, with how many."""
     if spec.channels is not None:
         yield ("channels",), len(spec.channels)
-    yield from _lists_of_medium(("medium",), spec.medium)
+    if spec.medium is not None:
+        yield from _lists_of_medium(("medium",), spec.medium)
+    if spec.mesh is not None:
+        for label, medium in spec.mesh.labels.items():
+            yield from _lists_of_medium(("mesh", "labels", label), medium)
     for i, region in enumerate(spec.regions):
         yield from _lists_of_medium(("regions", i, "medium"), region.medium)
     for i, light in enumerate(spec.lights):

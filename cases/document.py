@@ -82,11 +82,14 @@ class Document:
     data : dict
     lines : dict
         Line number of each key, by its path in the document.
+    run : str, optional
+        The values of a run of its sweep, of which an error is told.
     """
 
     path: Path
     data: dict[str, Any]
     lines: dict[Key, int]
+    run: str | None = None
 
     def line(self, key: Key) -> int | None:
         """The line of a key, or of what holds it: a key that is merged into another (`<<`) has none of its own."""
@@ -99,6 +102,8 @@ class Document:
         line = self.line(key)
         where = f"{self.path}, line {line}" if line else f"{self.path}"
         name = dotted(key)
+        if self.run is not None:
+            message = f"in the run {self.run}: {message}"
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
 
     @contextmanager

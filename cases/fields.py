@@ -1,11 +1,8 @@
 """Coefficients that vary in space, from files: tetrahedra with values, stacks of images, and arrays."""
 
-import contextlib
-import io
 import re
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +12,9 @@ from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.files import oriented
+from tetlux.meshing.files import read_with_meshio
+from tetlux.meshing.given import unjoined
 from tetlux.meshing.paths import is_file, is_folder
-
-if TYPE_CHECKING:
-    import meshio
 
 IMAGES = (".png", ".tif", ".tiff")
 # White of the grey images that Pillow reads, by their mode.
@@ -51,7 +46,7 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
     path = _existing(path, (".vtu",))
     if not np.isfinite(scale) or scale <= 0:
         raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
-    data = _read_mesh(path)
+    data = read_with_meshio(path, "vtu")
     blocks = [number for number, block in enumerate(data.cells) if block.type == "tetra"]
     if not blocks:
         raise InputError(f"{path} holds no tetrahedra; give a tetrahedral mesh.")
@@ -60,7 +55,7 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
         raise InputError(f'{path} holds no array "{name}"; the arrays there are: {known}.')
     try:
         # Nodes of other cells, whose values may be anything, are left out.
-        mesh, used = oriented(scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks]))
+        mesh, used = unjoined(scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks]))
         if name in data.point_data:
             return mesh_field(mesh, data.point_data[name][used], at="nodes")
         values = np.concatenate([data.cell_data[name][block] for block in blocks])
@@ -168,17 +163,6 @@ def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
     if path.suffix.lower() not in suffixes:
         raise InputError(f'{path}: "{path.suffix}" files are not read here; give {" or ".join(suffixes)}.')
     return path
-
-
-def _read_mesh(path: Path) -> "meshio.Mesh":
-    import meshio  # noqa: PLC0415
-
-    try:
-        # It says in a line of its own what is said below.
-        with contextlib.redirect_stderr(io.StringIO()), contextlib.redirect_stdout(io.StringIO()):
-            return meshio.read(path, file_format="vtu")
-    except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
-        raise InputError(f"{path} is not a readable VTU mesh; export it again.") from error
 
 
 def _pages(file: Path) -> list[tuple[str, npt.NDArray[np.generic]]]:

@@ -1,6 +1,6 @@
 """From the case file's lights to those that are solved for, by channel."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from pydantic import BaseModel
@@ -59,7 +59,9 @@ def keys_of(spec: BaseModel) -> dict[str, Key]:
     return found
 
 
-def light_of(spec: LightSpec, channel: int, count: int, regions: tuple[str, ...], reader: Reader) -> Light | None:
+def light_of(
+    spec: LightSpec, channel: int, count: int, regions: Mapping[str, int | None], reader: Reader
+) -> Light | None:
     """A light in one of the channels, or None where it is dark: in a list of powers 0 stands for that.
 
     Parameters
@@ -67,8 +69,8 @@ def light_of(spec: LightSpec, channel: int, count: int, regions: tuple[str, ...]
     spec : LightSpec
     channel, count : int
         Number of the channel, and of channels.
-    regions : tuple of str
-        Names of the regions.
+    regions : mapping of str to int
+        Numbers of the regions, or labels, by name; None is the whole body.
     reader : Reader
 
     Raises
@@ -134,10 +136,9 @@ def _environment(spec: EnvironmentSpec, brightest: float, channel: int, count: i
     return EnvironmentLight(brightest * pixels, up=spec.up, front=spec.front)
 
 
-def _region(spec: EmissionSpec, regions: tuple[str, ...]) -> int | None:
+def _region(spec: EmissionSpec, regions: Mapping[str, int | None]) -> int | None:
     if spec.region is None:
         return None
-    known = (BODY, *regions)
-    if spec.region not in known:
-        raise InputError(f'there is no region "{spec.region}"; the regions here are {", ".join(known)}.')
-    return known.index(spec.region) if regions else None
+    if spec.region not in regions:
+        raise InputError(f'there is no region "{spec.region}"; the regions here are {", ".join(regions)}.')
+    return regions[spec.region]

@@ -10,11 +10,11 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.phase import PhaseFunction, henyey_greenstein, table, two_term
 from tetlux.fem.validity import check_scattering
 from tetlux.fem.varying import Field, VaryingMedium
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.arrays import FloatArray
 
 
 def media_of(
-    document: Document, key: Key, spec: Media, surface: Surface, count: int, reader: Reader
+    document: Document, key: Key, spec: Media, points: FloatArray, unit: str, count: int, reader: Reader
 ) -> tuple[AnyMedium, ...]:
     """The media of a body or a region, one for each channel.
 
@@ -24,8 +24,10 @@ def media_of(
     key : Key
         Where in it the medium stands.
     spec : MediumSpec, MaterialSpec or list of MediumSpec
-    surface : Surface
-        Of the body or region; what varies must be known everywhere on it.
+    points : (n, 3) ndarray
+        Of the surface of the body or region, or nodes of a label: what varies must be known at all of them.
+    unit : str
+        Of lengths.
     count : int
         Number of channels.
     reader : Reader
@@ -37,14 +39,14 @@ def media_of(
     """
     if isinstance(spec, MaterialSpec):
         with document.at((*key, "material")):
-            return material(spec.material, unit=surface.unit)
+            return material(spec.material, unit=unit)
     if isinstance(spec, list):
-        return tuple(_medium(document, (*key, i), each, surface, i, reader) for i, each in enumerate(spec))
-    return tuple(_medium(document, key, spec, surface, channel, reader) for channel in range(count))
+        return tuple(_medium(document, (*key, i), each, points, i, reader) for i, each in enumerate(spec))
+    return tuple(_medium(document, key, spec, points, channel, reader) for channel in range(count))
 
 
 def _medium(
-    document: Document, key: Key, spec: MediumSpec, surface: Surface, channel: int, reader: Reader
+    document: Document, key: Key, spec: MediumSpec, points: FloatArray, channel: int, reader: Reader
 ) -> AnyMedium:
     fields: dict[str, Field] = {}
     numbers: dict[str, float] = {}
@@ -53,7 +55,7 @@ def _medium(
         if isinstance(value, FieldSpec):
             with document.at((*key, name)):
                 fields[name] = reader.field(value)
-                numbers[name] = float(fields[name](surface.points).mean())
+                numbers[name] = float(fields[name](points).mean())
         elif value is not None:
             numbers[name] = of_channel(value, channel)
     with document.at((*key, "phase")):
@@ -64,7 +66,7 @@ def _medium(
         if not fields:
             return medium
         varying = VaryingMedium(base=medium, **fields)
-        varying.at(surface.points)
+        varying.at(points)
         return varying
 
 

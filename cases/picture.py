@@ -9,25 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.cases.picture_frame import frame
+from tetlux.cases.picture_marks import Shape, marks_of
 from tetlux.cases.picture_plain import draw_plain
-from tetlux.cases.picture_stage import (
-    FULL,
-    LIGHT,
-    OVERSAMPLING,
-    PANEL,
-    SHADED,
-    Ray,
-    Stage,
-    build_stage,
-    exitance_range,
-)
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.cases.picture_stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
+from tetlux.cases.picture_view import PANEL, UPRIGHT, Ray
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.notes import Note
 from tetlux.meshing.scratch import run_child, scratch
 
-__all__ = ["Ray", "Scene", "draw"]
-
-Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+__all__ = ["Ray", "Scene", "Shape", "draw"]
 
 # The command that draws a body with PyVista; the names of two files and the number of this process are added.
 RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process")
@@ -58,6 +48,14 @@ class Scene:
         The lights to draw in.
     colours : ((n, 3) ndarray of uint8, float), optional
         Colours of the vertices, in place of those of their exitance, and what white stands for, W/unit².
+    up : (3,) floats
+        What is up in the picture.
+    toward : (3,) ndarray, optional
+        Unit vector to the eye; chosen by the light if not given.
+    regions : tuple of Shape
+        Regions to outline.
+    detectors : tuple of (str, Vector)
+        Names of the detectors, and their places on the surface.
     """
 
     points: FloatArray
@@ -67,13 +65,17 @@ class Scene:
     title: str
     lights: tuple[Ray, ...] = ()
     colours: tuple[Image, float] | None = None
+    up: Vector = UPRIGHT
+    toward: FloatArray | None = None
+    regions: tuple[Shape, ...] = ()
+    detectors: tuple[tuple[str, Vector], ...] = ()
 
 
 def draw(scene: Scene, path: Path) -> list[str]:
     """Draw a body in the colours of its exitance.
 
     The colours follow the logarithm of the exitance, down to six decades below its maximum, or are those given. The
-    camera looks at the lit side.
+    camera looks at the lit side, unless it is given. Arrows are seen through, and regions as outlines.
 
     Parameters
     ----------
@@ -93,7 +95,11 @@ def draw(scene: Scene, path: Path) -> list[str]:
     """
     ends = exitance_range(scene.exitance)
     colours = None if scene.colours is None else scene.colours[0] / 255.0
-    stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights, colours)
+    stage = build_stage(
+        scene.points, scene.triangles, scene.exitance, scene.lights, colours, up=scene.up, toward=scene.toward
+    )
+    extent = np.ptp(scene.points, axis=0)
+    marks = marks_of(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
     image = _drawn_with_pyvista(stage)
     warnings: list[str] = [] if image is not None else [WITHOUT_PYVISTA]
     unfinished = path.with_name(path.name + ".part")
@@ -103,13 +109,14 @@ def draw(scene: Scene, path: Path) -> list[str]:
             _averaged(draw_plain(stage) if image is None else image),
             stage.camera,
             scene.lights,
+            marks,
             ends=ends,
             table=stage.table,
             below=ends is not None and bool((scene.exitance < ends[0] * (1 - 1e-9)).any()),
             white=None if scene.colours is None else scene.colours[1],
             unit=scene.unit,
             title=scene.title,
-            extent=np.ptp(scene.points, axis=0),
+            extent=extent,
         )
         os.replace(unfinished, path)  # noqa: PTH105
     finally:

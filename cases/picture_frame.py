@@ -6,14 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture_stage import (
-    BACKGROUND,
-    DARK,
-    LIGHT,
-    PANEL,
-    Camera,
-    Ray,
-)
+from tetlux.cases.picture_marks import Marks, draw_marks
+from tetlux.cases.picture_stage import BACKGROUND, DARK, LIGHT
+from tetlux.cases.picture_view import PANEL, Camera, Ray
 from tetlux.meshing.arrays import FloatArray
 
 if TYPE_CHECKING:
@@ -34,6 +29,7 @@ def frame(
     image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
     camera: Camera,
     lights: tuple[Ray, ...],
+    marks: Marks,
     *,
     ends: tuple[float, float] | None,
     table: FloatArray,
@@ -53,6 +49,8 @@ def frame(
         The drawn body, of the panel's size.
     camera : Camera
     lights : tuple of Ray
+    marks : Marks
+        Regions and detectors.
     ends : (float, float) or None
         What the ends of the colour map stand for; None where no light leaves.
     table : (256, 3) ndarray
@@ -79,6 +77,7 @@ def frame(
     canvas.text(LEFT + 12, 56, _fitted(title), size=21, color=ink, va="center", parse_math=False)
     _size_marks(canvas, camera, unit, extent, ink, faint)
     _axes_cross(canvas, camera, faint)
+    draw_marks(canvas, marks, LEFT, TOP)
     _light_marks(canvas, camera, lights)
     if white is None:
         _color_bar(figure, ends, table, below, unit)

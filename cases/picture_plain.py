@@ -6,22 +6,35 @@ from tetlux.cases.picture_stage import (
     FULL,
     LIGHT,
     OVERSAMPLING,
-    PANEL,
     SHADED,
+    Image,
     Stage,
+    see_through,
 )
+from tetlux.cases.picture_view import PANEL
 from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Pairs of a pixel and a triangle looked at in one go; bounds the memory to about 100 MB.
 BATCH = 1_000_000
 
 
-def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+def draw_plain(stage: Stage) -> Image:
     """Draw the body and the arrows; (h, w, 3) at `OVERSAMPLING` times the panel's size."""
     corners = np.concatenate([stage.corners, stage.arrows])
     placed = stage.camera.project(corners.reshape(-1, 3)).reshape(-1, 3, 3) * OVERSAMPLING
     body = len(stage.corners)
-    owner = _nearest_triangles(placed, closed=body)
+    bare = nearest_triangles(placed[:body], closed=body)
+    under = _coloured(stage, placed, bare[0])
+    if len(corners) == body:
+        return under
+    return see_through(
+        _coloured(stage, placed, nearest_triangles(placed, closed=body, behind=bare)[0]), under, stage.background
+    )
+
+
+def _coloured(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
+    """The colours of the triangles that are seen at each pixel (h, w), (h, w, 3)."""
+    body = len(stage.corners)
     flat = owner.ravel()
     pixels = np.flatnonzero(flat >= 0)
     flat = flat[pixels]
@@ -47,19 +60,36 @@ def draw_plain(stage: Stage) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     return image.reshape(*owner.shape, 3)
 
 
-def _nearest_triangles(placed: FloatArray, closed: int) -> IntArray:
-    """Which triangle is seen at each pixel, or -1, (h, w); of the first `closed` only the front is drawn."""
+def nearest_triangles(
+    placed: FloatArray, closed: int, behind: tuple[IntArray, FloatArray] | None = None
+) -> tuple[IntArray, FloatArray]:
+    """Which triangle is seen at each pixel, or -1, and how near it is, both (h, w).
+
+    Parameters
+    ----------
+    placed : (m, 3, 3) ndarray
+        Corners of the triangles: column and row, in drawn pixels, and nearness.
+    closed : int
+        Of the first so many triangles only the front is drawn.
+    behind : pair of (h, w) ndarray, optional
+        What was found of the first `closed` before, which are not looked at again.
+    """
     size = np.array([OVERSAMPLING * n for n in PANEL])
     a, b, c = (placed[:, i, :2] for i in range(3))
     # Rows count downwards, so a triangle seen from its front runs clockwise.
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     drawn = np.flatnonzero((area < 0) | ((area > 0) & (np.arange(len(placed)) >= closed)))
+    if behind is not None:
+        drawn = drawn[drawn >= closed]
     # The pixels whose middles, at n + 1/2, lie within a triangle's rectangle.
     low = np.maximum(np.ceil(placed[drawn, :, :2].min(axis=1) - 0.5).astype(int), 0)
     high = np.minimum(np.floor(placed[drawn, :, :2].max(axis=1) - 0.5).astype(int), size - 1)
     columns, rows = np.maximum(high - low + 1, 0).T
-    owner = np.full((size[1], size[0]), -1, dtype=np.int64)
-    nearness = np.full(owner.shape, -np.inf)
+    if behind is None:
+        owner = np.full((size[1], size[0]), -1, dtype=np.int64)
+        nearness = np.full(owner.shape, -np.inf)
+    else:
+        owner, nearness = (array.copy() for array in behind)
     # One strip is one row of pixels of one triangle.
     strip, row = np.repeat(np.arange(len(drawn)), rows), _counting(rows)
     ends = np.cumsum(columns[strip])
@@ -70,7 +100,7 @@ def _nearest_triangles(placed: FloatArray, closed: int) -> IntArray:
         first = low[strip[one]]
         pixels = np.column_stack([first[:, 0] + _counting(long), first[:, 1] + row[one]])
         _keep_nearest(owner, nearness, placed, drawn[strip[one]], pixels)
-    return owner
+    return owner, nearness
 
 
 def _keep_nearest(

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
-from tetlux.meshing.proximity import cross_segments
+from tetlux.cases.picture_view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 
-# Pixels of the panel that shows the body.
-PANEL = (1150, 880)
+Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
+
 # Each pixel is the mean of 2 x 2 drawn ones, in both drawers: smooth edges without multisampling.
 OVERSAMPLING = 2
 # Darker than this share of the maximum is drawn as dark as can be.
@@ -25,65 +25,16 @@ LIGHT: Vector = (0.0, 0.62, 0.72)
 # Brightness of a face turned away from the lamp and of one that faces it; between them it follows the
 # cosine. Near enough to 1 that colours can be read off the bar.
 SHADED, FULL = 0.66, 1.0
-# Where the lamp stands, along the camera's axes: above the viewer's left shoulder.
-LAMP = (-0.35, 0.5, 0.8)
 # Neighbours that meet at a sharper angle than this are shaded as two faces.
 SHARP = math.cos(math.radians(40.0))
 # The mean normal at the hub of a fan of more triangles than this would cost the square of their number.
 MOST_NEIGHBOURS = 100
-# Degrees about the vertical from the lit side to the eye, the best first.
-TURNS = (50.0, -50.0, 25.0, -25.0, 80.0, -80.0, 0.0)
-# So many entry points are looked for; each costs a test of all triangles.
-MOST_ENTRIES = 12
-# The margin round the body, as a share of the panel.
-MARGIN = 0.05
 # Lengths of a drawn arrow, as shares of the body's diagonal.
-SHORTEST_ARROW, LONGEST_ARROW = 0.16, 0.3
-
-
-@dataclass(frozen=True, eq=False)
-class Ray:
-    """A light as it is drawn: an arrow that ends where it meets the body, or a point (start = end)."""
-
-    start: Vector
-    end: Vector
-
-    @property
-    def is_point(self) -> bool:
-        """Whether this light has no direction."""
-        return self.start == self.end
-
-
-@dataclass(frozen=True, eq=False)
-class Camera:
-    """A parallel projection.
-
-    Parameters
-    ----------
-    right, up, toward : (3,) ndarray
-        Unit vectors: along the picture's rows, up its columns, and from the body to the eye.
-    center : (3,) ndarray
-        The point in the middle of the panel.
-    pixel : float
-        Size of a pixel of the panel, unit of length.
-    """
-
-    right: FloatArray
-    up: FloatArray
-    toward: FloatArray
-    center: FloatArray
-    pixel: float
-
-    @property
-    def lamp(self) -> FloatArray:
-        """Unit vector to the lamp that shades the body."""
-        return _unit(np.column_stack([self.right, self.up, self.toward]) @ LAMP)
-
-    def project(self, points: FloatArray) -> FloatArray:
-        """Pixels right of the panel's left edge and below its top edge, and nearness in pixels, (n, 3)."""
-        offset = np.asarray(points) - self.center
-        across, above, near = (offset @ axis / self.pixel for axis in (self.right, self.up, self.toward))
-        return np.column_stack([0.5 * PANEL[0] + across, 0.5 * PANEL[1] - above, near])
+SHORTEST_ARROW, LONGEST_ARROW = 0.1, 0.18
+# Of its shaft, as a share of the body's diagonal.
+ARROW_RADIUS = 0.0042
+# How much of an arrow's colour is seen in front of the body, which it must not hide.
+ARROW_OPACITY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,20 +107,24 @@ def build_stage(
     exitance: FloatArray,
     lights: tuple[Ray, ...],
     colours: FloatArray | None = None,
+    *,
+    up: Vector = UPRIGHT,
+    toward: FloatArray | None = None,
 ) -> Stage:
-    """Choose the camera, and make arrows, normals and colours for it."""
+    """Choose the camera, unless the direction to the eye is given, and make arrows, normals and colours for it."""
     shares = map_shares(exitance, exitance_range(exitance))
     corners = points[triangles]
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point]
-    arrows = [_arrow(tail, tip, 0.008 * diagonal) for tail, tip in shafts]
+    arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     marked = [np.array(ray.end) for ray in lights] + [tail for tail, _ in shafts]
     # A lamp far away must not shrink the body to a speck.
     near = [place[None] for place in marked if np.linalg.norm(place - middle) < diagonal]
-    toward = _choose_view(corners, exitance[triangles].mean(axis=1), lights, diagonal)
+    if toward is None:
+        toward = choose_view(corners, exitance[triangles].mean(axis=1), lights, diagonal, up)
     return Stage(
-        camera=_camera(np.vstack([points, *near]), toward),
+        camera=camera_at(np.vstack([points, *near]), toward, up),
         corners=corners,
         normals=corner_normals(corners, triangles),
         shares=shares[triangles],
@@ -188,6 +143,22 @@ def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:
     return tip + back * (drawn / length), tip
 
 
+def see_through(image: Image, under: Image, background: Vector) -> Image:
+    """A picture with arrows over one without them, through which the body is seen; in front of nothing they are solid.
+
+    Parameters
+    ----------
+    image, under : (h, w, 3) ndarray of uint8
+        With and without arrows.
+    background : (3,) floats
+    """
+    ground = np.round(255 * np.asarray(background)).astype(np.uint8)
+    over = (image != under).any(axis=2) & (under != ground).any(axis=2)
+    mixed = image.copy()
+    mixed[over] = np.round(ARROW_OPACITY * image[over] + (1.0 - ARROW_OPACITY) * under[over]).astype(np.uint8)
+    return mixed
+
+
 def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     """Unit normals (m, 3, 3) of the corners of triangles, smooth over the body yet broken at sharp edges.
 
@@ -197,7 +168,7 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     from scipy.sparse import csr_array  # noqa: PLC0415
 
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat = _unit(weighted)
+    flat = unit(weighted)
     owner = np.repeat(np.arange(len(triangles)), 3)
     count = len(owner)
     vertex = triangles.ravel()
@@ -208,85 +179,18 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     one, other = one[alike], other[alike]
     summed = csr_array((np.ones(len(one)), (one, owner[other])), shape=(count, len(triangles))) @ weighted
     normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
-    return np.asarray(_unit(normals).reshape(-1, 3, 3))
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.where(length > 0, length, 1.0))
-
-
-def _choose_view(corners: FloatArray, brightness: FloatArray, lights: tuple[Ray, ...], diagonal: float) -> FloatArray:
-    """Unit vector to the eye: towards the lit side, turned aside and a bit up, entry points in view."""
-    lit = _lit_side(corners, brightness, lights)
-    entries = np.array([ray.end for ray in lights if not ray.is_point][:MOST_ENTRIES]).reshape(-1, 3)
-    best, most = _oblique(lit, TURNS[0]), -1
-    for turn in TURNS:
-        view = _oblique(lit, turn)
-        seen = int(_visible(corners, entries, view, diagonal).sum())
-        if seen > most:
-            best, most = view, seen
-        if seen == len(entries):
-            break
-    return best
-
-
-def _lit_side(corners: FloatArray, brightness: FloatArray, lights: tuple[Ray, ...]) -> FloatArray:
-    """Where the light comes from: against the arrows, or else where most of it leaves; may be zero."""
-    back = sum((_unit(np.subtract(ray.start, ray.end)) for ray in lights), np.zeros(3))
-    if np.linalg.norm(back) > 0.1:
-        return _unit(back)
-    power = np.clip(np.nan_to_num(brightness), 0.0, None)[:, None] * np.cross(
-        corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    )
-    mean = power.sum(axis=0) / max(float(np.linalg.norm(power, axis=1).sum()), np.finfo(float).tiny)
-    # A body that glows nearly evenly has no lit side.
-    return _unit(mean) if np.linalg.norm(mean) > 0.05 else np.zeros(3)
-
-
-def _oblique(lit: FloatArray, turn: float) -> FloatArray:
-    """A view `turn` degrees about the vertical from the lit side, and from above or, if it must be, below."""
-    level = math.hypot(lit[0], lit[1])
-    height = math.degrees(math.atan2(lit[2], level))
-    azimuth = math.degrees(math.atan2(lit[1], lit[0])) if level > 0.2 else -90.0
-    around = math.radians(azimuth + turn)
-    above = math.radians(18.0 + (0.28 if height > 0 else 0.65) * height)
-    return np.array([math.cos(above) * math.cos(around), math.cos(above) * math.sin(around), math.sin(above)])
-
-
-def _visible(corners: FloatArray, entries: FloatArray, toward: FloatArray, diagonal: float) -> BoolArray:
-    """Whether nothing of the body hides an entry point from the eye."""
-    count = len(corners)
-    free = np.empty(len(entries), dtype=bool)
-    for i, entry in enumerate(entries):
-        distance, _ = cross_segments(
-            np.broadcast_to(entry, (count, 3)), np.broadcast_to(toward, (count, 3)), corners, slack=0.0
-        )
-        free[i] = not (distance > 2e-3 * diagonal).any()
-    return free
-
-
-def _camera(points: FloatArray, toward: FloatArray) -> Camera:
-    """The camera that looks against `toward`, z up, with all points within the panel."""
-    right = _unit(np.cross([0.0, 0.0, 1.0], toward))
-    up = np.cross(toward, right)
-    placed = points @ np.column_stack([right, up, toward])
-    low, high = placed.min(axis=0), placed.max(axis=0)
-    room = 1.0 - 2.0 * MARGIN
-    pixel = max((high[0] - low[0]) / (room * PANEL[0]), (high[1] - low[1]) / (room * PANEL[1]))
-    middle = 0.5 * (low + high)
-    return Camera(right, up, toward, np.column_stack([right, up, toward]) @ middle, float(pixel))
+    return np.asarray(unit(normals).reshape(-1, 3, 3))
 
 
 def _arrow(tail: FloatArray, tip: FloatArray, radius: float, sides: int = 24) -> tuple[FloatArray, FloatArray]:
     """Corners and normals (k, 3, 3) of an arrow: a shaft, and a head that ends at `tip`."""
-    axis = _unit(tip - tail)
-    across = _unit(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]))
+    axis = unit(tip - tail)
+    across = unit(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]))
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
     spoke = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across)
     neck, head = tip - 7.0 * radius * axis, 2.6 * radius
     rings = [tail, tail + radius * spoke, neck + radius * spoke, neck + head * spoke, tip]
-    slant = _unit(spoke + head / (7.0 * radius) * axis)
+    slant = unit(spoke + head / (7.0 * radius) * axis)
     bands = [(0, 1, -axis), (1, 2, spoke), (2, 3, -axis), (3, 4, slant)]
     corners, normals = [], []
     for first, last, normal in bands:

@@ -6,15 +6,17 @@ from pathlib import Path
 
 from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
 from tetlux.cases.images import read_pixels
-from tetlux.cases.schema import SurfaceSpec
+from tetlux.cases.schema import MeshSpec, SurfaceSpec
 from tetlux.cases.schema_media import FieldSpec
 from tetlux.cases.schema_parts import Encoding
 from tetlux.fem.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.files import read_mesh
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
 
 
 @dataclass
@@ -26,12 +28,13 @@ class Reader:
     folder : Path
         That of the case file, to which names are relative.
     seconds : float
-        Spent on reading and checking surfaces since this was set to 0.
+        Spent on reading and checking surfaces and meshes since this was set to 0.
     """
 
     folder: Path
     seconds: float = 0.0
     _surfaces: dict[str, Surface] = field(default_factory=dict)
+    _meshes: dict[str, TetMesh] = field(default_factory=dict)
     _fields: dict[str, Field] = field(default_factory=dict)
     _pixels: dict[tuple[str, Encoding], FloatArray] = field(default_factory=dict)
 
@@ -43,6 +46,16 @@ class Reader:
             self._surfaces[label] = replace(_surface(spec, unit, self.folder), crease_angle=spec.crease_angle)
         self.seconds += time.perf_counter() - started
         return self._surfaces[label]
+
+    def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
+        """Tetrahedra made elsewhere."""
+        label = f"{spec.file} {spec.scale!r} {spec.array} {unit}"
+        started = time.perf_counter()
+        if label not in self._meshes:
+            path = self.folder / spec.file
+            self._meshes[label] = read_mesh(path, unit=unit, scale=spec.scale, labels=spec.array)
+        self.seconds += time.perf_counter() - started
+        return self._meshes[label]
 
     def field(self, spec: FieldSpec) -> Field:
         """A coefficient that varies."""
@@ -64,7 +77,7 @@ class Reader:
 
 def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:
     if spec.file is not None:
-        return read_surface(folder / spec.file, unit=unit, scale=spec.scale)
+        return read_surface(folder / spec.file, unit=unit, scale=spec.scale, holes=spec.holes)
     if spec.sphere:
         return shapes.sphere(spec.sphere.radius, center=spec.sphere.center, unit=unit)
     if spec.slab:

@@ -13,6 +13,7 @@ from tetlux.fem.radiance import radiance
 from tetlux.fem.solution import Solution
 from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface import Surface
 
 
@@ -69,6 +70,8 @@ class Results:
             if len(self.case.light_names) > 1:
                 found += [(channel.name, *one) for one in lights_in(list(channel.lights), solution)]
         return found
+
+    __repr__ = one_line
 
 
 def lights_in(names: list[str], solution: Solution) -> list[tuple[str, Solution]]:

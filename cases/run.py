@@ -4,17 +4,19 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from tetlux.cases.case import Case
 from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
-from tetlux.cases.picture import Scene, draw
+from tetlux.cases.picture import Scene, Shape, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply
 from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.results import Results, results_of, surface_values, volume_values
 from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
+from tetlux.cases.vtp import write_vtp
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files import write_mesh
@@ -22,14 +24,23 @@ from tetlux.meshing.notes import prefixed
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+# The same surface for VTK, PyVista and ParaView, which show no values of a PLY.
+VTP = "surface.vtp"
 READINGS = "detectors.csv"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary last: see `publish`.
-ALL_FILES = (*FILES.values(), READINGS, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), VTP, READINGS, *COMPARISON, SUMMARY)
 
 
-def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: bool = True) -> Path:
+def run_case(
+    case: Case,
+    out: Path,
+    report: Report = lambda _: None,
+    *,
+    cache: bool = True,
+    note: Report | None = None,
+) -> Path:
     """Solve a case and write its results.
 
     They are written into a folder beside the final one, which they replace when all are complete: where there is a
@@ -44,6 +55,8 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
         Called with a line of text as each stage ends.
     cache : bool
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
+    note : callable, optional
+        Called with each warning; if not given they are reported.
 
     Returns
     -------
@@ -60,8 +73,8 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
     try:
         with claimed(out, case.name) as folder:
             solutions = solve_each(
-                case.surface,
-                [channel.medium for channel in case.channels],
+                case.mesh or case.surface,
+                [channel.media for channel in case.channels],
                 [list(channel.lights.values()) for channel in case.channels],
                 regions=case.regions,
                 tolerance=case.tolerance,
@@ -78,7 +91,10 @@ def run_case(case: Case, out: Path, report: Report = lambda _: None, *, cache: b
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
     for warning in warnings:
-        report(f"note: {warning}")
+        if note is None:
+            report(f"note: {warning}")
+        else:
+            note(warning)
     return target
 
 
@@ -89,26 +105,12 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     unit = case.surface.unit
     warnings = _warnings(results)
     if "surface" in case.outputs:
-        comments = [f"lengths in {unit}, exitance in W/{unit}^2"]
-        if results.has_colours:
-            comments.append(f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2")
-        write_ply(results.surface, folder / FILES["surface"], surface_values(results), comments)
+        _write_surface(results, folder)
     if "volume" in case.outputs:
         write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
-    if "picture" in case.outputs:
-        # One that is dark in the first channel may be bright in another.
-        lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-        scene = Scene(
-            points=results.surface.points,
-            triangles=results.surface.faces,
-            exitance=results.exitance(),
-            unit=unit,
-            title=case.name,
-            lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
-            colours=results.preview if results.has_colours else None,
-        )
-        warnings += draw(scene, folder / FILES["picture"])
     found = readings(case.sensors, results.by_light())
+    if "picture" in case.outputs:
+        warnings += draw(_scene(results, found), folder / FILES["picture"])
     if found:
         write_readings(found, unit, folder / READINGS)
     compared = None
@@ -128,12 +130,46 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     return warnings
 
 
+def _write_surface(results: Results, folder: Path) -> None:
+    """The surface with its values, for mesh tools and for VTK."""
+    unit, values = results.case.surface.unit, surface_values(results)
+    notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
+    if results.has_colours:
+        notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"
+    write_ply(results.surface, folder / FILES["surface"], values, list(notes.values()))
+    if results.has_colours:
+        # One array of three bytes is what VTK's viewers can show as a colour.
+        values["preview"] = results.preview[0]
+    write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
+
+
+def _scene(results: Results, readings: list[dict[str, Any]]) -> Scene:
+    """What the picture shows."""
+    case = results.case
+    # A light that is dark in the first channel may be bright in another.
+    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
+    return Scene(
+        points=results.surface.points,
+        triangles=results.surface.faces,
+        exitance=results.exitance(),
+        unit=case.surface.unit,
+        title=case.name,
+        lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
+        colours=results.preview if results.has_colours else None,
+        up=case.up,
+        toward=case.toward,
+        regions=tuple(Shape(one.surface.name, one.surface.points, one.surface.faces) for one in case.regions),
+        detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
+    )
+
+
 def _warnings(results: Results) -> list[str]:
     """Those of all channels; a sentence that holds for some of several channels names them."""
     names, solutions = results.case.channel_names, results.solutions
     told: dict[str, list[str]] = {}
     for name, solution in zip(names, solutions, strict=True):
-        for warning in solution.warnings:
+        # What was mended is said when the case is read.
+        for warning in (each for each in solution.warnings if each not in results.case.repairs):
             told.setdefault(results.case.named(warning), []).append(name)
     return [
         *results.case.region_warnings,

@@ -1,8 +1,8 @@
 """The case file: its keys, their types, and what they are made into."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from tetlux.cases.schema_lights import CameraSpec, DetectorSpec, LightSpec
@@ -55,6 +55,9 @@ class SurfaceSpec(Choice):
     crease_angle: float = Field(
         30.0, ge=0, le=180, description="degrees; triangles that bend less are one smooth surface, 0: all are flat"
     )
+    holes: Literal["small", "close", "refuse"] = Field(
+        "small", description="which holes of a file are closed: small ones, all (close), none (refuse)"
+    )
     sphere: SphereSpec | None = None
     slab: SlabSpec | None = None
     box: BoxSpec | None = None
@@ -65,6 +68,8 @@ class SurfaceSpec(Choice):
     def _scale_of_a_file(self) -> "SurfaceSpec":
         if self.file is None and self.scale != 1.0:
             raise PydanticCustomError("scale", "scale belongs to a file; give the shape its own lengths")
+        if self.file is None and self.holes != "small":
+            raise PydanticCustomError("holes", "holes belongs to a file; built-in shapes are closed")
         return self
 
 
@@ -74,6 +79,22 @@ class RegionSpec(Section):
     name: Label = Field("", description="default: region and number, as in region_1")
     surface: SurfaceSpec
     medium: Media
+
+
+class MeshSpec(Section):
+    """Tetrahedra made elsewhere, with a medium for each of their labels."""
+
+    file: str = Field(description="volume mesh, relative to the case file")
+    scale: Length = Field(1.0, description="factor on the file's coordinates")
+    array: str | None = Field(None, description="the array of the file that holds the labels, if it has several")
+    labels: Annotated[dict[str, Media], Field(min_length=1)] = Field(
+        description="the medium of each label, by its number or name; 0 if there are no labels"
+    )
+
+    @field_validator("labels", mode="before")
+    @classmethod
+    def _numbers_as_words(cls, labels: Any) -> Any:
+        return {str(label): medium for label, medium in labels.items()} if isinstance(labels, dict) else labels
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
@@ -98,8 +119,9 @@ class CaseSpec(Section):
         None, description="names the folder of results; the file's name if not given"
     )
     unit: Literal["nm", "um", "mm", "cm", "m", "in"] = "mm"
-    surface: SurfaceSpec
-    medium: Media
+    surface: SurfaceSpec | None = None
+    medium: Media | None = None
+    mesh: MeshSpec | None = Field(None, description="tetrahedra of your own, in place of surface and medium")
     channels: Annotated[list[Label], Field(min_length=1)] | None = Field(
         None, description="names of the channels, as many as lists in the case have values"
     )
@@ -109,7 +131,10 @@ class CaseSpec(Section):
         0.02, description="wanted relative L2 error of the exitance"
     )
     detectors: list[DetectorSpec] = Field([])
-    camera: CameraSpec | None = Field(None, description="radiance towards it is written with the surface")
+    camera: CameraSpec | None = Field(
+        None, description="from where the picture is taken; chosen by the light if left out"
+    )
+    up: Vector3 = Field((0.0, 0.0, 1.0), description="what is up in the picture")
     outputs: list[Output] = Field(["surface", "volume", "picture"])
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,
@@ -118,3 +143,21 @@ class CaseSpec(Section):
     sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
     )
+
+    @model_validator(mode="after")
+    def _one_body(self) -> "CaseSpec":
+        if self.mesh is None:
+            for name in ("surface", "medium"):
+                if getattr(self, name) is None:
+                    raise PydanticCustomError(
+                        "body", "{name} is missing; a case needs surface and medium, or mesh", {"name": name}
+                    )
+            return self
+        beside = [name for name in ("surface", "medium", "regions", "compare") if getattr(self, name)]
+        if beside:
+            raise PydanticCustomError(
+                "body",
+                "mesh stands in place of surface, medium, regions and compare; leave {beside} out",
+                {"beside": " and ".join(beside)},
+            )
+        return self

@@ -1,6 +1,6 @@
 """The sections of the case file that describe lights, detectors and the camera."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -132,6 +132,23 @@ class DetectorSpec(Choice):
 
 
 class CameraSpec(Section):
-    """From where the surface is seen."""
+    """From where the surface is seen: a place, or a direction by two angles."""
 
-    position: Vector3
+    position: Vector3 | None = Field(
+        None, description="the picture is taken from this side; radiance towards it is written with the surface"
+    )
+    azimuth: Number | None = Field(
+        None, description="of the picture alone: degrees about up, from the x axis anticlockwise seen from above"
+    )
+    elevation: Annotated[float, Field(strict=True, ge=-90, le=90)] | None = Field(
+        None, description="degrees above the horizon, with azimuth; 20 if not given"
+    )
+
+    @model_validator(mode="after")
+    def _place_or_angles(self) -> "CameraSpec":
+        if (self.position is None) == (self.azimuth is None):
+            what = "neither" if self.position is None else "both"
+            raise PydanticCustomError("one_of", "give position or azimuth, not {what}", {"what": what})
+        if self.position is not None and self.elevation is not None:
+            raise PydanticCustomError("one_of", "elevation belongs to azimuth; leave it out beside position", {})
+        return self

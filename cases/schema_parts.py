@@ -1,10 +1,12 @@
 """What sections of the case file are made of: numbers, choices, and values that may differ by channel."""
 
-import difflib
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
+
+from tetlux.cases.nearest import did_you_mean, nearest
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
@@ -52,14 +54,33 @@ class Section(BaseModel):
             return data
         for key in data:
             if key not in cls.model_fields:
-                close = difflib.get_close_matches(str(key), cls.model_fields, n=1)
-                hint = f'did you mean "{close[0]}"? ' if close else ""
+                hint = cls._hint(str(key), data)
                 raise PydanticCustomError(
                     "unknown_key",
                     "unknown key; {hint}the keys here are {known}",
                     {"key": str(key), "hint": hint, "known": ", ".join(cls.model_fields)},
                 )
         return data
+
+    @classmethod
+    def _hint(cls, key: str, data: dict[Any, Any]) -> str:
+        """What an unknown key was probably meant to be, or where it belongs."""
+        homes = [name for name, field in cls.model_fields.items() if key in _keys_within(field.annotation)]
+        # Of several kinds of light, or of shape, the one that is given.
+        homes = [name for name in homes if name in data] or homes
+        if len(homes) == 1:
+            return f'it belongs in "{homes[0]}"; '
+        found = nearest(key, cls.model_fields)
+        meaning = cls.model_fields[found].description if found else None
+        return did_you_mean(key, cls.model_fields, meaning or "")
+
+
+def _keys_within(annotation: Any) -> Iterator[str]:
+    """Keys of the sections that a value may be made of."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield from annotation.model_fields
+    for part in get_args(annotation):
+        yield from _keys_within(part)
 
 
 class Choice(Section):

@@ -2,21 +2,23 @@
 
 import math
 import platform
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from tetlux.cases.case import Channel
+from tetlux.cases.media_rows import media_rows
+from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in
-from tetlux.fem.coefficients import base_of
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
+from tetlux.meshing.libraries import installed_versions
+from tetlux.meshing.tetmesh import TetMesh
 
-LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "pyvista", "trimesh")
+LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
 def summarize(
@@ -26,14 +28,21 @@ def summarize(
     case, mesh = results.case, results.solutions[0].mesh
     several = len(case.light_names) > 1
     channels = [
-        _channel(channel, solution, results.exitance(channel.name), several)
-        for channel, solution in zip(case.channels, results.solutions, strict=True)
+        _channel(
+            channel,
+            solution,
+            results.exitance(channel.name),
+            several,
+            media,
+        )
+        for channel, solution, media in zip(case.channels, results.solutions, media_rows(case, mesh), strict=True)
     ]
     return {
         "case": case.name,
         "unit": case.surface.unit,
         "model": "fem",
         "tolerance": case.tolerance,
+        "as_ran": as_ran(case),
         "mesh": {
             "nodes": len(mesh.points),
             "tetrahedra": len(mesh.tetrahedra),
@@ -41,6 +50,7 @@ def summarize(
             "area": mesh.area,
             "surface_deviation": surface_deviation(mesh, case.surface),
             "min_quality": float(mesh.quality.min()),
+            **({"labels": _labels(case.mesh)} if case.mesh else {}),
         },
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
@@ -48,16 +58,20 @@ def summarize(
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
-        "versions": {"python": platform.python_version(), **{name: version(name) for name in LIBRARIES}},
+        "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
     }
 
 
-def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several: bool) -> dict[str, Any]:
-    medium, estimate = base_of(channel.medium), solution.error_estimate
+def _channel(
+    channel: Channel, solution: Solution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
+) -> dict[str, Any]:
+    estimate = solution.error_estimate
     figures: dict[str, Any] = {
         "name": channel.name,
-        "sigma_tr": medium.sigma_tr,
-        "albedo": medium.albedo,
+        # Those of the body outside of its regions.
+        "sigma_tr": media[0]["sigma_tr"],
+        "albedo": media[0]["albedo"],
+        "media": media,
         "power": _power(solution.power),
         "exitance": {
             "min": float(exitance.min()),
@@ -72,6 +86,12 @@ def _channel(channel: Channel, solution: Solution, exitance: FloatArray, several
         lights = lights_in(list(channel.lights), solution)
         figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
     return figures
+
+
+def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
+    """Labels of a mesh that was given, their names if they have any, and their volumes."""
+    volumes = mesh.region_volumes.items()
+    return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
 
 
 def _power(power: Power) -> dict[str, float]:
@@ -89,7 +109,7 @@ def _validity(validity: Validity) -> dict[str, float]:
     """How far diffusion itself is to be trusted; means and shares are of the surface's area."""
     valid = np.maximum(1.0 - validity.of_facets, 0.0)
     return {
-        "albedo": validity.medium.albedo,
+        "albedo": validity.albedo,
         "least_thickness_in_mean_free_paths": float(validity.thickness.min()),
         "share_thin": validity.mean(validity.thickness < THIN),
         "share_near_light": validity.mean(validity.distances(validity.middles) < NEAR),

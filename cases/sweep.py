@@ -13,11 +13,14 @@ MOST_RUNS = 20_000
 LONGEST_NAME = 255
 
 
-def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str, Any], dict[Key, int]]]:
-    """The case's data once for each point of its sweep's grid, with the label of that point."""
+Run = tuple[str | None, dict[str, float | str], dict[str, Any], dict[Key, int]]
+
+
+def swept(document: Document, spec: CaseSpec) -> list[Run]:
+    """The case's data once for each point of its sweep's grid: label and values of the point, data, lines of keys."""
     if not spec.sweep:
-        return [(None, document.data, {})]
-    runs: list[tuple[str | None, dict[str, Any], dict[Key, int]]] = []
+        return [(None, {}, document.data, {})]
+    runs: list[Run] = []
     for key, listed in spec.sweep.items():
         if len(set(map(repr, listed))) < len(listed):
             raise document.error(("sweep", key), "a value stands here twice; give each once.")
@@ -25,13 +28,14 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
     if count > MOST_RUNS:
         raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
     labels: set[str] = set()
-    for values in itertools.product(*spec.sweep.values()):
+    for point in itertools.product(*spec.sweep.values()):
+        values = dict(zip(spec.sweep, point, strict=True))
         data = copy.deepcopy(document.data)
         del data["sweep"]
         keys: dict[Key, int] = {}
-        for key, value in zip(spec.sweep, values, strict=True):
+        for key, value in values.items():
             keys[_assign(document, data, key, value)] = document.line(("sweep", key)) or 1
-        label = _label(dict(zip(spec.sweep, values, strict=True)))
+        label = _label(values)
         if len(label.encode()) > LONGEST_NAME:
             raise document.error(
                 ("sweep",),
@@ -40,7 +44,7 @@ def swept(document: Document, spec: CaseSpec) -> list[tuple[str | None, dict[str
         if label in labels:
             raise document.error(("sweep",), f'two runs would be written to one folder, "{label}"; change a value.')
         labels.add(label)
-        runs.append((label, data, keys))
+        runs.append((label, values, data, keys))
     return runs
 
 
@@ -56,7 +60,8 @@ def _assign(document: Document, data: dict[str, Any], key: str, value: object) -
     holder: Any = data
     try:
         for part in parts[:-1]:
-            holder = holder[part]
+            # The number of an item of a list, or of a label, which may be written as a word.
+            holder = holder[str(part) if isinstance(holder, dict) and part not in holder else part]
         holder[parts[-1]] = value
     except (KeyError, IndexError, TypeError) as error:
         raise document.error(

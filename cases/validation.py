@@ -1,10 +1,12 @@
 """Whether what a case file says is of the right form, and if not, which key is wrong, in plain words."""
 
+import re
 from typing import Any
 
 from pydantic import ValidationError
 
 from tetlux.cases.document import Document, Key
+from tetlux.cases.nearest import did_you_mean
 from tetlux.cases.schema import CaseSpec
 from tetlux.cases.schema_parts import TAG
 
@@ -22,6 +24,8 @@ PLAIN = {
 }
 # Values that YAML writes in another way than Python.
 PYTHONS = {None: "nothing", True: "true", False: "false"}
+# Sections in place of which people give one word, and how to write that.
+ONE_WORD = {"surface": "surface: {{file: {0}}}", "medium": "medium: {{material: {0}}}"}
 # Lists of numbers that are not of three.
 COUNTS: dict[str | int, str] = {"values": "two"}
 
@@ -42,6 +46,8 @@ def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
         context = first.get("ctx", {})
         if first["type"] == "unknown_key":
             key = (*key, context["key"])
+        if first["type"] == "body":
+            key = () if "name" in context else ("mesh",)
         raise document.error(key, _sentence(first["type"], first["msg"], first.get("input"), key)) from failure
 
 
@@ -59,9 +65,14 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale"):
+    if kind in ("unknown_key", "one_of", "scale", "body"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"
+    hint = ""
+    if kind == "literal_error" and isinstance(given, str):
+        text = did_you_mean(given, re.findall(r"'(.*?)'", message)) + text
+    if isinstance(given, str) and kind.startswith(("model_", "dict_")) and key and key[-1] in ONE_WORD:
+        hint = "; write " + ONE_WORD[str(key[-1])].format(given)
     shown = PYTHONS[given] if given is None or isinstance(given, bool) else repr(given)
-    return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}."
+    return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}{hint}."

@@ -19,10 +19,12 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.coefficients import Coefficients, apart, coefficients_of
-from tetlux.fem.linear import Method, Solver, solver_for
+from tetlux.fem.krylov import Preconditioner
+from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import EDGES, TetMesh
 
 Mass = Literal["lumped", "consistent"]
@@ -65,7 +67,7 @@ class Assembly:
     """
 
     mesh: TetMesh
-    cycles: list[tuple[Coefficients, Method]] = field(default_factory=list)
+    cycles: list[tuple[Coefficients, Preconditioner]] = field(default_factory=list)
 
     def solver(self, coefficients: Coefficients, mass: Mass, loads: int) -> Solver:
         """One for the matrix of given coefficients, prepared with what was prepared for others much like them."""
@@ -167,3 +169,5 @@ class Assembly:
         indices[place], source[place] = transposed.indices, transposed.data
         indices[middle], source[middle] = np.arange(nodes), len(low) + np.arange(nodes)
         return starts.astype(np.int32), indices, source
+
+    __repr__ = one_line

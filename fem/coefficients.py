@@ -1,17 +1,20 @@
 """What the media of a body are on each tetrahedron of a mesh."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from tetlux.fem.medium import Medium
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import TetMesh
 
 AnyMedium = Medium | VaryingMedium
+# Media by the regions or labels of a mesh that they fill: the body's own, or the outermost, first.
+MediaByLabel = Mapping[int, AnyMedium]
 # Barycentric coordinates of the points of a rule that is exact for quadratics, each of the same weight.
 _WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
 
@@ -27,6 +30,8 @@ class Coefficients:
     scattering, cosine : float or (m,) ndarray
         Scattering coefficient (1/unit) and mean cosine with the forward peak taken out, see
         `Medium.delta_eddington`.
+    mean_cosine : float or (m,) ndarray
+        Mean cosine of the scattering angle; nan where sigma_s' alone is given.
     outer : Medium
         The medium whose index and boundary the whole body shares.
     """
@@ -35,6 +40,7 @@ class Coefficients:
     sigma_t_prime: float | FloatArray
     scattering: float | FloatArray
     cosine: float | FloatArray
+    mean_cosine: float | FloatArray
     outer: Medium
 
     @property
@@ -57,11 +63,13 @@ class Coefficients:
         """1/(2A) of the boundary condition."""
         return 0.5 / self.outer.boundary_factor
 
+    __repr__ = one_line
+
 
 def coefficients_of(medium: Medium) -> Coefficients:
     """Coefficients of a body of one medium."""
     scattering, cosine = medium.delta_eddington
-    return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, medium)
+    return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, known_cosine(medium), medium)
 
 
 def apart(one: Coefficients, other: Coefficients) -> float:
@@ -85,57 +93,89 @@ def at_cells(value: float | FloatArray, cells: IntArray) -> FloatArray:
     return np.full(len(cells), value) if np.ndim(value) == 0 else np.asarray(value)[cells]
 
 
-def coefficients_on(mesh: TetMesh, media: Sequence[AnyMedium]) -> Coefficients:
-    """Coefficients of a mesh whose region i is of medium i.
+def by_label(media: MediaByLabel | Sequence[AnyMedium]) -> MediaByLabel:
+    """Media by label: those of a sequence are of the body, and of its regions 1, 2, ..."""
+    return media if isinstance(media, Mapping) else dict(enumerate(media))
+
+
+def coefficients_on(mesh: TetMesh, media: MediaByLabel | Sequence[AnyMedium]) -> Coefficients:
+    """Coefficients of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    media : mapping of int to medium, or sequence of medium
+        By label; of a sequence medium i is that of region i. One medium is that of the whole mesh.
 
     Raises
     ------
     InputError
-        If a coefficient that varies is not known, or not sensible, somewhere on the mesh; or if the mesh has other
-        regions than there are media. One medium is that of the whole mesh.
+        If a coefficient that varies is not known, or not sensible, somewhere on the mesh; or if labels and media do not
+        go together.
     """
-    outer = base_of(media[0])
-    if len(media) == 1 and isinstance(media[0], Medium):
-        return coefficients_of(media[0])
-    regions = mesh.regions if len(media) > 1 else np.zeros_like(mesh.regions)
-    _check_regions(np.bincount(regions, minlength=len(media)), len(media))
-    values = np.empty((4, len(mesh.tetrahedra)))
-    for region, medium in enumerate(media):
-        inside = np.flatnonzero(regions == region)
+    labelled = by_label(media)
+    outer = next(iter(labelled.values()))
+    if len(labelled) == 1 and isinstance(outer, Medium):
+        return coefficients_of(outer)
+    if isinstance(media, Mapping):
+        check_labels(mesh, media)
+    elif len(media) > 1:
+        _check_regions(mesh, len(media))
+    values = np.empty((5, len(mesh.tetrahedra)))
+    for label, medium in labelled.items():
+        inside = np.flatnonzero(mesh.regions == label) if len(labelled) > 1 else np.arange(len(mesh.tetrahedra))
         if isinstance(medium, Medium):
-            values[:, inside] = np.array([medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington])[:, None]
+            found = [medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington, known_cosine(medium)]
+            values[:, inside] = np.array(found)[:, None]
             continue
         # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
         points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
         at = medium.at(points.reshape(-1, 3))
         absorption, reduced = (value.reshape(-1, 4).mean(axis=1) for value in at)
         peaked, forward = medium.delta_eddington(reduced)
-        values[:, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
+        values[:4, inside] = absorption, absorption + reduced, peaked, np.full(len(inside), forward)
+        values[4, inside] = known_cosine(medium.base)
     each: list[FloatArray] = list(values)
-    return Coefficients(each[0], each[1], each[2], each[3], outer)
+    return Coefficients(each[0], each[1], each[2], each[3], each[4], base_of(outer))
 
 
-def _check_regions(sizes: IntArray, media: int) -> None:
-    """Refuse a mesh whose regions, by their numbers of tetrahedra, are not those that media are given for."""
-    if len(sizes) > media:
-        raise InputError(f"the mesh has {len(sizes) - 1} regions, and {media - 1} have a medium; give one for each.")
+def check_labels(mesh: TetMesh, labels: Iterable[int]) -> None:
+    """Refuse labels of a mesh that have no medium, and media of labels that it does not have.
+
+    Raises
+    ------
+    InputError
+    """
+    given = dict.fromkeys(labels)
+    without = [label for label in mesh.region_volumes if label not in given]
+    if without:
+        several = len(without) > 1
+        raise InputError(
+            f"the mesh's {'labels' if several else 'label'} {mesh.named(without)} {'have' if several else 'has'} no "
+            "medium; give one for each."
+        )
+    none = [label for label in given if label not in mesh.region_volumes]
+    if none:
+        raise InputError(
+            f"the mesh has no label {' and '.join(map(str, none))}; its labels are {mesh.named(mesh.region_volumes)}."
+        )
+
+
+def _check_regions(mesh: TetMesh, media: int) -> None:
+    """Refuse a mesh whose regions are not those that media are given for."""
+    most = max(mesh.region_volumes)
+    if most >= media:
+        raise InputError(f"the mesh has {most} regions, and {media - 1} have a medium; give one for each.")
     for region in range(1, media):
-        if sizes[region] == 0:
+        if region not in mesh.region_volumes:
             raise InputError(f"the mesh has no region {region}; make one that has, or leave the region out.")
 
 
-def at_surface(medium: AnyMedium, mesh: TetMesh, coefficients: Coefficients) -> Medium:
-    """One medium for what is under the surface: the body's own, or the mean of one that varies."""
-    if isinstance(medium, Medium):
-        return medium
-    cells, areas = mesh.boundary_cells, mesh.boundary_areas / mesh.area
-    sigma_a, total = (float(areas @ at_cells(v, cells)) for v in (coefficients.sigma_a, coefficients.sigma_t_prime))
-    base, scattering = medium.base, total - sigma_a
-    if base.sigma_s is None:
-        return replace(base, sigma_a=sigma_a, sigma_s_prime=scattering)
-    return replace(base, sigma_a=sigma_a, sigma_s=base.sigma_s * scattering / base.reduced_scattering)
+def known_cosine(medium: Medium) -> float:
+    """Mean cosine of a medium's scattering angle, nan if sigma_s' alone is given."""
+    return medium.mean_cosine if medium.sigma_s is not None else np.nan
 
 
 def base_of(medium: AnyMedium) -> Medium:
-    """The medium itself, or what stands for one that varies."""
+    """The medium itself, or that of the index, the boundary and the shape of scattering of one that varies."""
     return medium if isinstance(medium, Medium) else medium.base

@@ -46,6 +46,7 @@ from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.blocks import at_once
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
@@ -88,6 +89,8 @@ class Estimate:
     def error(self) -> float:
         """Relative L2 error of the exitance over the surface."""
         return float(self.shares.sum())
+
+    __repr__ = one_line
 
 
 def estimated(
@@ -135,7 +138,7 @@ def estimated(
     robin = coefficients.escape
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / size**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
-    duals = solver.roughly(loads)
+    duals = solver.roughly(loads).x
 
     diffusion, kept = coefficients.diffusion, 1.0
     if fitting is not None:
@@ -192,7 +195,8 @@ def _averaging(mesh: TetMesh) -> Callable[[FloatArray], FloatArray]:
     """
     groups = mesh.tetrahedra
     if mesh.regions.any():
-        keys = groups * (int(mesh.regions.max()) + 1) + mesh.regions[:, None]
+        first = int(mesh.regions.min())
+        keys = groups * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
         groups = np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
     starts = np.arange(0, groups.size + 1, 4)
     shape = (int(groups.max()) + 1, len(groups))

@@ -9,6 +9,7 @@ from scipy.ndimage import map_coordinates
 
 from tetlux.fem.varying import Field, as_text
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -36,6 +37,8 @@ class _Grid:
             )
         # "nearest" is what holds in the outer half of the outermost voxels.
         return np.asarray(map_coordinates(self.values, place.T, output=np.float64, order=1, mode="nearest"))
+
+    __repr__ = one_line
 
 
 def grid_field(values: npt.ArrayLike, *, origin: Vector, spacing: float | Vector) -> Field:
@@ -101,6 +104,8 @@ class _OnMesh:
         weights = weights.clip(0.0)
         weights /= weights.sum(axis=1, keepdims=True)
         return np.asarray((weights * self.values[self.mesh.tetrahedra[cells]]).sum(axis=1))
+
+    __repr__ = one_line
 
 
 def mesh_field(mesh: TetMesh, values: npt.ArrayLike, *, at: Literal["nodes", "tetrahedra"] = "nodes") -> Field:

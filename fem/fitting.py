@@ -21,6 +21,7 @@ import numpy as np
 
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import TetMesh
 
 # Below this k h the elements' own coefficients are as good: the exitance's error on balls is the same from .4 down.
@@ -46,6 +47,8 @@ class Fitting:
     diffusion: FloatArray
     kept: FloatArray
     across: FloatArray
+
+    __repr__ = one_line
 
 
 def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> Fitting | None:

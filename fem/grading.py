@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.refine import refine
@@ -16,21 +15,13 @@ from tetlux.meshing.tetmesh import TetMesh
 # Edges on the first mesh are no longer than this times the distance from the light, or times what resolves it
 # where they are at it. Its error then is some per cent, and its estimate good to a factor of three.
 LONGEST = 1.0
-# A line is as good as points this many resolutions apart, and as long as a beam that holds a thousandth.
-SPACING, FADED = 0.5, 7.0
 
 
-def lit_points(deposits: list[Deposit], medium: Medium) -> tuple[FloatArray, FloatArray]:
-    """Points where light is deposited (s, 3), lines as rows of points, and the length to resolve at each (s,)."""
-    extinction = medium.sigma_a + medium.delta_eddington[0]
+def lit_points(deposits: list[Deposit]) -> tuple[FloatArray, FloatArray]:
+    """Points where light is deposited, or is lit (s, 3), and the length to resolve at each (s,)."""
     found, resolutions = [np.zeros((0, 3))], [np.zeros(0)]
     for deposit in deposits:
-        rows = [deposit.points, deposit.lit]
-        for start, direction, length in zip(deposit.starts, deposit.directions, deposit.lengths, strict=True):
-            reach = min(float(length), FADED / extinction)
-            count = max(2, int(reach / (SPACING * deposit.resolution)) + 1)
-            rows.append(start + np.linspace(0.0, reach, count)[:, None] * direction)
-        points = np.vstack(rows)
+        points = np.vstack([deposit.points, deposit.lit])
         found.append(points)
         resolutions.append(np.full(len(points), deposit.resolution))
     places, finest = np.vstack(found), np.concatenate(resolutions)

@@ -92,6 +92,7 @@ def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
         directions=deposit.directions[:0],
         lengths=deposit.lengths[:0],
         fluxes=deposit.fluxes[:0],
+        lit=deposit.lit[:0],  # the points stand there
         resolution=medium.mean_free_path,
     )
     faint_parts = reaches < deposit.lengths
@@ -103,6 +104,7 @@ def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
         directions=deposit.directions[faint_parts],
         lengths=(deposit.lengths - reaches)[faint_parts],
         fluxes=left[faint_parts],
+        lit=deposit.lit[:0],
         cells=None,
     )
     return bright, faint

@@ -8,23 +8,15 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from tetlux.fem.coefficients import Coefficients, at_cells
+from tetlux.fem.facet_media import LocalMedia, media_in, media_under_facets
 from tetlux.fem.lights.collimated import CollimatedBeam
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.pencil import PencilBeam
-from tetlux.fem.medium import Medium
-from tetlux.fem.validity_tables import (
-    FADED,
-    NearRow,
-    Spread,
-    far_error,
-    near_error,
-    near_row,
-    thin_error,
-    wide_error,
-)
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.fem.validity_tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tetmesh import TetMesh
-from tetlux.meshing.thickness import thickness
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,22 +24,23 @@ class Validity:
     """What is to be expected of the diffusion approximation on the surface of a body.
 
     It follows from coefficients, geometry and light alone: the relative error of the exitance by each of several
-    causes, as Monte Carlo has them (`tetlux.fem.validity_tables`), of which the largest counts. They are of one medium
-    throughout; regions are not looked at.
+    causes, as Monte Carlo has them (`tetlux.fem.validity_tables`), of which the largest counts. They were found in one
+    medium throughout; in a body of several each facet has that of the media below it (`tetlux.fem.facet_media`), and
+    what is near a light that of the place where the light enters.
 
     Parameters
     ----------
     mesh : TetMesh
         Its boundary is looked at.
-    medium : Medium
-        Of the body.
+    coefficients : Coefficients
+        Of its tetrahedra.
     lights : sequence of Light
     deposits : sequence of Deposit
         What each of them leaves in the body.
     """
 
     mesh: TetMesh
-    medium: Medium
+    coefficients: Coefficients
     lights: Sequence[Light]
     deposits: Sequence[Deposit]
 
@@ -58,12 +51,13 @@ class Validity:
 
     def errors(self, points: FloatArray, facets: IntArray) -> FloatArray:
         """Expected relative errors of the exitance at points (q, 3) of given facets of the boundary (q,), (q,)."""
-        causes = [np.full(len(points), wide_error(self.medium)), self.thin_errors[facets]]
-        causes += [far_error(self.medium, self.distances(points)), self.near_errors(points)]
+        below = self.below[facets]
+        causes = [wide_error(below.albedo, self.coefficients.outer.eta), self.thin_errors[facets]]
+        causes += [self.far_errors(points, facets), self.near_errors(points)]
         return np.asarray(np.max(causes, axis=0))
 
     def distances(self, points: FloatArray) -> FloatArray:
-        """How far points (q, 3) are from where light enters, or from a source, (q,), mean free paths.
+        """How far points (q, 3) are from where light enters, or from a source, (q,), mean free paths of that place.
 
         They are 0 where there is light from everywhere, diffuse or emitted.
         """
@@ -73,16 +67,54 @@ class Validity:
         """Expected errors of the exitance at points (q, 3) that come of being near a light, (q,)."""
         return np.asarray(np.max([entry.errors(points) for entry in self._entries], axis=0))
 
+    def far_errors(self, points: FloatArray, facets: IntArray) -> FloatArray:
+        """Expected errors of the exitance at points (q, 3) of given facets (q,) that come of being far from light."""
+        below = self.below[facets]
+        lengths = np.min([entry.lengths(points) for entry in self._entries], axis=0)
+        return far_error(below.albedo, lengths / below.mean_free_path)
+
+    def unknown_cosine(self, points: FloatArray) -> BoolArray:
+        """Whether the mean cosine of scattering is not known where the light nearest to points (q, 3) enters, (q,)."""
+        lengths = np.array([entry.distances(points) for entry in self._entries])
+        unknown = np.array([entry.unknown(points) for entry in self._entries])
+        return np.asarray(np.take_along_axis(unknown, lengths.argmin(axis=0)[None], axis=0)[0])
+
     @cached_property
+    def _under(self) -> tuple[LocalMedia, FloatArray]:
+        return media_under_facets(self.mesh, self.coefficients)
+
+    @property
+    def below(self) -> LocalMedia:
+        """The media below each facet of the boundary."""
+        return self._under[0]
+
+    @property
     def thickness(self) -> FloatArray:
         """How thick the body is under each facet of the boundary, (f,), mean free paths."""
-        of_mesh = self.mesh.remembered(thickness, lambda: thickness(self.mesh))
-        return of_mesh / self.medium.mean_free_path
+        return self._under[1]
+
+    @cached_property
+    def mean_chord(self) -> float:
+        """Mean of the optical depth sigma_t' along straight ways through the body, ``4 ∫ sigma_t' dV / S`` (Cauchy)."""
+        mesh, total = self.mesh, self.coefficients.sigma_t_prime
+        return float(4.0 * np.sum(total * mesh.volumes) / mesh.area)
+
+    @property
+    def albedo(self) -> float:
+        """Mean reduced albedo of what is below the surface."""
+        return self.mean(self.below.albedo)
+
+    @property
+    def steepest(self) -> float:
+        """Largest sigma_tr at the surface, 1/unit."""
+        cells = self.mesh.boundary_cells
+        sigma_a, total = (at_cells(v, cells) for v in (self.coefficients.sigma_a, self.coefficients.sigma_t_prime))
+        return float(np.sqrt(3.0 * sigma_a * total).max())
 
     @cached_property
     def thin_errors(self) -> FloatArray:
         """Expected errors that come of the body's thickness under each facet of the boundary, (f,)."""
-        errors = [thin_error(self.medium, self.thickness, entry.spread) for entry in self._entries]
+        errors = [thin_error(self.below.cosine, self.thickness, entry.spread) for entry in self._entries]
         return np.asarray(np.max(errors, axis=0))
 
     @cached_property
@@ -101,8 +133,29 @@ class Validity:
 
     @cached_property
     def _entries(self) -> "list[_Entry]":
-        lights = zip(self.lights, self.deposits, strict=True)
-        return [_entry_of(light, deposit, self.medium) for light, deposit in lights]
+        return [self._entry_of(*each) for each in zip(self.lights, self.deposits, strict=True)]
+
+    def _entry_of(self, light: Light, deposit: Deposit) -> "_Entry":
+        sources = len(deposit.entries) == 0
+        places = deposit.points if sources else deposit.entries
+        if len(places) == 0:
+            return _Entry(None, self.below[np.zeros(0, dtype=np.int64)], np.inf, np.zeros((0, 6)))
+        if sources:
+            cells, _ = self.mesh.locate(places)
+            _, facets, _ = self.mesh.closest_boundary(places)
+            media = media_in(self.coefficients, np.where(cells >= 0, cells, self.mesh.boundary_cells[facets]))
+        else:
+            media = self.below[self.mesh.closest_boundary(places)[1]]
+        # The deposit of a thin beam in one point is at fault itself where scattering is isotropic; a line is as good
+        # there as either is where scattering is forward.
+        in_a_point = isinstance(light, PencilBeam) and light.deposit == "point"
+        rows = near_rows(media.albedo, None if sources else media.cosine if in_a_point else np.ones(len(places)))
+        breadth = np.inf
+        if not isinstance(light, CollimatedBeam) or light.spot is not None:
+            breadth = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
+        return _Entry(cKDTree(places), media, breadth, rows, in_a_point and not sources)
+
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,53 +165,52 @@ class _Entry:
     Attributes
     ----------
     places : cKDTree, optional
-        In mean free paths; light from everywhere has none.
-    unit : float
-        The mean free path.
+        Light from everywhere has none.
+    media : LocalMedia
+        At each of them.
     breadth : float
-        Radius of an even disc that spreads as much, mean free paths.
-    near : NearRow
-        Errors by distance.
+        Radius of an even disc that spreads as much, unit.
+    near : (p, 6) ndarray
+        Errors by distance from each place.
+    by_cosine : bool
+        Whether these errors depend on the mean cosine of scattering.
     """
 
     places: cKDTree | None
-    unit: float
+    media: LocalMedia
     breadth: float
-    near: NearRow
+    near: FloatArray
+    by_cosine: bool = False
 
     @property
     def spread(self) -> Spread:
         """Over what it spreads."""
         if self.places is None:
             return "everywhere"
-        return "wide" if self.breadth >= FADED else "narrow"
+        return "wide" if self.breadth >= FADED * self.media.mean_free_path.mean() else "narrow"
+
+    def lengths(self, points: FloatArray) -> FloatArray:
+        """Distances of points (q, 3) from it, (q,), unit."""
+        return np.zeros(len(points)) if self.places is None else np.asarray(self.places.query(points)[0])
 
     def distances(self, points: FloatArray) -> FloatArray:
-        """Distances of points (q, 3) from it, (q,), mean free paths."""
+        """The same in mean free paths of where it enters."""
         if self.places is None:
             return np.zeros(len(points))
-        return np.asarray(self.places.query(points / self.unit)[0])
+        lengths, nearest = self.places.query(points)
+        return np.asarray(lengths / self.media.mean_free_path[nearest])
+
+    def unknown(self, points: FloatArray) -> BoolArray:
+        """Whether errors near it depend on a mean cosine that is not known, at points (q, 3), (q,)."""
+        if self.places is None or not self.by_cosine:
+            return np.zeros(len(points), dtype=bool)
+        return np.asarray(self.media.assumed[self.places.query(points)[1]])
 
     def errors(self, points: FloatArray) -> FloatArray:
         """Errors at points (q, 3) that come of being near it, (q,)."""
-        if self.spread != "narrow":
+        if self.places is None or self.spread != "narrow":
             return np.zeros(len(points))
         # Within a wide beam the errors of its thin ones cancel more and more, as they are of either sign: see the last
         # table of `tests.tables.validity`. The rim of a beam wider than that is not seen.
-        return near_error(self.near, np.hypot(self.distances(points), self.breadth))
-
-
-def _entry_of(light: Light, deposit: Deposit, medium: Medium) -> _Entry:
-    unit = medium.mean_free_path
-    sources = len(deposit.entries) == 0
-    places = deposit.points if sources else deposit.entries
-    # The deposit of a thin beam in one point is at fault itself where scattering is isotropic; a line is as good there
-    # as either is where scattering is forward.
-    in_a_point = isinstance(light, PencilBeam) and light.deposit == "point"
-    near = near_row(medium, None if sources else medium.mean_cosine if in_a_point else 1.0)
-    if len(places) == 0:
-        return _Entry(None, unit, np.inf, near)
-    breadth = np.inf
-    if not isinstance(light, CollimatedBeam) or light.spot is not None:
-        breadth = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean())) / unit
-    return _Entry(cKDTree(places / unit), unit, breadth, near)
+        lengths, nearest = self.places.query(points)
+        return near_error(self.near[nearest], np.hypot(lengths, self.breadth) / self.media.mean_free_path[nearest])

@@ -7,6 +7,7 @@ from typing import Literal
 
 from tetlux.fem.fresnel import boundary_factor_classic, boundary_factor_exact
 from tetlux.fem.phase import PhaseFunction
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 Boundary = Literal["exact", "classic"]
@@ -162,3 +163,5 @@ class Medium:
         second = g**2 if self.phase is None else self.phase.second_moment
         peak = min(max(second, 0.0), max(g, 0.0))
         return self.sigma_s * (1.0 - peak), (g - peak) / (1.0 - peak)
+
+    __repr__ = one_line

@@ -12,6 +12,7 @@ from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import Stretches
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.march import march
 from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.surface import triangle_areas
@@ -53,6 +54,8 @@ class Rays:
 
     def __getitem__(self, some: BoolArray) -> "Rays":
         return Rays(self.starts[some], self.directions[some], self.powers[some], self.cells[some])
+
+    __repr__ = one_line
 
 
 def joined(parts: list[Rays]) -> Rays:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 # How far a table's integral over all directions may be off 1.
@@ -97,6 +98,8 @@ class Table:
         """Scattered share per solid angle, 1/sr, at cosines (...) of the scattering angle."""
         angle = np.arccos(np.clip(np.asarray(cosine, dtype=float), -1.0, 1.0))
         return np.asarray(np.interp(angle, self.angles, self.values))
+
+    __repr__ = one_line
 
 
 def henyey_greenstein(g: float) -> Lobes:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tetlux.fem.coefficients import AnyMedium
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -22,6 +23,25 @@ class Region:
 
     surface: Surface
     medium: AnyMedium | Sequence[AnyMedium]
+
+    __repr__ = one_line
+
+
+def check_list_of_regions(regions: Sequence[Region]) -> None:
+    """Refuse what is no list of regions.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(regions, Sequence):
+        raise InputError(f"regions are given in a list, and {type(regions).__name__} is none; write [Region(...)].")
+    for region in regions:
+        if not isinstance(region, Region):
+            raise InputError(
+                f"a {type(region).__name__} is given where a region is wanted; write Region(surface, medium), with the "
+                "closed surface that bounds it."
+            )
 
 
 def only_medium(region: Region) -> AnyMedium:

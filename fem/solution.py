@@ -11,6 +11,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -77,7 +78,7 @@ class Solution:
     validity : Validity, optional
         How far the diffusion approximation itself is to be trusted; of all lights together.
     residual : float
-        Largest relative residual of the linear systems on this mesh, computed from their solutions.
+        Largest relative residual of the linear systems on `mesh`, computed anew from their solutions.
     iterations : int
         Most iterations that one of them took; 0 if all were solved directly.
     """
@@ -95,7 +96,7 @@ class Solution:
     moved: float = 0.0
     of_lights: "tuple[Solution, ...]" = ()
     validity: Validity | None = None
-    residual: float = np.nan
+    residual: float = 0.0
     iterations: int = 0
 
     @cached_property
@@ -215,6 +216,21 @@ class Solution:
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
         return fluence
+
+    def __repr__(self) -> str:
+        low, high = self.exitance.min(), self.exitance.max()
+        facts = [
+            count(len(self.mesh.points), "node"),
+            f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",
+            f"{self.power.exited:.4g} of {self.power.incident:.4g} W exited",
+        ]
+        if np.isfinite(self.error_estimate):
+            facts.append(f"estimated error {self.error_estimate:.2%}")
+        if self.of_lights:
+            facts.append(count(len(self.of_lights), "light"))
+        if self.warnings:
+            facts.append(count(len(self.warnings), "warning"))
+        return f"Solution({', '.join(facts)})"
 
 
 def added(parts: Sequence[Solution]) -> Solution:

@@ -1,32 +1,32 @@
 """From a body, a medium and lights to a `Solution`: mesh, solve, estimate, refine."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from threading import Timer
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.region import Region
+from tetlux.fem.scene import Scene, channels_of, scene_of
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import Step, System
-from tetlux.fem.validity import check_media, warnings_for, warnings_for_regions
+from tetlux.fem.system import Step
+from tetlux.fem.validity import warnings_for
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.notes import Note
 from tetlux.meshing.refine import refine
-from tetlux.meshing.regions import check_regions, region_at
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -51,9 +51,9 @@ SLOW = 8.0
 
 
 @overload
-def solve(
+def solve(  # type: ignore[overload-overlap]  # a list of channels may be among media by label
     body: Surface | TetMesh,
-    medium: AnyMedium,
+    medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -71,7 +71,7 @@ def solve(
 @overload
 def solve(
     body: Surface | TetMesh,
-    medium: Sequence[AnyMedium],
+    medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
@@ -88,7 +88,7 @@ def solve(
 
 def solve(
     body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
@@ -104,14 +104,15 @@ def solve(
     """Solve for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
-    tolerance; a `TetMesh` is used as it is.
+    tolerance; a `TetMesh` is used as it is, with a medium for each label of its tetrahedra if it has several.
 
     Parameters
     ----------
     body : Surface or TetMesh
-    medium : Medium, VaryingMedium, or sequence of these
-        Of the body. Several are channels (wavelengths, or red, green and blue): all are solved on one mesh that is
-        fine enough for every one of them.
+    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
+        Of the body, or of each label of a mesh, by its number or name. Several are channels (wavelengths, or red, green
+        and blue): all are solved on one mesh that is fine enough for every one of them. The media of a label may be a
+        list of channels too.
     lights : sequence of Light
         At least one; they add up.
     regions : sequence of Region
@@ -138,7 +139,7 @@ def solve(
     Returns
     -------
     Solution or list of Solution
-        One for each channel, if `medium` is a sequence.
+        One for each channel, if `medium` is a sequence, or one of its labels has a sequence.
 
     Raises
     ------
@@ -153,7 +154,7 @@ def solve(
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """
-    channels = [medium] if isinstance(medium, AnyMedium) else list(medium)
+    channels, several = channels_of(body, mesh, medium)
     solutions = solve_each(
         body,
         channels,
@@ -168,12 +169,12 @@ def solve(
         cache=cache,
         report=report,
     )
-    return solutions[0] if isinstance(medium, AnyMedium) else solutions
+    return solutions if several else solutions[0]
 
 
 def solve_each(
     body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
@@ -192,7 +193,7 @@ def solve_each(
     ----------
     body, regions, tolerance, mesh, mass, subtract, limit, most_tetrahedra, cache, report
         As in `solve`.
-    medium : Medium, VaryingMedium, or sequence of these
+    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
         That of all scenes, or of each.
     scenes : sequence of sequences of Light
         The lights of one scene add up; each scene has a solution of its own.
@@ -221,20 +222,12 @@ def solve_each(
         mesh = body
     watch = Stopwatch()
     with watch.stage("surface"):
-        surface = body.surface if isinstance(body, TetMesh) else body
-        inner = tuple(region.surface for region in regions)
-        media = media_of(medium, regions, len(scenes))
-        if mesh is None:
-            check_regions(surface, inner)
-        else:
-            _check_mesh(mesh, surface, len(inner))
-        for each in dict.fromkeys(media):
-            check_media(surface, each)
+        scene = scene_of(body, mesh, medium, regions, len(scenes))
+        surface, inner, media = scene.surface, scene.inner, scene.media
         sources = [
-            sources_of(lights, surface, each, subtract, partial(region_at, regions=inner))
-            for lights, each in zip(scenes, media, strict=True)
+            sources_of(lights, its_body, subtract) for lights, its_body in zip(scenes, scene.bodies, strict=True)
         ]
-    work = _Work(surface, inner, media, sources, mass, limit, watch)
+    work = _Work(scene, sources, mass, limit, watch)
     given = mesh is not None
     size = len(set(media)), sum(map(len, scenes))
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *size)
@@ -242,18 +235,16 @@ def solve_each(
         with watch.stage("mesh"):
             with _told_if_slow(report):
                 mesh = tetrahedralize(surface, inner, cache=cache)
-            lit = lit_points([deposit for each in sources for deposit in each.deposits], base_of(media[0][0]))
+            lit = lit_points([deposit for each in sources for deposit in each.deposits])
             mesh = graded_towards(mesh, surface, *lit, most_tetrahedra, inner=inner)
         report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     check_memory(len(mesh.tetrahedra), *size)
     steps = _refined(mesh, work, tolerance, 0 if given else most_tetrahedra, report)
-    if given:
-        where = "on the mesh given"
     found = []
-    for scene, step in sorted(steps.items()):
-        warnings = _warnings(step.solution, sources[scene], tolerance, where)
-        warnings += warnings_for_regions(inner, media[scene])
-        found.append(replace(step.solution, warnings=warnings))
+    for number, step in sorted(steps.items()):
+        warnings = _warnings(step.solution, sources[number], tolerance, "on the mesh given" if given else where)
+        warnings += scene.warnings(number, step.solution, given=given)
+        found.append(replace(step.solution, warnings=list(dict.fromkeys(warnings))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
 
@@ -273,24 +264,26 @@ def _told_if_slow(report: Callable[[str], None]) -> Iterator[None]:
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What is solved for: a body, and the media and lights of each scene."""
+    """What is solved for: a body, the media and lights of each scene, and how."""
 
-    surface: Surface
-    inner: tuple[Surface, ...]
-    media: list[tuple[AnyMedium, ...]]
+    scene: Scene
     sources: list[Sources]
     mass: Mass
     limit: bool
     watch: Stopwatch
 
+    @property
+    def media(self) -> list[tuple[AnyMedium, ...]]:
+        """The media of each scene."""
+        return self.scene.media
+
     def solver_on(self, mesh: TetMesh) -> Callable[[int, Step | None], Step]:
         """What solves for one scene on a mesh, given its solution on the mesh before; scenes share what they can."""
         assembly = Assembly(mesh)
-        systems = {}
-        for media in dict.fromkeys(self.media):
-            regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
-            expected = self.media.count(media)
-            systems[media] = System(mesh, media[0], self.surface, self.mass, expected, regions, assembly, self.limit)
+        systems = {
+            media: self.scene.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            for media in dict.fromkeys(self.media)
+        }
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
@@ -299,7 +292,8 @@ def _refined(
 ) -> dict[int, Step]:
     """Solutions of all scenes on one mesh, refined until it is fine enough or has as many tetrahedra as it may."""
     # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
-    order = sorted(range(len(work.media)), key=lambda scene: base_of(work.media[scene][0]).mean_free_path)
+    bodies = work.scene.bodies
+    order = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     first, *pending = order
     solve_on = work.solver_on(mesh)
     steps = best = {first: solve_on(first, None)}
@@ -313,7 +307,7 @@ def _refined(
         fine_enough = not marked.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with work.watch.stage("mesh"):
-                finer = refine(mesh, marked, work.surface, work.inner)
+                finer = refine(mesh, marked, work.scene.surface, work.scene.inner)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, work.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
@@ -323,38 +317,6 @@ def _refined(
             return steps if fine_enough else best
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf
-
-
-def _check_mesh(mesh: TetMesh, surface: Surface, regions: int) -> None:
-    """Refuse a mesh that is not of this body."""
-    if mesh.unit != surface.unit:
-        raise InputError(f"the mesh is in {mesh.unit} and the surface in {surface.unit}; give both in one unit.")
-    have = int(mesh.regions.max(initial=0))
-    if have != regions:
-        raise InputError(f"the mesh has {have} regions and {regions} are given; give those that it was made of.")
-
-
-def media_of(
-    medium: AnyMedium | Sequence[AnyMedium], regions: Sequence[Region], scenes: int
-) -> list[tuple[AnyMedium, ...]]:
-    """The media of the body and its regions in each scene.
-
-    Raises
-    ------
-    InputError
-        If there are not as many media as scenes, or their refractive indices differ within a body.
-    """
-
-    def of_scenes(given: AnyMedium | Sequence[AnyMedium], whose: str) -> list[AnyMedium]:
-        if isinstance(given, AnyMedium):
-            return [given] * scenes
-        if len(given) != scenes:
-            raise InputError(f"{whose} has {len(given)} media for {scenes} channels; give one, or one for each.")
-        return list(given)
-
-    columns = [of_scenes(medium, "the body")]
-    columns += [of_scenes(region.medium, f"region {number}") for number, region in enumerate(regions, 1)]
-    return list(zip(*columns, strict=True))
 
 
 def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
@@ -375,10 +337,9 @@ def _to_split(steps: list[Step], tolerance: float) -> BoolArray:
 
 def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
     """What a user should know of a solution, and where refinement stopped."""
-    warnings, medium = list(solution.surface.warnings), solution.medium
+    warnings = list(solution.surface.warnings)
     if solution.validity is not None:
         warnings += warnings_for(solution.surface, solution.validity)
-        medium = solution.validity.medium
     warnings += [*sources.warnings, *solution.warnings]
     if not solution.error_estimate <= tolerance:
         warnings.append(
@@ -443,11 +404,12 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str
     warnings += _shallow(solution)
     brightest = float(np.max(solution.transmitted_irradiance))
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
+        shallowest = 1.0 / solution.validity.steepest if solution.validity else np.nan
         warnings.append(
             Note(
                 "exitance-negative",
                 "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-                f"{1 / medium.sigma_tr:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+                f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
                 "medium absorbs so much that light does not diffuse in it; do not rely on what leaves.",
             )
         )

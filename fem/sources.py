@@ -1,17 +1,17 @@
 """What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.coefficients import AnyMedium, base_of
+from tetlux.fem.body import Body
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 
@@ -51,25 +51,21 @@ class Sources:
         """Whether the equation itself may have a fluence below zero: that of a source of a first moment may."""
         return any(charges.dips for charges in self.charges)
 
+    __repr__ = one_line
+
 
 def sources_of(
     lights: Sequence[Light],
-    surface: Surface,
-    media: Sequence[AnyMedium],
+    body: Body,
     subtract: Subtract,
-    region_of: Callable[[FloatArray], IntArray] | None = None,
 ) -> Sources:
     """Let lights fall into a body.
 
     Parameters
     ----------
     lights : sequence of Light
-    surface : Surface
-    media : sequence of Medium or VaryingMedium
-        Of the body, and of its regions.
+    body : Body
     subtract : {"half-space", "free-space", "nothing"}
-    region_of : callable, optional
-        The regions that points lie in, if there are several.
 
     Raises
     ------
@@ -81,7 +77,6 @@ def sources_of(
     check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-    uniform = len(media) == 1 and isinstance(media[0], Medium)
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
@@ -89,9 +84,13 @@ def sources_of(
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract == "half-space"
     for number, light in enumerate(lights):
-        deposit = light.deposit_in(surface, base_of(media[0]), uniform=uniform)
-        find = _charges_in_one_medium if uniform else _charges_in_several
-        known, rest, found = find(deposit, surface, media, region_of, images=images, most=left)
+        deposit = light.deposit_in(body)
+        if body.only_medium is not None:
+            known, rest, found = _charges_in_one_medium(
+                deposit, body.surface, body.only_medium, images=images, most=left
+            )
+        else:
+            known, rest, found = _charges_in_several(deposit, body, images=images, most=left)
         left -= sum(len(some.positions) for some in found)
         charges += found
         owners += [number] * len(found)
@@ -117,14 +116,10 @@ def check_list(lights: Sequence[Light]) -> None:
             raise InputError(f"{light!r} is no light; give lights such as PencilBeam or DiffuseLight.")
 
 
-_RegionOf = Callable[[FloatArray], IntArray] | None
-
-
 def _charges_in_one_medium(
-    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], _: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
-    medium = base_of(media[0])
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
     if len(deposit.starts):
@@ -138,20 +133,27 @@ def _charges_in_one_medium(
 
 
 def _charges_in_several(
-    deposit: Deposit, surface: Surface, media: Sequence[AnyMedium], region_of: _RegionOf, *, images: bool, most: int
+    deposit: Deposit, body: Body, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
-    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh."""
-    places = np.zeros(len(deposit.points), dtype=np.int64) if region_of is None else region_of(deposit.points)
+    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh.
+
+    What is subtracted solves the equation of the region's medium and no other, so it ends where the region does. Images
+    serve where that region is also what bounds the body nearest to the source.
+    """
+    if len(deposit.points) == 0:
+        return deposit, deposit, []
+    places = body.region_at(deposit.points)
+    outermost = body.region_at(body.just_inside(deposit.points)) == places
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
-        medium, inside = media[region], places == region
+        medium, inside = body.by_label[region], places == region
         if isinstance(medium, Medium) and most > 0:
             some = charges_of(
                 deposit.points[inside],
                 deposit.powers[inside],
-                surface,
+                body.surface,
                 medium,
-                images=images and region == 0,
+                images=images & outermost[inside],
                 most=most,
                 region=region,
             )

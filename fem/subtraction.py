@@ -30,6 +30,7 @@ from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.march import march
 from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.subdivide import quartered
@@ -129,6 +130,8 @@ class Charges:
         in_blocks(work, len(points), max(1, PAIRS // len(charges)))
         return fluence
 
+    __repr__ = one_line
+
 
 def charges_of(
     points: FloatArray,
@@ -136,7 +139,7 @@ def charges_of(
     surface: Surface,
     medium: Medium,
     *,
-    images: bool,
+    images: bool | BoolArray,
     most: int = MOST_CHARGES,
     region: int | None = None,
 ) -> Charges | None:
@@ -150,8 +153,8 @@ def charges_of(
         W.
     surface : Surface
     medium : Medium
-    images : bool
-        Without them it is the sources in free space.
+    images : bool or (s,) ndarray of bool
+        Of which sources there are images; without them it is the sources in free space.
     most : int
         How many charges can be afforded.
     region : int, optional
@@ -165,19 +168,20 @@ def charges_of(
     positions, strengths, count = [points], [powers], len(points)
     feet, normals = surface.project(points)
     depths = np.linalg.norm(feet - points, axis=1)
-    for foot, normal, depth, power in zip(feet, normals, depths.tolist(), powers.tolist(), strict=True):
+    mirrored = np.broadcast_to(images, len(points)) & (depths > 0)
+    for i in np.flatnonzero(mirrored).tolist():
         if count > most:
             return None
-        if images and depth > 0:
-            heights, weights = _image_line(depth, medium.extrapolation_length)
-            line = foot + heights[:, None] * normal
-            clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
-            clear &= ~surface.contains(line)
-            # Beyond the first charge that comes too close to the body again there may be more of it.
-            clear = np.logical_and.accumulate(clear)
-            positions.append(line[clear])
-            strengths.append(power * weights[clear])
-            count += int(clear.sum())
+        foot, normal, depth, power = feet[i], normals[i], float(depths[i]), float(powers[i])
+        heights, weights = _image_line(depth, medium.extrapolation_length)
+        line = foot + heights[:, None] * normal
+        clear = np.linalg.norm(surface.closest(line)[0] - line, axis=1) >= CLEARANCE * heights
+        clear &= ~surface.contains(line)
+        # Beyond the first charge that comes too close to the body again there may be more of it.
+        clear = np.logical_and.accumulate(clear)
+        positions.append(line[clear])
+        strengths.append(power * weights[clear])
+        count += int(clear.sum())
     if count > most:
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
@@ -227,6 +231,8 @@ class Patch:
         cells, faces = np.divmod(places, 4)
         return mesh.tetrahedra[inside[cells, None], FACES[faces]], beyond.reshape(-1)[places] < 0
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class PatchTerms:
@@ -243,6 +249,8 @@ class PatchTerms:
     load: FloatArray
     exited: float
     absorbed: float
+
+    __repr__ = one_line
 
 
 def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:

@@ -7,20 +7,23 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.coefficients import AnyMedium, Coefficients, at_surface, coefficients_on
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.limiter import nonnegative
-from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.linear import LinearResult, Solver, solver_for
 from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
+from tetlux.fem.partition import MeshPartition
 from tetlux.fem.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.describe import count, one_line
 from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -37,6 +40,8 @@ class Step:
     estimate: Estimate
     good: tuple[BoolArray, ...]
 
+    __repr__ = one_line
+
 
 @dataclass(frozen=True, eq=False)
 class System:
@@ -45,8 +50,8 @@ class System:
     Parameters
     ----------
     mesh : TetMesh
-    medium : Medium or VaryingMedium
-        Of the body.
+    medium : Medium, VaryingMedium, or mapping of int to these
+        Of the body; or the medium of each label of the mesh, that of the outermost first.
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
     mass : {"lumped", "consistent"}
@@ -63,7 +68,7 @@ class System:
     """
 
     mesh: TetMesh
-    medium: AnyMedium
+    medium: AnyMedium | MediaByLabel
     surface: Surface | None = None
     mass: Mass = "lumped"
     expected: int = 1
@@ -72,9 +77,11 @@ class System:
     limit: bool = True
 
     @property
-    def media(self) -> tuple[AnyMedium, ...]:
-        """Those of the body and of its regions."""
-        return (self.medium, *(only_medium(region) for region in self.regions))
+    def media(self) -> MediaByLabel | tuple[AnyMedium, ...]:
+        """Those of the body and of its regions, or those of labels."""
+        if isinstance(self.medium, AnyMedium):
+            return (self.medium, *(only_medium(region) for region in self.regions))
+        return self.medium
 
     @cached_property
     def coefficients(self) -> Coefficients:
@@ -132,10 +139,9 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, self.body, self.media, subtract, self._region_of)
-        solution, _, parts = self._solved(sources, watch, None)
-        warnings = [*solution.warnings, *sources.warnings]
-        return replace(self._with_residual(solution, parts), seconds=watch.read(), warnings=warnings)
+            sources = sources_of(lights, Body(self.body, self.media, MeshPartition(self.mesh)), subtract)
+        solution, *_ = self._solved(sources, watch, None)
+        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
     def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
@@ -157,13 +163,7 @@ class System:
             ]
         shares = np.sum([each.shares for each in estimates], axis=0)
         estimate = Estimate(shares, np.sum([each.power_shares for each in estimates], axis=0))
-        return Step(replace(self._with_residual(solution, parts), error_estimate=estimate.error), estimate, good)
-
-    def _with_residual(self, solution: Solution, parts: "list[_Part]") -> Solution:
-        """A solution with what the linear solvers that it took report."""
-        solvers = {self.plain.solver, *(part.equations.solver for part in parts)}
-        residual, iterations = max(one.residual for one in solvers), max(one.iterations for one in solvers)
-        return replace(solution, residual=residual, iterations=iterations)
+        return Step(replace(solution, error_estimate=estimate.error), estimate, good)
 
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
@@ -196,10 +196,7 @@ class System:
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
             columns = np.column_stack([*(term.load for term in terms), *(loads[light] for light in lit)] or loads[:1])
-            parts: FloatArray = np.zeros(columns.shape)
-            for equations in dict.fromkeys(of_columns):
-                mine = [i for i, each in enumerate(of_columns) if each is equations]
-                parts[:, mine] = equations.solver.solve(columns[:, mine])
+            parts, solved = _solve_columns(of_columns, columns)
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
         worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
         if worse:
@@ -208,7 +205,8 @@ class System:
                     patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
                     terms[i] = patch_terms(patches[i], self.mass)
             with watch.stage("solve"):
-                parts[:, worse] = self.plain.solver.solve(np.column_stack([terms[i].load for i in worse]))
+                solved.append(self.plain.solver.solve(np.column_stack([terms[i].load for i in worse])))
+                parts[:, worse] = solved[-1].x
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
         of_lights = []
         for light, deposit in enumerate(deposits):
@@ -225,9 +223,15 @@ class System:
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        under = at_surface(self.medium, mesh, self.coefficients)
-        validity = Validity(mesh, under, sources.lights, sources.deposits)
-        return replace(added(of_lights), warnings=notes, validity=validity), tuple(good), found
+        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
+        solution = replace(
+            added(of_lights),
+            warnings=notes,
+            validity=validity,
+            residual=max((result.residual for result in solved), default=0.0),
+            iterations=max((result.iterations for result in solved), default=0),
+        )
+        return solution, tuple(good), found
 
     def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
         """Fitted ones for what is spread evenly, the mesh's own for what is not."""
@@ -281,16 +285,15 @@ class System:
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
         return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
 
-    def _region_of(self, points: FloatArray) -> IntArray:
-        """The regions that points inside lie in, (q,)."""
-        cells, _ = self.mesh.locate(points)
-        return np.asarray(np.where(cells >= 0, self.mesh.regions[cells], 0))
-
     def _losing(self, equations: "Equations") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""
         losing = equations.absorbing.copy()
         losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
         return losing
+
+    def __repr__(self) -> str:
+        regions = f", {count(len(self.regions), 'region')}" if self.regions else ""
+        return f"System({self.mesh!r}, {self.medium!r}{regions})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -309,6 +312,18 @@ class Equations:
     solver: Solver
     absorbing: FloatArray
     fitting: Fitting | None
+
+    __repr__ = one_line
+
+
+def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
+    """Solve for the columns of (n, k) loads, each by equations of its own: (n, k), and what that took."""
+    parts, solved = np.zeros(loads.shape), []
+    for some in dict.fromkeys(equations):
+        columns = [i for i, each in enumerate(equations) if each is some]
+        solved.append(some.solver.solve(loads[:, columns]))
+        parts[:, columns] = solved[-1].x
+    return parts, solved
 
 
 @dataclass(frozen=True, eq=False)

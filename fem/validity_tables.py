@@ -9,8 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 
 ALBEDOS = (0.6, 0.9, 0.99)
 COSINES = (0.0, 0.8)
@@ -42,47 +41,61 @@ PLATE = ((1.78, 0.79, 0.41, 0.20, 0.16), (1.16, 0.36, 0.10, 0.06, 0.06))
 # What is near has faded at the first distance, what is far begins at the second.
 FADED, BEGINS = 8.0, 4.0
 
-NearRow = FloatArray
 # Thin beams and points, beams wider than what is near, and light from everywhere.
 Spread = Literal["narrow", "wide", "everywhere"]
 
 
-def near_row(medium: Medium, cosine: float | None) -> NearRow:
-    """Errors near a thin beam's entry, with this mean cosine of scattering, or near a point source, by ring."""
-    return _by_albedo(np.array(SOURCE) if cosine is None else _between(cosine, COSINES, np.array(BEAM)), medium)
+def near_rows(albedo: FloatArray, cosine: FloatArray | None) -> FloatArray:
+    """Errors near thin beams' entries, or near point sources, by ring.
+
+    Parameters
+    ----------
+    albedo : (n,) ndarray
+        Reduced albedo of the medium there.
+    cosine : (n,) ndarray, optional
+        Mean cosine of scattering at the entry of a beam; None for point sources.
+
+    Returns
+    -------
+    (n, 6) ndarray
+    """
+    if cosine is None:
+        return _at(np.array(SOURCE), _by_albedo(albedo))
+    return _at(np.array(BEAM), _by_value(cosine, COSINES), _by_albedo(albedo))
 
 
-def near_error(row: NearRow, distance: FloatArray) -> FloatArray:
-    """Errors at distances from a thin beam's entry, or a point source."""
-    return np.asarray(np.interp(distance, [*_middles(NEAR_RINGS), FADED], [*row, 0.0]))
+def near_error(rows: FloatArray, distance: FloatArray) -> FloatArray:
+    """Errors at distances (n,) from a thin beam's entry, or a point source, each with its own of the rows (n, 6)."""
+    return _along((*_middles(NEAR_RINGS), FADED), np.column_stack([rows, np.zeros(len(rows))]), distance)
 
 
-def far_error(medium: Medium, distance: FloatArray) -> FloatArray:
-    """Error at distances from all light.
+def far_error(albedo: FloatArray, distance: FloatArray) -> FloatArray:
+    """Errors at distances (n,) from all light, where the reduced albedo is (n,).
 
-    Beyond the table it grows, as diffusion decays faster than radiative transfer does, by
+    Beyond the table they grow, as diffusion decays faster than radiative transfer does, by
     ``0.4 (1 - albedo) sigma_tr`` (Case and Zweifel 1967, of isotropic scattering, to first order).
     """
     at = _middles(FAR_RINGS)
-    error = np.interp(distance, [BEGINS, *at], [0.0, *_by_albedo(np.array(FAR), medium)])
-    excess = 0.4 * (1.0 - medium.albedo) * medium.sigma_tr * medium.mean_free_path
+    rows = _at(np.array(FAR), _by_albedo(albedo))
+    error = _along((BEGINS, *at), np.column_stack([np.zeros(len(rows)), rows]), distance)
+    # sigma_tr times the mean free path is sqrt(3 (1 - albedo)).
+    excess = 0.4 * (1.0 - albedo) * np.sqrt(3.0 * (1.0 - albedo))
     return np.asarray(1.0 - (1.0 - error) * np.exp(-excess * np.maximum(distance - at[-1], 0.0)))
 
 
-def wide_error(medium: Medium) -> float:
-    """Error under a wide beam."""
-    rows = np.array(WIDE)
-    return float(_by_albedo(_between(medium.eta, INDICES, rows), medium))
+def wide_error(albedo: FloatArray, eta: float) -> FloatArray:
+    """Errors under a wide beam, where the reduced albedo is (n,)."""
+    return _at(np.array(WIDE), _by_value(np.full(len(albedo), eta), INDICES), _by_albedo(albedo))
 
 
-def thin_error(medium: Medium, thickness: FloatArray, light: Spread) -> FloatArray:
-    """Error where the body is so thick, beyond that of a thick one.
+def thin_error(cosine: FloatArray, thickness: FloatArray, light: Spread) -> FloatArray:
+    """Errors where the mean cosine is (n,) and the body so thick (n,), beyond those of a thick one.
 
     Large bodies too are grazed by a wide beam somewhere, which is most of their error in it, and is left in.
     """
     columns, table = (THICKNESSES, PLATE) if light == "narrow" else (DIAMETERS, THIN)
-    row = _between(medium.mean_cosine, COSINES, np.array(table))
-    return np.asarray(np.interp(thickness, columns, row if light == "wide" else np.maximum(row - row[-1], 0.0)))
+    rows = _at(np.array(table), _by_value(cosine, COSINES))
+    return _along(columns, rows if light == "wide" else np.maximum(rows - rows[:, -1:], 0.0), thickness)
 
 
 def _middles(rings: tuple[float, ...]) -> FloatArray:
@@ -90,13 +103,37 @@ def _middles(rings: tuple[float, ...]) -> FloatArray:
     return np.asarray(0.5 * (edges[1:] + edges[:-1]))
 
 
-def _by_albedo(rows: FloatArray, medium: Medium) -> FloatArray:
+_Place = tuple[IntArray, FloatArray]
+
+
+def _by_value(value: FloatArray, knots: tuple[float, ...]) -> _Place:
+    """The knot below each value (n,), and how far it is from there to the next one, as a share."""
+    place = np.interp(value, knots, np.arange(len(knots)))
+    low = np.minimum(place.astype(np.int64), len(knots) - 2)
+    return low, place - low
+
+
+def _by_albedo(albedo: FloatArray) -> _Place:
     scale = -np.log(1.0 - np.array(ALBEDOS))
-    return _between(-np.log(max(1.0 - medium.albedo, 1e-9)), tuple(scale), rows)
+    return _by_value(-np.log(np.maximum(1.0 - albedo, 1e-9)), tuple(scale))
 
 
-def _between(value: float, knots: tuple[float, ...], rows: FloatArray) -> FloatArray:
-    """Rows (k, ...) at ascending knots (k,), interpolated at a value."""
-    place = float(np.interp(value, knots, np.arange(len(knots))))
-    low = min(int(place), len(knots) - 2)
-    return np.asarray(rows[low] + (place - low) * (rows[low + 1] - rows[low]))
+def _at(table: FloatArray, *places: _Place) -> FloatArray:
+    """A table interpolated at places (n,) along its first axes: what is left of its axes, for each of these."""
+    found = 0.0
+    for corner in np.ndindex(*(2 for _ in places)):
+        weight = np.ones(len(places[0][0]))
+        index = []
+        for up, (low, share) in zip(corner, places, strict=True):
+            weight = weight * (share if up else 1.0 - share)
+            index.append(low + up)
+        values = table[tuple(index)]
+        found = found + weight.reshape(-1, *(1,) * (values.ndim - 1)) * values
+    return np.asarray(found)
+
+
+def _along(knots: tuple[float, ...], rows: FloatArray, value: FloatArray) -> FloatArray:
+    """Rows (n, k) of values at ascending knots (k,), each interpolated at a value of its own (n,)."""
+    low, share = _by_value(value, knots)
+    every = np.arange(len(rows))
+    return np.asarray((1.0 - share) * rows[every, low] + share * rows[every, low + 1])

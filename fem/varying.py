@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 # Values (n,) of a coefficient, 1/unit, at points (n, 3); raises InputError where it is not known.
@@ -20,8 +21,7 @@ class VaryingMedium:
     Parameters
     ----------
     base : Medium
-        Gives the refractive index, the boundary and what does not vary, and stands for the whole where one number
-        has to do.
+        Gives the refractive index, the boundary, the shape of scattering, and the coefficient that does not vary.
     sigma_a, sigma_s_prime : Field, optional
         Absorption and reduced scattering coefficients, 1/unit. The shape of scattering stays that of `base`.
 
@@ -87,9 +87,11 @@ class VaryingMedium:
         # sigma_s* (1 - g*) = sigma_s', whatever the peak.
         return sigma_s_prime / (1.0 - cosine), cosine
 
+    __repr__ = one_line
 
-def as_text(point: FloatArray) -> str:
-    """A place, as people write it."""
+
+def as_text(point: FloatArray | Vector) -> str:
+    """A place or a direction, as people write it."""
     return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
 
 

@@ -1,6 +1,8 @@
 """Shapes and lengths: surfaces, tetrahedra, and nothing about light."""
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
+from tetlux.meshing.files import read_mesh
+from tetlux.meshing.given import mesh_from_arrays
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.refine import refine
@@ -19,6 +21,8 @@ __all__ = [
     "box",
     "check_regions",
     "cylinder",
+    "mesh_from_arrays",
+    "read_mesh",
     "read_surface",
     "refine",
     "slab",

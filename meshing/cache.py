@@ -59,7 +59,7 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             points, tetrahedra, regions = data["points"], data["tetrahedra"], data["regions"]
             types = points.dtype, tetrahedra.dtype, regions.dtype
-            if str(data["key"]) != key or types != (np.float64, np.int64, np.int64):
+            if str(data["key"]) != key or types != (np.float64, np.int64, np.int64) or regions.min() < 0:
                 return None
         mesh = TetMesh(points, tetrahedra, unit, regions)
     except Exception:  # whatever a foreign, cut or damaged file can make its reader raise: it is a miss

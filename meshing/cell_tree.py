@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import one_line
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9
@@ -43,6 +44,8 @@ class Stretches:
     leave: FloatArray
     weights: FloatArray
     slopes: FloatArray
+
+    __repr__ = one_line
 
 
 class CellTree:

@@ -1,107 +1,174 @@
-"""Volume meshes on disk, through meshio."""
+"""Volume meshes on disk: gmsh's and NIRFAST's by readers of our own, all others through meshio."""
 
+import contextlib
+import io
+import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing import nirfast
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.paths import is_file
-from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.given import Given, checked_mesh, oriented
+from tetlux.meshing.gmsh import is_gmsh, read_gmsh
+from tetlux.meshing.gmsh_write import write_gmsh
+from tetlux.meshing.labels import REGION, labels_of
+from tetlux.meshing.paths import exists, is_file, is_folder
+from tetlux.meshing.raw import RawMesh
+from tetlux.meshing.tetmesh import TetMesh
 
-SUFFIXES = (".vtu", ".msh")
-# In whatever unit.
-LONGEST = 1e30
-# What the regions of tetrahedra are called in files.
-REGION = "region"
+if TYPE_CHECKING:
+    import meshio
+
+__all__ = ["oriented", "read_mesh", "read_with_meshio", "write_mesh"]
+
+WRITTEN = (".vtu", ".msh")
+# What is read, by suffixes in lower case: meshio knows more of them, but not of tetrahedra, or not well.
+NAMED = (".vtu", ".vtk", ".msh", ".mesh", ".inp", ".node")
+MESHIO = {
+    ".vtu": "vtu",
+    ".vtk": "vtk",
+    ".msh": "ansys",
+    ".mesh": "medit",
+    ".meshb": "medit",
+    ".inp": "abaqus",
+    ".node": "tetgen",
+    ".ele": "tetgen",
+    ".bdf": "nastran",
+    ".nas": "nastran",
+    ".fem": "nastran",
+    ".avs": "avsucd",
+    ".vol": "netgen",
+    ".su2": "su2",
+    ".ugrid": "ugrid",
+    ".xml": "dolfin-xml",
+    ".f3grid": "flac3d",
+    ".mdpa": "mdpa",
+    ".xdmf": "xdmf",
+    ".xmf": "xdmf",
+    ".cgns": "cgns",
+    ".med": "med",
+    ".e": "exodus",
+    ".exo": "exodus",
+    ".ex2": "exodus",
+}
 
 
-def read_mesh(path: str | Path, *, unit: str = "mm") -> TetMesh:
-    """Read a tetrahedral mesh, and its regions if it has them.
+def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels: str | None = None) -> TetMesh:
+    """Read a tetrahedral mesh made elsewhere, mend what can be mended safely, and check it.
 
     Parameters
     ----------
     path : str or Path
-        VTU, or binary gmsh.
+        VTU, VTK, gmsh (2.2 and 4.1, text or binary), Medit, Abaqus, NIRFAST (any of its .node, .elem and .region
+        files, or their name without a suffix), TetGen, Nastran and what else meshio reads.
     unit : str
-        Unit of the coordinates.
+        Unit of the coordinates once multiplied by `scale`: nm, um, mm, cm, m or in.
+    scale : float
+        Factor on the file's coordinates.
+    labels : str, optional
+        The array of cell values that holds the labels, where the file has several: physical groups of gmsh
+        ("gmsh:physical"), or an array called region, label, material or the like, unless another one is given here.
 
     Returns
     -------
     TetMesh
+        `regions` holds the label of each tetrahedron, `labels` their names, `repairs` and `warnings` what was done and
+        what a user should know.
 
     Raises
     ------
     InputError
-        If the file is missing, unreadable, or holds no tetrahedra.
+        If the file is missing or unreadable, holds other solid cells than tetrahedra or none, or its tetrahedra cannot
+        be mended: see `mesh_from_arrays`.
+
+    Examples
+    --------
+    >>> mesh = read_mesh("head.msh", unit="mm")  # doctest: +SKIP
+    >>> mesh.labels  # doctest: +SKIP
+    {1: 'scalp', 2: 'skull'}
+    """
+    path = Path(path)
+    if not np.isfinite(scale) or scale <= 0:
+        raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
+    try:
+        raw = _read(path)
+        corners, notes = raw.corners()
+        found = labels_of(raw, labels)
+        given = Given(
+            scale * raw.points,
+            corners,
+            found.values,
+            found.names,
+            numbered_from=None,
+            repairs=notes,
+            warnings=(*raw.notes, *found.notes),
+        )
+        return checked_mesh(given, unit)[0]
+    except InputError as error:
+        said = str(error)
+        raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from error
+
+
+def _read(path: Path) -> RawMesh:
+    suffix = path.suffix.lower()
+    named = nirfast.nirfast_files(path) if suffix in nirfast.SUFFIXES or not is_file(path) else {}
+    beside = suffix == ".node" and ".elem" not in named and is_file(path.with_suffix(".ele"))
+    try:
+        if named and not beside and (suffix in nirfast.SUFFIXES or ".elem" in named):
+            return nirfast.read_nirfast(named)
+        if not is_file(path):
+            what = "is a folder" if is_folder(path) else "is no file but a device" if exists(path) else "does not exist"
+            raise InputError(f"{path} {what}; check the path of the mesh file.")
+        if suffix not in MESHIO:
+            raise InputError(f'{path}: "{path.suffix}" is no volume mesh format here; give one of {", ".join(NAMED)}.')
+        if suffix == ".msh" and is_gmsh(path):
+            return read_gmsh(path)
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
+    except Exception as error:  # whatever a damaged file makes its reader run into
+        raise InputError(f"{path} is not a readable {suffix[1:].upper()} mesh; export it again.") from error
+    data = read_with_meshio(path, MESHIO[suffix])
+    arrays = {name: list(values) for name, values in data.cell_data.items()}
+    points = np.asarray(data.points, dtype=np.float64)
+    return RawMesh(points, [(block.type, block.data) for block in data.cells], arrays, sets=data.cell_sets)
+
+
+def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":
+    """What meshio reads of a file, without a word of its own on the terminal.
+
+    Raises
+    ------
+    InputError
     """
     import meshio  # noqa: PLC0415
 
-    path = Path(path)
-    if not is_file(path):
-        raise InputError(f"{path} does not exist; check the path of the mesh file.")
-    _check_suffix(path)
     try:
-        data = meshio.read(path)
-        chosen = [i for i, block in enumerate(data.cells) if block.type == "tetra"]
-        cells = [data.cells[i].data for i in chosen]
-        tags = [data.cell_data[REGION][i] for i in chosen] if REGION in data.cell_data else []
+        silent = io.StringIO()
+        with contextlib.redirect_stderr(silent), contextlib.redirect_stdout(silent), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return meshio.read(path, file_format=file_format)
+    except ImportError as error:
+        package = error.name or "another package"
+        raise InputError(f"{path} needs {package}, which is not installed; save it as .vtu or .msh.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
-        raise InputError(f"{path} is not a readable {path.suffix} mesh; export it again.") from error
-    if not cells:
-        raise InputError(f"{path} holds no tetrahedra; give a tetrahedral mesh.")
-    try:
-        mesh, _ = oriented(data.points, np.vstack(cells), unit)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-    return replace(mesh, regions=np.concatenate(tags).reshape(-1).astype(np.int64)) if tags else mesh
-
-
-def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """Tetrahedra of a file, whichever way round they are, as a mesh without the nodes that none of them uses.
-
-    Parameters
-    ----------
-    points : (n, 3) array_like
-    cells : (m, 4) array_like
-    unit : str
-
-    Returns
-    -------
-    mesh : TetMesh
-    used : (k,) ndarray
-        The numbers that its nodes have in the file.
-
-    Raises
-    ------
-    InputError
-        If a corner does not exist or lies nowhere, or a tetrahedron is flat.
-    """
-    vertices, tetrahedra = np.asarray(points, dtype=np.float64), np.array(cells, dtype=np.int64)
-    if vertices.ndim != 2 or vertices.shape[1] != 3:
-        raise InputError(f"its nodes are an array of shape {vertices.shape}; give three coordinates for each.")
-    used, compact = np.unique(tetrahedra, return_inverse=True)
-    if used[0] < 0 or used[-1] >= len(vertices):
-        raise InputError("a tetrahedron names a node that does not exist; the file is damaged.")
-    if not (np.abs(vertices[used]) < LONGEST).all():
-        raise InputError("a node's coordinate is no number, or absurdly large; export the file again.")
-    vertices, tetrahedra = vertices[used], compact.reshape(tetrahedra.shape)
-    negative = tetrahedron_volumes(vertices, tetrahedra) < 0
-    tetrahedra[negative] = tetrahedra[negative][:, [1, 0, 2, 3]]
-    return TetMesh(vertices, tetrahedra, unit), used
+        raise InputError(f"{path} is not a readable {path.suffix[1:].upper()} mesh; export it again.") from error
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:
-    """Write a tetrahedral mesh, with named values at its nodes, and with the `region` of its tetrahedra if several.
+    """Write a tetrahedral mesh, with named values at its nodes, and with the labels of its tetrahedra if it has any.
 
     Parameters
     ----------
     mesh : TetMesh
     path : str or Path
-        Ends in .vtu (VTK, binary) or .msh (gmsh 4.1, binary).
+        Ends in .vtu (VTK, binary; labels are the array `region`) or .msh (gmsh 4.1, binary; labels are physical
+        groups, with their names).
     values : mapping of str to (n,) ndarray, optional
 
     Raises
@@ -110,20 +177,17 @@ def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray]
         If the ending is another one.
     """
     path = Path(path)
-    _check_suffix(path)
-    file_format = "vtu" if path.suffix == ".vtu" else "gmsh"
-    # gmsh's values are floating-point numbers.
-    tags = mesh.regions.astype(np.int32 if file_format == "vtu" else np.float64)
+    suffix = path.suffix.lower()
+    if suffix not in WRITTEN:
+        raise InputError(f'{path}: "{path.suffix}" is no volume mesh format here; use {" or ".join(WRITTEN)}.')
+    if suffix == ".msh":
+        write_gmsh(mesh, path, values or {})
+        return
     import meshio  # noqa: PLC0415
 
     meshio.Mesh(
         mesh.points,
         [("tetra", mesh.tetrahedra)],
         point_data=dict(values or {}),
-        cell_data={REGION: [tags]} if tags.any() else {},
-    ).write(path, file_format=file_format)
-
-
-def _check_suffix(path: Path) -> None:
-    if path.suffix not in SUFFIXES:
-        raise InputError(f'{path}: "{path.suffix}" is no volume mesh format here; use {" or ".join(SUFFIXES)}.')
+        cell_data={REGION: [mesh.regions.astype(np.int32)]} if mesh.regions.any() else {},
+    ).write(path, file_format="vtu")

@@ -10,6 +10,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import Stretches
+from tetlux.meshing.describe import one_line
 
 # Stretches that are kept of one mesh: two hundred megabytes.
 MOST_KEPT = 1 << 21
@@ -98,6 +99,8 @@ class Marched:
             np.concatenate([one.slopes, other.slopes]),
         )
         return Marched(lines, self.cells, ends, lost, some_of(stretches, ~lost[stretches.paths]))
+
+    __repr__ = one_line
 
 
 def some_of(every: Stretches, chosen: BoolArray) -> Stretches:

@@ -1,33 +1,29 @@
 """From a closed surface to tetrahedra: pytetwild (fTetWild) behind a guard."""
 
 import importlib.util
-import json
 import math
-import os
-import subprocess
-import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from tetlux.meshing.acceptance import NotTheBodyError, check_body, has_lost_a_part, part_of
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
-from tetlux.meshing.deviation import surface_deviation
+from tetlux.meshing.child_mesher import run_pytetwild
 from tetlux.meshing.errors import InputError, RunError
 from tetlux.meshing.proxy import proxy
 from tetlux.meshing.refine import moved_to_surface
-from tetlux.meshing.regions import nesting, tagged
-from tetlux.meshing.repair import bodies, compact
-from tetlux.meshing.scratch import run_child, scratch
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.regions import tagged
+from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
+from tetlux.meshing.shells import shells_of
+from tetlux.meshing.surface import Surface, body_sizes
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.topology import bodies, compact
 
-# The command that fills input.npz of its working directory; -S, since it is told where modules are.
-MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
 # Measured with what follows on 2 cores, from surface to mesh, without the cache. Seconds are of the quietest of four
 # runs; the rest is over ten. Volume is against the surface's; deviation is of the mesh whose boundary was moved back,
 # as a share of the diagonal.
@@ -44,9 +40,6 @@ MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_
 # mean free paths across and at tolerances from .05 to .005, half to 2.5 times this deviation take the same time within
 # a fifth and end with as many nodes.
 #
-# Default deviation: this share of the diagonal, or of the body's mean thickness 2 V/A if that is less.
-DEVIATION = 0.01
-DEVIATION_OF_THICKNESS = 0.25
 # What fTetWild's envelope gets of the deviation; the proxy gets the rest. Time goes with the proxy's triangles
 # and with the inverse of the envelope: from .45 to .7 it is the same within a fifth.
 ENVELOPE = 0.55
@@ -56,29 +49,18 @@ EDGE_LENGTH = 1.0 / 12.0
 # at 9 .12 and 1.5, 2.3, 1.9; at 10 .08 and 1.1, 1.8, 1.8. At 14 the worst was .03; at 30, which is three times
 # quicker than 10, .01.
 STOP_ENERGY = 9.5
-# A mesh whose boundary is farther from the surface than so many deviations has lost a part.
-LOST = 2.5
-# Places at which that is looked for: a lost part is larger than a triangle.
-LOOKS = 3_000
 # Seconds after which the mesher is stopped, if nothing else is said: ten times what slow ones take.
 TIME_LIMIT = 300.0
 # How much finer the second attempt is, if the first one's mesh is not the body of the surface.
 SECOND = 0.3
-# Default deviation of an inner surface: this share of its own diagonal, or of its region's mean thickness as above.
-# Seconds of the mesher and what the inner ball's volume lacks, until refinement puts more nodes onto it, at .02, .03
-# and .05: a twentieth of a ball's size, 3.4, 2.1, 1.5 and 3.9, 5.0, 8.0 %; 5 wide in the hare, which alone takes .9,
-# 2.3, 2.2, 1.7 and 3.8, 4.9, 7.5 %. The proxy of each surface has its own deviation, without which the first would take
-# two to four times as long; the envelope is one for all.
-INNER_DEVIATION = 0.03
 # Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. Seconds of the mesher and tetrahedra
 # at .011, .0058 and .0029 (a plate 60 wide; 1, .5 and .25 thick): 2 and 2k, 5 and 8k, over 60 s; a needle of 100 widths
 # (.005) takes 2 s, one of 1000 (.0005) over 60.
 THINNEST = 0.002
-# A region whose inner ones leave it less than this share of its volume is filled by them.
-LEFT = 1e-6
-MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
-# Below this share of the body's volume a separate lump of tetrahedra is debris of the envelope.
-DEBRIS = 1e-3
+NOT_INSTALLED = (
+    "pytetwild, which fills surfaces with tetrahedra, is not installed, and pip has no wheel of it for Intel Macs; "
+    "give tetrahedra in place of the surface, or build it: pip install pytetwild."
+)
 
 
 def tetrahedralize(
@@ -131,7 +113,7 @@ def tetrahedralize(
         If `edge_length`, `deviation`, `epsilon`, `stop_energy` or `time_limit` is not positive, or an inner surface
         bounds no region of the body, see `check_regions`.
     RunError
-        If the mesher crashes, takes too long, or returns something that is not this body.
+        If the mesher is not installed, crashes, takes too long, or returns something that is not this body.
 
     Notes
     -----
@@ -146,6 +128,8 @@ def tetrahedralize(
     ):
         if value is not None and not 0 < value < math.inf:
             raise InputError(f"{name} is {value:g}; give a number greater than 0.")
+    if importlib.util.find_spec("pytetwild") is None:
+        raise RunError(f"{surface.name}: {NOT_INSTALLED}")
     if deviation is None and epsilon is None:
         check_thickness(surface)
     size = surface.diagonal
@@ -194,39 +178,6 @@ def check_thickness(surface: Surface) -> None:
         )
 
 
-@dataclass(frozen=True)
-class _Shell:
-    """A surface that the mesher is given: the body's or an inner one."""
-
-    surface: Surface
-    deviation: float
-    # Whether another one touches it: decimated each on its own, they would not any more.
-    touching: bool = False
-    # The regions that it bounds together.
-    regions: tuple[int, ...] = ()
-
-
-def _shells(surface: Surface, regions: Sequence[Surface], deviation: float) -> list[_Shell]:
-    """The body's surface and the inner ones, and how far the mesher may stray from each."""
-    if len(regions) == 0:
-        return [_Shell(surface, deviation)]
-    lie = nesting(surface, regions)
-    surfaces = [surface, *(replace(s, name=f"region {i} ({s.name})") for i, s in enumerate(regions, 1))]
-    by_thickness = []
-    for i, each in enumerate(surfaces):
-        held = [surfaces[j] for j, parent in enumerate(lie.parents, 1) if parent == i]
-        own = each.volume - sum(inner.volume for inner in held)
-        thickness = 2.0 * own / (each.area + sum(inner.area for inner in held))
-        # Layers may fill it all.
-        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > LEFT * each.volume else math.inf)
-    shells = [_Shell(surface, min(deviation, by_thickness[0]), lie.touching[0], tuple(lie.within(0)))]
-    for i, (each, parent) in enumerate(zip(surfaces[1:], lie.parents, strict=True), 1):
-        # What is on either side of it may be thin.
-        stray = min(deviation, INNER_DEVIATION * each.diagonal, by_thickness[i], by_thickness[parent])
-        shells.append(_Shell(each, stray, lie.touching[i], tuple(lie.within(i))))
-    return shells
-
-
 def _made(
     surface: Surface,
     edge_length: float,
@@ -238,7 +189,7 @@ def _made(
 ) -> TetMesh:
     """A mesh that is the body of the surface; if the first one is not, a second one, closer to the surface."""
     end = time.monotonic() + time_limit
-    shells = _shells(surface, regions, deviation)
+    shells = shells_of(surface, regions, deviation)
     if len(regions) > 0:
         envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells))
     # Where two surfaces touch fTetWild forgets which way their triangles face, and then what is inside.
@@ -254,34 +205,15 @@ def _made(
             surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit, filtered
         )
         for shell in shells:
-            _check_against(_part(mesh, shell), shell.surface, share * shell.deviation)
+            check_body(part_of(mesh, shell), shell.surface, share * shell.deviation)
         return mesh
 
     try:
         mesh = attempt(1.0)
-        lost = any(
-            surface_deviation(_part(mesh, shell), shell.surface, LOOKS) > LOST * shell.deviation for shell in shells
-        )
-    except _NotTheBodyError:
+        lost = any(has_lost_a_part(mesh, shell) for shell in shells)
+    except NotTheBodyError:
         lost = True
     return attempt(SECOND) if lost else mesh
-
-
-def _part(mesh: TetMesh, shell: _Shell) -> TetMesh:
-    """What a surface bounds of the mesh."""
-    if 0 in shell.regions or not shell.regions:
-        return mesh
-    tetrahedra = mesh.tetrahedra[np.isin(mesh.regions, shell.regions)]
-    if len(tetrahedra) == 0:
-        raise _NotTheBodyError(
-            f"{shell.surface.name}: the mesh lost it, since it is too small beside the body; "
-            "give a smaller deviation, or leave it out."
-        )
-    return TetMesh(*compact(mesh.points, tetrahedra), mesh.unit)
-
-
-class _NotTheBodyError(RunError):
-    """The mesher's mesh is another body than the surface's; a closer one may not be."""
 
 
 def _filled(
@@ -299,7 +231,7 @@ def _filled(
     # Unit size, about the origin: fTetWild's tolerances are absolute in places.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     first = np.cumsum([0, *(len(each.points) for each in coarse)])
-    points, tetrahedra = _run_pytetwild(
+    points, tetrahedra = run_pytetwild(
         (np.concatenate([each.points for each in coarse]) - origin) / size,
         np.concatenate([each.faces + start for each, start in zip(coarse, first, strict=False)]),
         edge_length=edge_length / size,
@@ -317,69 +249,6 @@ def _filled(
     return moved_to_surface(mesh, surface, regions)
 
 
-def _run_pytetwild(
-    points: FloatArray,
-    faces: IntArray,
-    *,
-    edge_length: float,
-    epsilon: float,
-    stop_energy: float,
-    seconds: float,
-    time_limit: float,
-    name: str,
-    filtered: bool = True,
-) -> tuple[FloatArray, IntArray]:
-    """Points and tetrahedra; if not filtered, also those round the body."""
-    try:
-        with scratch("mesher") as folder:
-            np.savez(
-                folder / "input.npz",
-                points=points,
-                faces=faces.astype(np.int32),
-                edge_length=edge_length,
-                epsilon=epsilon,
-                stop_energy=stop_energy,
-                filtered=filtered,
-            )
-            # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
-            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-            done = run_child([*MESHER, _whereabouts()], folder, seconds, environment)
-            result = folder / "output.npz"
-            if done.returncode != 0 or not result.exists():
-                raise _failed(name, done)
-            with np.load(result) as data:
-                return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
-    except subprocess.TimeoutExpired as error:
-        raise RunError(
-            f"{name}: the mesher was stopped after {time_limit:g} s; give a surface with fewer triangles, "
-            "a larger deviation, or a longer time limit."
-        ) from error
-    except OSError as error:
-        raise RunError(f"{name}: the mesher could not be run ({error.strerror or error}); {MAKE_ROOM}") from error
-
-
-def _failed(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
-    """What to say of a mesher that ended without a mesh."""
-    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-    cause = f"signal {-done.returncode}" if done.returncode < 0 else last
-    remedy = "repair or simplify the surface in a mesh editor and try again."
-    if last.startswith("OSError"):
-        remedy = MAKE_ROOM
-    elif done.returncode == -9:
-        remedy = "it was killed, as the system does when memory runs out: free some, or simplify the surface."
-    return RunError(f"{name}: the mesher failed ({cause}); {remedy}")
-
-
-def _whereabouts() -> str:
-    """What `_mesher_process` is told: where modules are (an editable install may know it by a hook only)."""
-    spec = importlib.util.find_spec("pytetwild")
-    folder = (spec.submodule_search_locations or [""])[0] if spec else ""
-    places = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
-    # Relative ones are relative to another working directory.
-    paths = [place for place in dict.fromkeys(places) if Path(place).is_absolute()]
-    return json.dumps({"paths": paths, "pytetwild": folder, "parent": os.getpid()})
-
-
 def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
     """Positive tetrahedra only, without the crumbs that an envelope can leave, and without unused nodes.
 
@@ -388,50 +257,21 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: I
     if tags is not None:
         tetrahedra, tags = tetrahedra[tags >= 0], tags[tags >= 0]
     if len(tetrahedra) == 0 or not np.isfinite(points).all():
-        raise RunError(
-            f"{surface.name}: the mesher returned no tetrahedra; give a shorter edge length or a cleaner surface."
-        )
+        raise RunError(f"{surface.name}: the mesher returned no tetrahedra; repair the surface in a mesh editor.")
     volumes = tetrahedron_volumes(points, tetrahedra)
     if (volumes < 0).any():
-        raise RunError(f"{surface.name}: the mesher returned inverted tetrahedra; try a shorter edge length.")
+        raise RunError(f"{surface.name}: the mesher returned inverted tetrahedra; repair the surface in a mesh editor.")
     keep = volumes > 0
     lump = bodies(len(points), tetrahedra)
     share = np.bincount(lump, volumes) / volumes.sum()
-    keep &= share[lump] > DEBRIS
+    keep &= share[lump] > _largest_debris(surface)
     mesh = TetMesh(*compact(points, tetrahedra[keep]), surface.unit)
     return mesh if tags is None else replace(mesh, regions=tags[keep])
 
 
-def _check_against(mesh: TetMesh, surface: Surface, deviation: float) -> None:
-    """Refuse a mesh that is not the body of the surface."""
-    # Boundary nodes are on the surface, but for those few that could not get there; chords cut through what is
-    # thin and round, by the deviation at most.
-    slack = 0.02 + deviation * surface.area / surface.volume
-    # A surface that crosses itself counts what overlaps more than once, and the mesh is of the union.
-    lowest = -0.9 if surface.overlaps else -slack
-    for quantity, change in (
-        ("volume", mesh.volume / surface.volume - 1.0),
-        ("area", mesh.area / surface.area - 1.0),
-    ):
-        if not lowest <= change <= slack:
-            raise _NotTheBodyError(
-                f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
-                f"the mesher's deviation of {deviation:.3g} {surface.unit}: give a smaller deviation."
-            )
-    of_surface = bodies(len(surface.points), surface.faces)
-    # The first vertices of each body: a small one may be gone without a trace in the sums.
-    _, first = np.unique(of_surface, return_index=True)
-    vertices = surface.points[surface.faces[first]].reshape(-1, 3)
-    astray = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
-    if not surface.overlaps and (astray > LOST * deviation).any():
-        raise _NotTheBodyError(
-            f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
-            "others; give a smaller deviation, or leave it out."
-        )
-    wanted = len(first)
-    parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
-    if parts > wanted:
-        raise _NotTheBodyError(
-            f"{surface.name}: the mesh fell into {parts} parts where the surface has {wanted}; "
-            "give a smaller deviation, or thicken the narrowest part."
-        )
+def _largest_debris(surface: Surface) -> float:
+    """The share of the volume below which a lump is debris: no body of the surface is, however small."""
+    if surface.overlaps:
+        return DEBRIS
+    volume, _ = body_sizes(surface.points, surface.faces, bodies(len(surface.points), surface.faces))
+    return min(DEBRIS, 0.5 * float(volume.min() / volume.sum()))

@@ -23,28 +23,7 @@ class ClosestPoint:
     """
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
-        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray  # noqa: PLC0415
-        from vtkmodules.vtkCommonCore import vtkPoints  # noqa: PLC0415
-        from vtkmodules.vtkCommonDataModel import (  # noqa: PLC0415
-            vtkCellArray,
-            vtkPolyData,
-            vtkStaticCellLocator,
-        )
-
-        vertices = vtkPoints()
-        vertices.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-        cells = vtkCellArray()
-        offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
-        cells.SetData(
-            numpy_to_vtkIdTypeArray(offsets, deep=True),
-            numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
-        )
-        data = vtkPolyData()
-        data.SetPoints(vertices)
-        data.SetPolys(cells)
-        self._locator = vtkStaticCellLocator()
-        self._locator.SetDataSet(data)
-        self._locator.BuildLocator()
+        self._locator = cell_locator(points, faces)
 
     def __call__(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         """Nearest points (q, 3) and the faces (q,) that they lie on, for queries (q, 3)."""
@@ -61,6 +40,34 @@ class ClosestPoint:
             nearest[i] = point
             faces[i] = int(face)
         return nearest, faces
+
+
+def cell_locator(points: FloatArray, faces: IntArray, per_bucket: int = 10) -> Any:
+    """VTK's static cell locator of triangles ``points[faces]``, about so many in each of its buckets."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray  # noqa: PLC0415
+    from vtkmodules.vtkCommonCore import vtkPoints  # noqa: PLC0415
+    from vtkmodules.vtkCommonDataModel import (  # noqa: PLC0415
+        vtkCellArray,
+        vtkPolyData,
+        vtkStaticCellLocator,
+    )
+
+    vertices = vtkPoints()
+    vertices.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+    cells = vtkCellArray()
+    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
+    cells.SetData(
+        numpy_to_vtkIdTypeArray(offsets, deep=True),
+        numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
+    )
+    data = vtkPolyData()
+    data.SetPoints(vertices)
+    data.SetPolys(cells)
+    locator = vtkStaticCellLocator()
+    locator.SetDataSet(data)
+    locator.SetNumberOfCellsPerNode(per_bucket)
+    locator.BuildLocator()
+    return locator
 
 
 def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:

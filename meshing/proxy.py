@@ -8,8 +8,10 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.repair import Edges, bodies, compact
-from tetlux.meshing.surface import Surface, signed_volume
+from tetlux.meshing.pinches import pull_apart
+from tetlux.meshing.resolution import FLAT
+from tetlux.meshing.surface import Surface, signed_volume, triangle_areas
+from tetlux.meshing.topology import Edges, bodies, compact
 
 # Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a
 # sphere, 5 to 10 on organic and mechanical surfaces. The first try; the next ones follow from what it measured.
@@ -57,6 +59,37 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     """
     if not np.isfinite(deviation) or deviation <= 0:
         raise InputError(f"deviation is {deviation:g}; give a length greater than 0.")
+    apart = pull_apart(surface.points, surface.faces)
+    if apart is None or len(apart[0]) == len(surface.points):
+        return _decimate(surface, deviation)
+    return _together([_decimate(part, deviation) for part in _parts(surface, *apart)], surface)
+
+
+def _parts(surface: Surface, points: FloatArray, faces: IntArray) -> list[Surface]:
+    """The connected parts of a surface that was pulled apart, without walls between bodies, which bound nothing."""
+    body = bodies(len(points), faces)
+    parts = []
+    for number in range(int(body.max()) + 1):
+        own = compact(points, faces[body == number])
+        if abs(signed_volume(*own)) > FLAT * surface.diagonal * triangle_areas(*own)[1].sum():
+            # It may touch itself, and its proxy cross itself there.
+            parts.append(replace(surface, points=own[0], faces=own[1], overlaps=True))
+    return parts
+
+
+def _together(parts: list[Surface], surface: Surface) -> Surface:
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    return replace(
+        surface,
+        points=np.concatenate([part.points for part in parts]),
+        faces=np.concatenate([part.faces + start for part, start in zip(parts, first, strict=False)]),
+        repairs=(),
+        warnings=(),
+    )
+
+
+def _decimate(surface: Surface, deviation: float) -> Surface:
+    """A surface of two triangles at each edge, decimated; itself if nothing coarser is near and sound."""
     if len(surface.faces) <= FEWEST:
         return surface
     wanted = min(TRIANGLES * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))

@@ -1,16 +1,18 @@
-"""Which triangle does a ray meet first? Millions of rays, by Embree."""
+"""Which triangle does a ray meet first? For millions of rays."""
 
 from functools import cached_property
-from typing import Any
+from importlib.util import find_spec
 
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.embree import Embree
+from tetlux.meshing.ray_locator import RayLocator
 
+# Embree has no wheel for Linux on ARM.
+ENGINE: type[Embree] | type[RayLocator] = RayLocator if find_spec("embreex") is None else Embree
 # Embree computes in single precision: rays start this share of the triangles' extent along their way.
 OFFSET = 1e-5
-# And are nowhere as far as this many extents away, where single precision has no numbers any more.
-FARTHEST = 1e12
 
 
 class RayCaster:
@@ -28,17 +30,8 @@ class RayCaster:
         self._origin, self._size = 0.5 * (low + high), float(np.linalg.norm(high - low))
 
     @cached_property
-    def _scene(self) -> Any:
-        from embreex.mesh_construction import TriangleMesh  # noqa: PLC0415
-        from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415
-
-        scene = EmbreeScene(robust=True)
-        TriangleMesh(scene, self._single(self._corners.reshape(-1, 3)).reshape(-1, 3, 3))
-        return scene
-
-    def _single(self, points: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
-        """Places about the origin, in units of the extent, which single precision can hold."""
-        return np.asarray(np.clip((points - self._origin) / self._size, -FARTHEST, FARTHEST), dtype=np.float32)
+    def _engine(self) -> Embree | RayLocator:
+        return ENGINE((self._corners - self._origin) / self._size)
 
     def first(self, origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
         """The first triangle that each ray meets.
@@ -57,19 +50,19 @@ class RayCaster:
         """
         if len(origins) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64)
-        # Single precision holds no places far from the triangles: rays start from near them.
+        # No precision holds places far from the triangles: rays start from near them.
         gone = np.maximum(np.einsum("ij,ij->i", self._origin - origins, directions) - self._size, 0.0)
         origins = origins + gone[:, None] * directions
         offset = OFFSET * self._size
-        starts = self._single(origins + offset * directions)
-        met = self._scene.run(starts, np.ascontiguousarray(directions, dtype=np.float32), output=True)
-        faces = np.asarray(met["primID"], dtype=np.int64)
-        # Embree says which triangle; how far that is, is computed anew in full precision.
+        starts = (origins + offset * directions - self._origin) / self._size
+        faces, rough = self._engine(starts, directions)
+        # The engine says which triangle; how far that is, is computed anew in full precision.
         corners = self._corners[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):
             exact = np.einsum("ij,ij->i", corners[:, 0] - origins, normals)
             exact /= np.einsum("ij,ij->i", directions, normals)
-        rough = np.asarray(met["tfar"], dtype=np.float64) * self._size + offset
-        distances = np.where(np.abs(exact - rough) < 10.0 * offset, exact, rough)
+        rough = rough * self._size + offset
+        with np.errstate(invalid="ignore"):
+            distances = np.where(np.abs(exact - rough) < 10.0 * offset, exact, rough)
         return np.where(faces >= 0, gone + distances, np.inf), faces

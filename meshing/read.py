@@ -1,20 +1,33 @@
-"""Surface files: STL, OBJ, PLY, OFF, GLB and 3MF, through trimesh."""
+"""Surface files: STL, OBJ, PLY, OFF, GLB, GLTF and 3MF."""
 
-import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.formats.obj import read_obj
+from tetlux.meshing.formats.off import read_off
+from tetlux.meshing.formats.ply import read_ply
+from tetlux.meshing.formats.scene import read_scene
+from tetlux.meshing.formats.stl import read_stl
+from tetlux.meshing.holes import Holes
 from tetlux.meshing.paths import exists, is_file, is_folder
+from tetlux.meshing.quiet import quiet
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.surface import Surface
 
-SUFFIXES = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".3mf")
+READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
+    ".stl": read_stl,
+    ".obj": read_obj,
+    ".ply": read_ply,
+    ".off": read_off,
+}
+SUFFIXES = (*READERS, ".glb", ".gltf", ".3mf")
 
 
-def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0) -> Surface:
+def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, holes: Holes = "small") -> Surface:
     """Read a closed triangle mesh from a file, check it, and mend what can be mended safely.
 
     Parameters
@@ -25,6 +38,8 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0) -> S
         Unit of the coordinates once multiplied by `scale`: nm, um, mm, cm, m or in.
     scale : float
         Factor on the file's coordinates.
+    holes : "small", "close" or "refuse"
+        Which holes are capped: see `surface_from_arrays`.
 
     Returns
     -------
@@ -61,28 +76,16 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0) -> S
         raise InputError(
             f"{path} is not a readable {path.suffix.lstrip('.').upper()} mesh{beside}; export it again."
         ) from error
-    return surface_from_arrays(points * scale, faces, unit=unit, name=path.name)
+    return surface_from_arrays(points * scale, faces, unit=unit, name=path.name, holes=holes)
 
 
 def _load(path: Path) -> tuple[FloatArray, IntArray]:
-    import trimesh  # noqa: PLC0415
-    from trimesh.resolvers import ZipResolver  # noqa: PLC0415
-
-    # Of a file's pictures and materials nothing is wanted: only glTF has triangles in other files.
-    resolver = None if path.suffix.lower() == ".gltf" else ZipResolver({})
-    log = logging.getLogger("trimesh")
-    was = log.disabled
+    reader = READERS.get(path.suffix.lower())
     try:
-        # What it says of a broken file is said here in a sentence.
-        log.disabled = True
-        with np.errstate(all="ignore"):
-            scene = trimesh.load_scene(path, resolver=resolver, process=False)
-            meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh)]
-    finally:
-        log.disabled = was
-    if not meshes:
-        raise InputError(f"{path} holds no triangles, or was cut short; give a closed triangle mesh.")
-    offsets = np.cumsum([0] + [len(m.vertices) for m in meshes])
-    points = np.vstack([m.vertices for m in meshes])
-    faces = np.vstack([np.asarray(m.faces) + o for m, o in zip(meshes, offsets, strict=False)])
-    return np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+        with quiet(), np.errstate(all="ignore"):
+            points, faces = reader(path.read_bytes()) if reader else read_scene(path)
+    except InputError as error:
+        raise InputError(f"{path} {error}") from error
+    if len(faces) == 0:
+        raise InputError(f"{path} holds no triangles; give a closed triangle mesh.")
+    return points, faces

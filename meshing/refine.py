@@ -51,7 +51,7 @@ def refine(
         If `mesh` has more regions than there are inner surfaces, unless there are none.
     """
     points, tetrahedra, parents = _bisected(mesh, marked)
-    fine = TetMesh(points, tetrahedra, mesh.unit)
+    fine = TetMesh(points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
     if mesh.regions.any():
         fine = replace(fine, regions=mesh.regions[parents])
     if surface is None:

@@ -5,8 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.curved import CurvedPatches
+from tetlux.meshing.describe import count, size
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.rays import RayCaster
 from tetlux.meshing.solids import Shape, lies_on
@@ -22,6 +23,23 @@ def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
     cross = np.cross(b - a, c - a)
     length = np.linalg.norm(cross, axis=1)
     return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
+
+
+def place_words(place: FloatArray, size: float) -> str:
+    """Coordinates to be read, of a place in a body of that size: what rounding left of 0 is 0."""
+    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
+
+
+def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Volume and area of each body, (b,), whichever way it faces; `body` (m,) numbers the triangles' bodies from 0."""
+    corners = points[faces]
+    count = int(body.max()) + 1
+    # About its own middle: a small body far away has no digits to spare.
+    middle = np.column_stack([summed(body, x, count) for x in corners.mean(axis=1).T])
+    middle /= np.bincount(body, minlength=count)[:, None]
+    a, b, c = (corners[:, i] - middle[body] for i in range(3))
+    volume = np.abs(summed(body, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, count))
+    return volume, summed(body, triangle_areas(points, faces)[1], count)
 
 
 def longest_sides(corners: FloatArray) -> FloatArray:
@@ -207,6 +225,12 @@ class Surface:
         if len(leaves) == 0:
             return None
         return float(distances[leaves[0]]), int(faces[leaves[0]])
+
+    def __repr__(self) -> str:
+        return (
+            f'Surface("{self.name}", {count(len(self.faces), "triangle")}, {size(self.points, self.unit)}, '
+            f"volume {self.volume:.3g} {self.unit}³)"
+        )
 
 
 def barycentric_of(points: FloatArray, triangles: FloatArray) -> FloatArray:

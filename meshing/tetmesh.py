@@ -1,6 +1,6 @@
 """`TetMesh`: the tetrahedra that fill a body."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +13,7 @@ from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 from tetlux.meshing.blocks import grouped, in_blocks, once
 from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.corners import cross, dot, over_corners
+from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.marched import Kept
 from tetlux.meshing.proximity import ClosestPoint
@@ -29,6 +30,8 @@ EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
 # What is remembered of one mesh for others.
 MOST_REMEMBERED = 32
+# Labels that a sentence names; of more it says how many there are.
+MOST_NAMED = 8
 _T = TypeVar("_T")
 
 
@@ -44,7 +47,12 @@ class TetMesh:
         Corners; the first three are anticlockwise seen from the fourth's far side, so volumes are positive.
     unit : str
     regions : (m,) ndarray of int, optional
-        The region of each tetrahedron: 0 is the body itself, and the others are numbered from 1; all 0 if not given.
+        The region, or the label, of each tetrahedron; all 0 if not given. Of a mesh that was made of surfaces 0 is the
+        body itself, and its regions are numbered from 1; of a mesh made elsewhere labels are whatever they are.
+    labels : mapping of int to str, optional
+        Names of labels, as far as they have any.
+    repairs, warnings : tuple of str
+        What was mended when it was read, and what was left that a user should know.
 
     Raises
     ------
@@ -56,6 +64,9 @@ class TetMesh:
     tetrahedra: IntArray
     unit: str = "mm"
     regions: IntArray = field(default_factory=lambda: _NO_REGIONS)
+    labels: Mapping[int, str] = field(default_factory=dict)
+    repairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         p, t = self.points, self.tetrahedra
@@ -68,8 +79,8 @@ class TetMesh:
         if self.regions is _NO_REGIONS:
             # Zeros that take no memory.
             object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(t)))
-        elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu" or self.regions.min() < 0:
-            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, integers from 0 up.")
+        elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu":
+            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, all integers.")
         bad = int((self.volumes <= 0).sum())
         if bad:
             raise InputError(f"{bad} of {len(t)} tetrahedra are inverted or flat; orient and clean the mesh.")
@@ -386,6 +397,37 @@ class TetMesh:
             Barycentric coordinates; nan for points outside.
         """
         return self.tree.locate(np.asarray(queries, dtype=float).reshape(-1, 3))
+
+    def region_at(self, queries: FloatArray) -> IntArray:
+        """The region of the tetrahedron that holds each point (q, 3), or of the one nearest to it, (q,)."""
+        cells, _ = self.locate(queries)
+        outside = np.flatnonzero(cells < 0)
+        if len(outside):
+            cells[outside] = self.boundary_cells[self.closest_boundary(queries[outside])[1]]
+        return np.asarray(self.regions[cells])
+
+    def named(self, labels: Iterable[int]) -> str:
+        """Labels as text, with their names, to be read: ``1 (scalp) and 2 (skull)``."""
+        texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
+        shown = texts if len(texts) <= MOST_NAMED else [*texts[:MOST_NAMED], f"{len(texts) - MOST_NAMED} more"]
+        return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+
+    @cached_property
+    def region_volumes(self) -> dict[int, float]:
+        """Volume of each region, unit³, by its number in ascending order."""
+        if self.regions.strides == (0,):
+            return {int(self.regions[0]): self.volume}
+        numbers, place = np.unique(self.regions, return_inverse=True)
+        volumes = np.bincount(place, self.volumes)
+        return dict(zip(numbers.tolist(), volumes.tolist(), strict=True))
+
+    def __repr__(self) -> str:
+        regions = len(np.unique(self.regions))
+        parts = "" if regions == 1 else f"{count(regions, 'region')}, "
+        return (
+            f"TetMesh({count(len(self.points), 'node')}, {count(len(self.tetrahedra), 'tetrahedron', 'tetrahedra')}, "
+            f"{parts}{size(self.points, self.unit)}, volume {self.volume:.3g} {self.unit}³)"
+        )
 
 
 def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:

@@ -19,9 +19,11 @@ from skfem.refdom import RefTet, RefTri
 
 from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.assembly import system_matrix
+from tetlux.fem.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
-from tetlux.fem.linear import Solver, multigrid
+from tetlux.fem.linear import Solver
+from tetlux.fem.multigrid import multigrid
 from tetlux.fem.solve import solve
 from tetlux.fem.sources import Subtract
 from tetlux.meshing import Surface, TetMesh, refine
@@ -167,7 +169,7 @@ class Body:
         load = integrals_with_hats(mesh.points, mesh.tetrahedra, mesh.volumes, self.source)
         if self.inflow is not None:
             load += integrals_with_hats(mesh.points, mesh.boundary_faces, mesh.boundary_areas, self.inflow)
-        fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(load)
+        fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(load).x
         return Solution(mesh, mesh.surface, medium, fluence, Power(1.0, 0.0, 0.0, 1.0, 0.0))
 
     def measured(self, level: int) -> Row:
@@ -478,7 +480,7 @@ def point_in_a_ball(finenesses: Sequence[float], subtract: Subtract) -> Table:
     coarse = sphere_surface(radius)
     surface = TrueSphere(coarse.points, coarse.faces)
     light = PointSource((0.0, 0.0, height))
-    lit = lit_points([light.deposit_in(coarse, medium)], medium)
+    lit = lit_points([light.deposit_in(LitBody(coarse, (medium,)))])
 
     def truth(x: FloatArray) -> FloatArray:
         gamma = np.arctan2(np.hypot(x[..., 0], x[..., 1]), x[..., 2])
@@ -528,7 +530,7 @@ def _between_extrapolated_planes(fineness: float) -> tuple[TetMesh, dict[str, fl
     # Rows and columns of the known zeros go: what is left is symmetric.
     matrix = system_matrix(mesh, medium)[inner][:, inner]
     fluence = np.zeros(len(z))
-    fluence[inner] = Solver(matrix, [multigrid]).solve(_point_load(mesh)[inner])
+    fluence[inner] = Solver(matrix, [multigrid]).solve(_point_load(mesh)[inner]).x
 
     # Through the real face, weighed with v, flows what the layer above it takes: ∫ D grad phi . grad v + sigma_a phi v.
     above = mesh.tetrahedra[mesh.points[mesh.tetrahedra, 2].mean(axis=1) > FACE]
@@ -555,7 +557,7 @@ def _between_extrapolated_planes(fineness: float) -> tuple[TetMesh, dict[str, fl
 def _with_robin(fineness: float) -> dict[str, float]:
     mesh = _graded_to_the_point(np.array([-THICKNESS, -8.0, -4.0, -2.0, FACE]), fineness)
     medium = DEEP.medium
-    fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(_point_load(mesh))
+    fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(_point_load(mesh)).x
     face, weights = _nodes_of_face(mesh)
     rho = np.hypot(mesh.points[face, 0], mesh.points[face, 1])
     exitance = fluence[face] / (2.0 * DEEP.boundary_factor)

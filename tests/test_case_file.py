@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.case import Case, library_folder, load_cases
+from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
+from tetlux.cases.shipped import library_folder
 from tetlux.fem import PencilBeam, PointSource
 from tetlux.meshing import InputError, box
 
@@ -83,7 +84,7 @@ def at(line: int) -> str:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("  eta: 1.4", "  etta: 1.4", at(7) + r'medium\.etta: unknown key; did you mean "eta"\?'),
+        ("  eta: 1.4", "  etta: 1.4", at(7) + r'medium\.etta: unknown key; did you mean "eta" \(refractive'),
         ("tolerance: 0.05", "speed: 3", at(12) + "speed: unknown key"),
         ("  sigma_a: 1e-1", "  sigma_a: -0.1", at(5) + r"medium\.sigma_a: sigma_a is -0\.1"),
         (
@@ -140,7 +141,7 @@ def at(line: int) -> str:
         ),
         ("{slab: {width: 6, depth: 1}}", "3", r"surface: expected keys and values, but found 3"),
         ("outputs: [surface]", "sweep: {medium.eta: []}", at(13) + r"sweep\.medium\.eta"),
-        ("outputs: [surface]", "sweep: {medium.eta: [-1]}", at(13) + r"medium\.eta: eta is -1"),
+        ("outputs: [surface]", "sweep: {medium.eta: [-1]}", at(13) + r"medium\.eta: in the run .*=-1: eta is -1"),
         ("name: plate", "name: !!python/object/apply:os.system ['true']", "line 1: not valid YAML"),
     ],
 )
@@ -224,7 +225,8 @@ def test_every_case_that_ships_is_right() -> None:
 def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     schema = json.loads(capsys.readouterr().out)
-    assert set(schema["required"]) == {"surface", "medium", "lights"}
+    assert set(schema["required"]) == {"lights"}
+    assert {"surface", "medium", "mesh"} <= set(schema["properties"])
     assert "sigma_s_prime" in schema["$defs"]["MediumSpec"]["properties"]
 
 
@@ -270,7 +272,7 @@ def test_a_sweep_makes_folders_below_the_case_only(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("sweep: {lights.²: [1]}", r'sweep\.lights\.²: "lights\.²" is no key of this case'),
-        ("sweep: {<<: {medium.eta: [1.4, -1]}}", r"line 13: medium\.eta: eta is -1"),
+        ("sweep: {<<: {medium.eta: [1.4, -1]}}", r"line 13: medium\.eta: in the run medium\.eta=-1: eta is -1"),
         ("sweep: {medium.eta: [[1]]}", r"sweep\.medium\.eta\[0\]: expected a number or a word, but found \[1\]"),
         ("outputs: !!set {surface}", r'line 13: not valid YAML: tags such as "!!set" are not read here'),
         ("camera: 2001-01-01", r"camera: expected keys and values, but found '2001-01-01'"),

@@ -16,7 +16,7 @@ from PIL import Image
 
 from tests.conftest import TISSUE
 from tetlux import cases, fem, meshing
-from tetlux.cases.case import find_case_file, load_cases
+from tetlux.cases.case import load_cases
 from tetlux.cases.chart import benchmark as chart_benchmark
 from tetlux.cases.chart import command as chart_module
 from tetlux.cases.chart import files, finite_elements, reference
@@ -31,6 +31,7 @@ from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
 from tetlux.cases.cli import main
+from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere
 from tetlux.meshing import RunError, Surface, box, tetrahedralize
@@ -410,7 +411,7 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
     [
         (
             ["ball"],
-            "ball is neither a file nor one of the cases that ship: "
+            'ball: did you mean "sphere"? it is neither a file nor one of the cases that ship: '
             "candle, hare, inclusion, laser, marble, slab, sphere, torus.",
         ),
         (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetlux.cases.case import library_folder
+from tetlux.cases.shipped import library_folder
 from tetlux.meshing import Surface, box, cylinder, read_surface, sphere
 from tetlux.meshing.arrays import FloatArray, IntArray
 

@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import block
 from tests.test_paths import carved
 from tetlux.fem import CollimatedBeam, DiffuseLight, EnvironmentLight, Medium, Solution, System, solve
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.fresnel import moments, reflectance
 from tetlux.meshing import InputError, TetMesh, box, tetrahedralize, torus
@@ -88,7 +89,7 @@ def test_a_coarse_environment_is_even_too(ball_mesh: TetMesh) -> None:
 def test_a_concave_body_keeps_light_off_itself(ring: TetMesh) -> None:
     """Of the mesh's nodes those at the middle of the hole see part of the sky, and those outermost all of it."""
     light = EnvironmentLight(np.full((32, 64), 1.0 / math.pi))
-    deposit = light.deposit_in(ring.surface, medium(1.0)).on(ring, ring.surface, coefficients_of(medium(1.0)))
+    deposit = light.deposit_in(Body(ring.surface, (medium(1.0),))).on(ring, ring.surface, coefficients_of(medium(1.0)))
     assert isinstance(deposit.irradiance, np.ndarray)
     distance = np.hypot(*ring.boundary_points.T[:2])
     assert deposit.irradiance[distance > 7.9] == pytest.approx(1.0, abs=0.03)
@@ -136,7 +137,7 @@ def test_a_small_sun_lights_what_a_beam_lights() -> None:
     x, y, z = (-float(part) for part in towards)
     beam = CollimatedBeam((x, y, z), float(across))
     of_sky, of_beam = (
-        each.deposit_in(mesh.surface, of).on(mesh, mesh.surface, coefficients_of(of)) for each in (light, beam)
+        each.deposit_in(Body(mesh.surface, (of,))).on(mesh, mesh.surface, coefficients_of(of)) for each in (light, beam)
     )
     incident = float(mesh.boundary_node_areas @ of_sky.irradiance)
     assert incident == pytest.approx(of_beam.incident, rel=1e-9)

@@ -21,7 +21,7 @@ from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
 from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES
-from tetlux.meshing import RunError, mesher, sphere, tetrahedralize
+from tetlux.meshing import RunError, child_mesher, mesher, sphere, tetrahedralize
 from tetlux.meshing.cache import remember_mesh, remembered_mesh
 from tetlux.meshing.scratch import scratch
 
@@ -291,7 +291,7 @@ def test_interrupted_at_any_stage(
         time.sleep(60)
 
     if stage == "meshing":
-        monkeypatch.setattr(mesher, "MESHER", INTERRUPTS)
+        monkeypatch.setattr(child_mesher, "MESHER", INTERRUPTS)
     elif stage == "drawing":
         monkeypatch.setattr(picture, "RENDERER", INTERRUPTS)
     else:
@@ -325,8 +325,8 @@ def test_a_scheduler_may_stop_it(number: signal.Signals, tmp_path: Path) -> None
     temporary = tmp_path / "tmp"
     temporary.mkdir()
     # Its mesher would take for ever.
-    hanging = "import sys; from tetlux.meshing import mesher; from tetlux.cases.cli import main;" + (
-        "mesher.MESHER = (sys.executable, '-c', 'import time; time.sleep(60)'); sys.exit(main(sys.argv[1:]))"
+    hanging = "import sys; from tetlux.meshing import child_mesher; from tetlux.cases.cli import main;" + (
+        "child_mesher.MESHER = (sys.executable, '-c', 'import time; time.sleep(60)'); sys.exit(main(sys.argv[1:]))"
     )
     command = [sys.executable, "-c", hanging, "run", str(written(tmp_path)), "--out", str(tmp_path / "out")]
     environment = {**os.environ, "TMPDIR": str(temporary), "TETLUX_CACHE_DIR": str(tmp_path / "cache")}
@@ -451,7 +451,7 @@ def test_a_mesher_that_dies_fails_its_case_only(
     (tmp_path / "bad.yaml").write_text(good.read_text().replace("name: ball", "").replace("radius: 10", "radius: 11"))
     assert main(["run", str(good), "--out", str(tmp_path / "first")]) == 0
     # The ball's mesh is remembered.
-    monkeypatch.setattr(mesher, "MESHER", (sys.executable, "-c", code))
+    monkeypatch.setattr(child_mesher, "MESHER", (sys.executable, "-c", code))
     assert main(["run", str(tmp_path / "bad.yaml"), str(good), "--out", str(tmp_path / "out")]) == 1
     assert f"tetlux: bad failed: sphere: the mesher failed ({said}" in capsys.readouterr().err
     assert finished(tmp_path / "out" / "ball") == 2.0

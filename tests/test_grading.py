@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.conftest import block
-from tetlux.fem import Deposit, Medium
+from tetlux.fem import Deposit
 from tetlux.fem.grading import graded_towards, lit_points
 
 
@@ -12,13 +12,11 @@ def test_of_several_channels_the_finest_counts() -> None:
     places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
     deposits = [Deposit(lit=places[:2], resolution=0.5), Deposit(lit=places, resolution=0.2)]
     for order in (deposits, deposits[::-1]):
-        points, resolutions = lit_points(
-            [*order, Deposit(lit=places[1:2], resolution=0.1)], Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4)
-        )
+        points, resolutions = lit_points([*order, Deposit(lit=places[1:2], resolution=0.1)])
         assert sorted(points.tolist()) == sorted(places.tolist())
         found = dict(zip(map(tuple, points.tolist()), resolutions.tolist(), strict=True))
         assert found == {(0.0, 0.0, 0.0): 0.2, (1.0, 0.0, 0.0): 0.1, (0.0, 2.0, 0.0): 0.2}
-    points, resolutions = lit_points([Deposit()], Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4))
+    points, resolutions = lit_points([Deposit()])
     assert points.shape == (0, 3)
     assert resolutions.shape == (0,)
 

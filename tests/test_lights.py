@@ -8,6 +8,7 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, paths, solve
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.fresnel import reflectance
@@ -23,7 +24,7 @@ def total(deposit: Deposit) -> float:
 
 
 def test_a_point_source_keeps_its_power(ball: Surface, ball_mesh: TetMesh) -> None:
-    deposit = PointSource((1.0, 2.0, 3.0), power=2.5).deposit_in(ball, TISSUE)
+    deposit = PointSource((1.0, 2.0, 3.0), power=2.5).deposit_in(Body(ball, (TISSUE,)))
     assert (deposit.incident, total(deposit)) == (2.5, 2.5)
     load = load_vector(ball_mesh, coefficients_of(TISSUE), deposit)
     assert load.sum() == pytest.approx(2.5, rel=1e-14)
@@ -33,7 +34,7 @@ def test_a_point_source_keeps_its_power(ball: Surface, ball_mesh: TetMesh) -> No
 
 def test_a_pencil_beam_at_right_angles_puts_one_point_a_mean_free_path_deep() -> None:
     plate = slab(60.0, 10.0)
-    deposit = PencilBeam((1.0, 2.0, 5.0), (0.0, 0.0, -2.0), power=3.0).deposit_in(plate, TISSUE)
+    deposit = PencilBeam((1.0, 2.0, 5.0), (0.0, 0.0, -2.0), power=3.0).deposit_in(Body(plate, (TISSUE,)))
     assert deposit.points == pytest.approx(np.array([[1.0, 2.0, -TISSUE.mean_free_path]]))
     assert deposit.specular == pytest.approx(3 * (0.4 / 2.4) ** 2)
     assert deposit.powers[0] == pytest.approx(TISSUE.albedo * (3 - deposit.specular))
@@ -43,7 +44,9 @@ def test_a_pencil_beam_at_right_angles_puts_one_point_a_mean_free_path_deep() ->
 def test_a_slanting_beam_refracts() -> None:
     angle = math.radians(50)
     direction = (math.sin(angle), 0.0, -math.cos(angle))
-    deposit = PencilBeam((-5 * direction[0], 0.0, 5 * math.cos(angle)), direction).deposit_in(slab(60.0, 10.0), TISSUE)
+    deposit = PencilBeam((-5 * direction[0], 0.0, 5 * math.cos(angle)), direction).deposit_in(
+        Body(slab(60.0, 10.0), (TISSUE,))
+    )
     inside = math.asin(math.sin(angle) / 1.4)
     expected = TISSUE.mean_free_path * np.array([[math.sin(inside), 0, -math.cos(inside)]])
     assert deposit.points == pytest.approx(expected, abs=1e-9)
@@ -54,7 +57,7 @@ def test_a_line_fades_by_delta_eddington_and_leaves_the_rest_at_the_far_side() -
     thin = slab(20.0, 0.5)
     beam = PencilBeam((0.1, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
     mesh = block((8, 8, 2), (20.0, 20.0, 0.5))
-    deposit = beam.deposit_in(thin, FORWARD).on(mesh, thin, coefficients_of(FORWARD))
+    deposit = beam.deposit_in(Body(thin, (FORWARD,))).on(mesh, thin, coefficients_of(FORWARD))
     extinction = 0.05 + 10 * (1 - 0.81)
     lost = (0.4 / 2.4) ** 2
     through = (1 - lost) * math.exp(-extinction * 0.5)
@@ -115,7 +118,7 @@ def test_a_slanting_line_is_integrated_exactly() -> None:
 
 
 def test_a_beam_with_a_radius_is_spread_evenly_over_its_disc() -> None:
-    deposit = PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(slab(60.0, 10.0), TISSUE)
+    deposit = PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(Body(slab(60.0, 10.0), (TISSUE,)))
     distance = np.linalg.norm(deposit.points[:, :2], axis=1)
     assert distance.max() < 2.0
     # Over a disc the mean square distance from the middle is half the radius squared.
@@ -125,7 +128,7 @@ def test_a_beam_with_a_radius_is_spread_evenly_over_its_disc() -> None:
 
 
 def test_what_misses_is_not_incident() -> None:
-    deposit = PencilBeam((30.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(slab(60.0, 10.0), TISSUE)
+    deposit = PencilBeam((30.0, 0.0, 5.0), (0.0, 0.0, -1.0), radius=2.0).deposit_in(Body(slab(60.0, 10.0), (TISSUE,)))
     assert deposit.incident == pytest.approx(0.5, abs=0.05)
     assert "misses the body" in deposit.warnings[0]
 
@@ -133,10 +136,10 @@ def test_what_misses_is_not_incident() -> None:
 def test_warnings_of_deposits() -> None:
     plate, thin = slab(60.0, 10.0), slab(60.0, 0.5)
     beam = PencilBeam((0.0, 0.0, 5.0), (0.0, 0.0, -1.0))
-    assert beam.deposit_in(plate, TISSUE).warnings == ()
-    assert "singular" in replace(beam, deposit="line").deposit_in(plate, TISSUE).warnings[0]
-    assert "less than two mean free paths" in beam.deposit_in(thin, TISSUE).warnings[0]
-    assert beam.deposit_in(thin, TISSUE).points[0, 2] == pytest.approx(-0.25)
+    assert beam.deposit_in(Body(plate, (TISSUE,))).warnings == ()
+    assert "singular" in replace(beam, deposit="line").deposit_in(Body(plate, (TISSUE,))).warnings[0]
+    assert "less than two mean free paths" in beam.deposit_in(Body(thin, (TISSUE,))).warnings[0]
+    assert beam.deposit_in(Body(thin, (TISSUE,))).points[0, 2] == pytest.approx(-0.25)
 
 
 @pytest.mark.parametrize(
@@ -157,14 +160,14 @@ def test_warnings_of_deposits() -> None:
 def test_lights_that_cannot_be(make: object, message: str, ball: Surface) -> None:
     assert callable(make)
     with pytest.raises(InputError, match=message):
-        make().deposit_in(ball, TISSUE)
+        make().deposit_in(Body(ball, (TISSUE,)))
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.4])
 def test_diffuse_light_on_a_ball_against_its_closed_form(eta: float, ball: Surface) -> None:
     medium = Medium(sigma_a=0.05, sigma_s_prime=1.0, eta=eta)
     solution = solve(ball, medium, [DiffuseLight(3.0)], tolerance=0.01)
-    transmitted = DiffuseLight(3.0).deposit_in(ball, medium).transmitted_irradiance
+    transmitted = DiffuseLight(3.0).deposit_in(Body(ball, (medium,))).transmitted_irradiance
     expected = transmitted * sphere_light.diffuse_exitance(medium, radius=10.0)
     # Three runs each: the power 0.19 to 0.32 % off, the worst node 1.5 to 1.8 %.
     assert solution.power.exited / solution.mesh.area == pytest.approx(expected, rel=0.005)
@@ -178,7 +181,7 @@ def test_diffuse_light_that_cannot_be(ball: Surface) -> None:
     with pytest.raises(InputError, match="irradiance is 0"):
         DiffuseLight(0.0)
     with pytest.raises(InputError, match='needs the boundary "exact"'):
-        DiffuseLight(1.0).deposit_in(ball, replace(TISSUE, boundary="classic"))
+        DiffuseLight(1.0).deposit_in(Body(ball, (replace(TISSUE, boundary="classic"),)))
 
 
 def test_a_slanting_line_beam_meets_the_far_face_at_its_angle() -> None:
@@ -187,7 +190,7 @@ def test_a_slanting_line_beam_meets_the_far_face_at_its_angle() -> None:
     clear = Medium(sigma_a=0.0, sigma_s=0.1, g=0.0, eta=1.4)
     beam = PencilBeam((-3 * direction[0], 0.1, 3 * math.cos(angle)), direction, deposit="line")
     plate, mesh = slab(400.0, 4.0), block((4, 4, 2), (400.0, 400.0, 4.0))
-    deposit = beam.deposit_in(plate, clear).on(mesh, plate, coefficients_of(clear))
+    deposit = beam.deposit_in(Body(plate, (clear,))).on(mesh, plate, coefficients_of(clear))
     inside = math.asin(math.sin(angle) / 1.4)
     assert deposit.lengths[:3] == pytest.approx(4 / math.cos(inside))
     # Stokes: the same share is reflected from inside at the refracted angle as from outside at the first.
@@ -205,7 +208,7 @@ def test_what_is_still_caught_after_many_reflections_is_booked(monkeypatch: pyte
     beam = PencilBeam((0.2, 0.1, 2.0), (0.3, 0.2, -1.0), deposit="line")
     cube, mesh = box((2.0, 2.0, 2.0)), block((2, 2, 2), (2.0, 2.0, 2.0))
     mesh = TetMesh(mesh.points + np.array([0.0, 0.0, 1.0]), mesh.tetrahedra)
-    deposit = beam.deposit_in(cube, clear).on(mesh, cube, coefficients_of(clear))
+    deposit = beam.deposit_in(Body(cube, (clear,))).on(mesh, cube, coefficients_of(clear))
     scattered = load_vector(mesh, coefficients_of(clear), deposit).sum()
     # The first way, and of each of the others what is reflected.
     assert len(deposit.lengths) == 3
@@ -238,19 +241,19 @@ def test_surfaces_inside_the_body_do_not_stop_a_beam() -> None:
     outer, inner = box((20.0, 20.0, 20.0)), box((4.0, 4.0, 4.0))
     shells = surface_from_arrays(np.vstack([outer.points, inner.points]), np.vstack([outer.faces, inner.faces + 8]))
     beam = PencilBeam((0.3, 0.4, 30.0), (0.0, 0.0, -1.0), deposit="line")
-    assert beam.deposit_in(shells, FORWARD).lengths[0] == pytest.approx(20.0)
+    assert beam.deposit_in(Body(shells, (FORWARD,))).lengths[0] == pytest.approx(20.0)
     overlapping = box((20.0, 20.0, 20.0), center=(0.0, 0.0, 15.0))
     both = surface_from_arrays(
         np.vstack([outer.points, overlapping.points]), np.vstack([outer.faces, overlapping.faces + 8])
     )
-    assert beam.deposit_in(both, FORWARD).lengths[0] == pytest.approx(35.0)
+    assert beam.deposit_in(Body(both, (FORWARD,))).lengths[0] == pytest.approx(35.0)
 
 
 def test_a_beam_that_touches_an_edge_from_outside_is_outside() -> None:
     for side in (1.0, -1.0):
         beam = PencilBeam((0.0, 0.0, 2.0), (side, 0.0, -1.0))
         with pytest.raises(InputError, match="misses"):
-            beam.deposit_in(box((1.99, 2.0, 2.0)), TISSUE)
+            beam.deposit_in(Body(box((1.99, 2.0, 2.0)), (TISSUE,)))
         # On the edge itself it may or may not enter; that it starts inside would be wrong.
         cube = box((2.0, 2.0, 2.0))
         assert not cube.contains(np.array([beam.origin]))[0]
@@ -273,7 +276,7 @@ def test_beams_enter_the_smooth_surface_that_triangles_stand_for() -> None:
     for x, y in ((0.3, 0.2), (2.0, 3.0), (5.0, -4.0)):
         (found,) = (
             PencilBeam((x, y, 20.0), (0.0, 0.0, -1.0))
-            .deposit_in(ball, Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4))
+            .deposit_in(Body(ball, (Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4),)))
             .points
         )
         entry = np.array([x, y, math.sqrt(100.0 - x**2 - y**2)])

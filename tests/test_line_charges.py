@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import TISSUE
 from tetlux.fem import Deposit, Medium, PencilBeam, solve
 from tetlux.fem import line_charges as lines
+from tetlux.fem.body import Body
 from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.line_charges import in_points
@@ -177,15 +178,18 @@ def test_a_beam_through_a_thin_slab_keeps_its_power() -> None:
 def test_only_beams_without_width_are_points(ball: Surface) -> None:
     thin = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line")
     wide = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=1.0, deposit="line")
-    one, other = sources_of([thin], ball, [FORWARD], "half-space"), sources_of([wide], ball, [FORWARD], "half-space")
+    one, other = (
+        sources_of([thin], Body(ball, (FORWARD,)), "half-space"),
+        sources_of([wide], Body(ball, (FORWARD,)), "half-space"),
+    )
     assert len(one.charges) == 1
     assert len(one.deposits[0].starts) == 0
     assert one.deposits[0].resolution == FORWARD.mean_free_path
     assert len(other.charges) == 0
     # Without images its rays' points could be afforded.
-    assert len(sources_of([wide], ball, [FORWARD], "free-space").charges) == 0
+    assert len(sources_of([wide], Body(ball, (FORWARD,)), "free-space").charges) == 0
     assert other.on_mesh[0].on_mesh is not None
-    plain = sources_of([thin], ball, [FORWARD], "nothing")
+    plain = sources_of([thin], Body(ball, (FORWARD,)), "nothing")
     assert len(plain.charges) == 0
     assert plain.on_mesh[0] is plain.deposits[0]
 
@@ -195,9 +199,9 @@ def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
         PencilBeam((20.0 * math.cos(a), 20.0 * math.sin(a), 0.0), (-math.cos(a), -math.sin(a), 0.0), deposit="line")
         for a in 0.3 * np.arange(20)
     ]
-    sources = sources_of(beams, ball, [FORWARD], "half-space")
+    sources = sources_of(beams, Body(ball, (FORWARD,)), "half-space")
     assert 5 < len(sources.charges) < 20
     assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
     put = sum(float(c.strengths[: c.sources].sum()) for c in sources.charges)
     put += sum(scattered(d, FORWARD) for d in sources.on_mesh)
-    assert put == pytest.approx(sum(scattered(b.deposit_in(ball, FORWARD), FORWARD) for b in beams), rel=1e-12)
+    assert put == pytest.approx(sum(scattered(b.deposit_in(Body(ball, (FORWARD,))), FORWARD) for b in beams), rel=1e-12)

@@ -1,5 +1,6 @@
 """The linear solvers: one solution by all of them, true residuals, the ledger, and what happens when one fails."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -9,15 +10,20 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Medium, PointSource, linear, solve
+from tetlux.fem import Medium, PointSource, krylov, linear, solve
+from tetlux.fem import multigrid as multigrid_module
 from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
 from tetlux.fem.coefficients import apart, coefficients_of
-from tetlux.fem.linear import Method, Product, Solver, direct, jacobi, multigrid, solver_for
+from tetlux.fem.direct import direct
+from tetlux.fem.krylov import Method, Product, jacobi
+from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.multigrid import multigrid
 from tetlux.meshing import RunError, TetMesh, blocks, refine
 
-METHODS = [jacobi, multigrid, direct]
+METHODS: list[Callable[[Product], Method]] = [jacobi, multigrid, direct]
 # Nearly singular; strongly absorbing.
 CLEAR = Medium(sigma_a=1e-4, sigma_s_prime=0.9999, eta=1.5)
+CLEAREST = Medium(sigma_a=1e-6, sigma_s_prime=1.0, eta=2.0)
 DARK = Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.4)
 
 
@@ -43,7 +49,7 @@ def loads_on(mesh: TetMesh, count: int = 3) -> np.ndarray:
 @pytest.mark.parametrize("method", METHODS)
 def test_every_method_solves(method: Callable[[Product], Method], medium: Medium, wide: TetMesh) -> None:
     matrix, loads = system_matrix(wide, medium), loads_on(wide)
-    found = Solver(matrix, [method]).solve(loads)
+    found = Solver(matrix, [method]).solve(loads).x
     assert (np.linalg.norm(loads - matrix @ found, axis=0) < 2e-11).all()
     truth = spsolve(matrix.tocsc(), loads)
     # In a strong absorber the residual says less of the exitance, which is a billionth of the fluence at the source.
@@ -56,11 +62,11 @@ def test_every_method_solves(method: Callable[[Product], Method], medium: Medium
 def test_the_ledger_closes_wherever_the_iteration_stops(
     monkeypatch: pytest.MonkeyPatch, aim: float, medium: Medium, wide: TetMesh
 ) -> None:
-    monkeypatch.setattr(linear, "AIM", aim)
+    monkeypatch.setattr(krylov, "AIM", aim)
     monkeypatch.setattr(linear, "REFUSED", 1.0)
     load = loads_on(wide, 1)[:, 0]
     matrix = system_matrix(wide, medium)
-    fluence = Solver(matrix, [jacobi]).solve(load)
+    fluence = Solver(matrix, [jacobi]).solve(load).x
     out = wide.boundary_node_areas @ fluence[wide.boundary_nodes] / (2.0 * medium.boundary_factor)
     assert out + medium.sigma_a * (wide.node_volumes @ fluence) == pytest.approx(1.0, abs=1e-12)
 
@@ -72,19 +78,19 @@ def test_many_loads_are_solved_as_one_by_one(
     large: bool, count: int, cores: int, wide: TetMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In groups where there are many, and one by one where a single product has all cores at work."""
-    monkeypatch.setattr(linear, "THREADS", cores)
-    monkeypatch.setattr(blocks, "THREADS", cores)
+    for module in (krylov, linear, blocks):
+        monkeypatch.setattr(module, "THREADS", cores)
     if large:
-        monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
+        monkeypatch.setattr(krylov, "ENTRIES_FOR_THREADS", 1)
     loads = loads_on(wide, count)
     loads[:, 1] = 0.0
     loads[:, 2] *= 1e6
     solver = Solver(system_matrix(wide, TISSUE), [multigrid])
-    together = solver.solve(loads)
+    together = solver.solve(loads).x
     assert together.shape == loads.shape
     assert (together[:, 1] == 0.0).all()
     for column in range(count):
-        alone = solver.solve(loads[:, column])
+        alone = solver.solve(loads[:, column]).x
         assert alone.shape == (len(loads),)
         assert np.linalg.norm(alone - together[:, column]) <= 1e-9 * np.linalg.norm(alone)
 
@@ -111,26 +117,46 @@ def test_multigrid_does_not_slow_down_as_the_mesh_grows(monkeypatch: pytest.Monk
     assert iterations["multigrid"][1] < 1.6 * iterations["multigrid"][0]
 
 
+@pytest.mark.parametrize("count", [None, 1, 3, 50])
+def test_a_result_says_what_it_took(count: int | None, wide: TetMesh) -> None:
+    matrix, load = system_matrix(wide, TISSUE), loads_on(wide, count or 1)
+    if count is None:
+        load = load[:, 0]
+    found = {method.__name__: Solver(matrix, [method]).solve(load) for method in METHODS}
+    for name, result in found.items():
+        left = np.linalg.norm(load - matrix @ result.x, axis=0) / np.linalg.norm(load, axis=0)
+        assert result.x.shape == load.shape
+        assert result.residual == pytest.approx(np.max(left), rel=0.01, abs=1e-14)
+        assert result.method == name
+    assert found["direct"].iterations == 0
+    assert 5 < found["multigrid"].iterations < 0.5 * found["jacobi"].iterations
+    rough = Solver(matrix, [jacobi]).roughly(loads_on(wide))
+    left = np.linalg.norm(loads_on(wide) - matrix @ rough.x, axis=0)
+    assert rough.residual == pytest.approx(left.max(), rel=0.01)
+    assert 5 < rough.iterations < 0.7 * found["jacobi"].iterations
+
+
 def test_what_one_method_leaves_the_next_one_solves(wide: TetMesh) -> None:
     matrix, load = system_matrix(wide, TISSUE), loads_on(wide, 1)[:, 0]
     prepared = []
 
     def helpless(product: Product) -> Method:
-        return lambda rest: np.full_like(rest, np.nan)
+        return lambda rest: (np.full_like(rest, np.nan), 1)
 
     def rough(product: Product) -> Method:
         inverse = 1.0 / product.matrix.diagonal()[:, None]
-        return lambda rest: 0.1 * inverse * rest
+        return lambda rest: (0.1 * inverse * rest, 1)
 
     def thorough(product: Product) -> Method:
         prepared.append(product)
         return direct(product)
 
     solver = Solver(matrix, [helpless, rough, thorough])
-    found = solver.solve(load)
+    found = solver.solve(load).x
     assert solver.note.startswith("the linear solver had to fall back from helpless to thorough")
     assert np.linalg.norm(load - matrix @ found) < 2e-11
     assert len(prepared) == 1
+    assert solver.solve(load).method == "thorough"
     enough = Solver(matrix, [direct, thorough])
     enough.solve(load)
     assert enough.note == ""
@@ -145,15 +171,15 @@ def test_what_is_left_is_solved_for_again(wide: TetMesh) -> None:
 
     def short(product: Product) -> Method:
         method = direct(product)
-        return lambda rest: 0.999 * method(rest)
+        return lambda rest: (0.999 * method(rest)[0], 0)
 
-    assert np.linalg.norm(load - matrix @ Solver(matrix, [short]).solve(load)) < 2e-11
+    assert np.linalg.norm(load - matrix @ Solver(matrix, [short]).solve(load).x) < 2e-11
 
 
 def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetMesh) -> None:
     matrix = system_matrix(wide, TISSUE)
-    monkeypatch.setattr(linear, "ENTRIES_FOR_THREADS", 1)
-    monkeypatch.setattr(linear, "THREADS", 3)
+    monkeypatch.setattr(krylov, "ENTRIES_FOR_THREADS", 1)
+    monkeypatch.setattr(krylov, "THREADS", 3)
     x = np.random.default_rng(0).normal(size=(matrix.shape[0], 2))
     product = Product(matrix)
     assert len(product._blocks) == 3
@@ -164,7 +190,7 @@ def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetM
 def test_nodes_without_neighbours_are_no_obstacle() -> None:
     """Where absorption outweighs everything there is nothing to aggregate."""
     matrix = csr_array(diags_array(np.linspace(1.0, 2.0, 1000)))
-    assert Solver(matrix, [multigrid]).solve(np.ones(1000)) == pytest.approx(1.0 / np.linspace(1.0, 2.0, 1000))
+    assert Solver(matrix, [multigrid]).solve(np.ones(1000)).x == pytest.approx(1.0 / np.linspace(1.0, 2.0, 1000))
 
 
 @pytest.mark.parametrize(
@@ -175,7 +201,43 @@ def test_the_solver_goes_by_size(cells: int, loads: int, expected: Callable[[Pro
     solver = solver_for(system_matrix(mesh, TISSUE), loads)
     assert solver._methods[0] is expected
     load = loads_on(mesh, 1)
-    assert np.linalg.norm(load - solver.matrix @ solver.solve(load)) < 2e-11
+    assert np.linalg.norm(load - solver.matrix @ solver.solve(load).x) < 2e-11
+
+
+# Regions a thousandfold and more apart: absorption and reduced scattering of the inner one.
+CORES = [(100.0, 1.0), (0.01, 1e-4), (0.01, 1e4), (100.0, 1e4), (1e-6, 1e-4)]
+
+
+def matrix_with_a_core(mesh: TetMesh, sigma_a: float, sigma_s_prime: float) -> csr_array:
+    """Tissue, and other coefficients within a ball in its middle."""
+    core = Medium(sigma_a=sigma_a, sigma_s_prime=sigma_s_prime, eta=TISSUE.eta)
+    centres = mesh.points[mesh.tetrahedra].mean(axis=1)
+    inside = np.linalg.norm(centres - mesh.points.mean(axis=0), axis=1) < 5.0
+    return Assembly(mesh).of(
+        replace(
+            coefficients_of(TISSUE),
+            sigma_a=np.where(inside, core.sigma_a, TISSUE.sigma_a),
+            sigma_t_prime=np.where(inside, core.sigma_t_prime, TISSUE.sigma_t_prime),
+        )
+    )
+
+
+@pytest.mark.parametrize(("cells", "count", "first"), [(16, 1, jacobi), (26, 3, jacobi), (12, 20, direct)])
+def test_without_pyamg_residuals_are_as_small(
+    cells: int, count: int, first: Callable[[Product], Method], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Strong internal reflection, strong absorption, and regions 1e4 apart."""
+    monkeypatch.setattr(linear, "HAS_PYAMG", False)
+    monkeypatch.setitem(sys.modules, "pyamg.aggregation", None)
+    mesh = block((cells,) * 3, (20.0,) * 3)
+    matrices = [system_matrix(mesh, medium) for medium in (CLEAR, DARK, CLEAREST)]
+    matrices += [matrix_with_a_core(mesh, *core) for core in CORES]
+    for matrix in matrices:
+        solver, loads = solver_for(matrix, count), loads_on(mesh, count)
+        assert solver._methods[0] is first
+        assert multigrid not in solver._methods
+        assert (np.linalg.norm(loads - matrix @ solver.solve(loads).x, axis=0) < 2e-11).all()
+        assert solver.note == ""
 
 
 @pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
@@ -187,7 +249,7 @@ def test_a_rough_solution_is_good_to_a_few_digits(
     # Of any size, and one that is nothing.
     loads = np.column_stack([1e6 * loads[:, :1], 1e-6 * loads[:, 1:], np.zeros(len(loads))])
     solver = Solver(matrix, [method])
-    found = solver.roughly(loads)
+    found = solver.roughly(loads).x
     assert (np.linalg.norm(loads - matrix @ found, axis=0) <= 1e-3 * np.linalg.norm(loads, axis=0)).all()
     assert not found[:, -1].any()
 
@@ -196,15 +258,15 @@ def test_a_rough_solution_that_is_too_rough_is_solved_in_full(wide: TetMesh) -> 
     matrix, loads = system_matrix(wide, TISSUE), loads_on(wide)
 
     def useless(_: Product) -> Method:
-        return np.zeros_like
+        return lambda rest: (np.zeros_like(rest), 1)
 
-    found = Solver(matrix, [useless, direct]).roughly(loads)
+    found = Solver(matrix, [useless, direct]).roughly(loads).x
     assert (np.linalg.norm(loads - matrix @ found, axis=0) < 2e-11).all()
 
 
 def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest.MonkeyPatch) -> None:
     def helpless(product: Product) -> Method:
-        return lambda rest: 0.0 * rest
+        return lambda rest: (0.0 * rest, 1)
 
     monkeypatch.setattr("tetlux.fem.assembly.solver_for", lambda matrix, *_: Solver(matrix, [helpless, direct]))
     solution = solve(wide, TISSUE, [PointSource((0.0, 0.0, -1.0))])
@@ -213,13 +275,13 @@ def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest
 
 
 def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
-    mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], linear._level
+    mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], multigrid_module._level
 
-    def counting(product: Product) -> linear._Level | None:
+    def counting(product: Product) -> multigrid_module._Level | None:
         prepared.append(product.matrix.shape[0])
         return level(product)
 
-    monkeypatch.setattr(linear, "_level", counting)
+    monkeypatch.setattr(multigrid_module, "_level", counting)
     assembly, loads = Assembly(mesh), loads_on(mesh)
     base, near, beyond, far = (
         coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.125, 0.9)
@@ -232,7 +294,7 @@ def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPa
         assert (len(mesh.points) in prepared) == anew
         matrix = assembly.of(coefficients)
         assert np.array_equal(solver.matrix.data, matrix.data)
-        assert (np.linalg.norm(loads - matrix @ solver.solve(loads), axis=0) < 2e-11).all()
+        assert (np.linalg.norm(loads - matrix @ solver.solve(loads).x, axis=0) < 2e-11).all()
         assert solver.note == ""
 
 

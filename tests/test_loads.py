@@ -8,6 +8,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import Deposit, Medium, PencilBeam
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.loads import load_vector
 from tetlux.meshing import Surface, TetMesh, cell_tree
@@ -187,7 +188,7 @@ def test_what_runs_outside_goes_to_the_nearest_nodes() -> None:
 def test_a_wide_beam_in_a_ball_is_cut_as_one_by_one(ball: Surface, ball_mesh: TetMesh) -> None:
     """It enters and leaves through the true surface, outside the mesh's facets."""
     beam = PencilBeam((0.5, -0.3, 20.0), (0.1, 0.2, -1.0), radius=4.0, deposit="line")
-    deposit = beam.deposit_in(ball, FORWARD)
+    deposit = beam.deposit_in(Body(ball, (FORWARD,)))
     load = load_vector(ball_mesh, coefficients_of(FORWARD), deposit)
     assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     some = slice(None, None, 20)

@@ -9,6 +9,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
 from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
@@ -399,9 +400,8 @@ def several(mesh: TetMesh, medium: Medium) -> Coefficients:
     """Coefficients that differ from tetrahedron to tetrahedron."""
     scattering, cosine = medium.delta_eddington
     shares = 0.5 + np.random.default_rng(7).random(len(mesh.tetrahedra))
-    return Coefficients(
-        medium.sigma_a * shares, medium.sigma_t_prime * shares, scattering * shares, cosine * shares**0, medium
-    )
+    values = medium.sigma_a * shares, medium.sigma_t_prime * shares, scattering * shares, cosine * shares**0
+    return Coefficients(*values, medium.mean_cosine, medium)
 
 
 CLEAR = Medium(sigma_a=0.01, sigma_s=0.2, g=0.5, eta=1.4)
@@ -418,7 +418,7 @@ def test_beams_know_where_they_begin(
 ) -> None:
     """Also those that are reflected inside: the boundary's index is 1.4."""
     coefficients = coefficients_of(CLEAR) if uniform else several(ball_mesh, CLEAR)
-    light = LIGHTS[name].deposit_in(ball, CLEAR, uniform=uniform)
+    light = LIGHTS[name].deposit_in(Body(ball, (CLEAR,) if uniform else (CLEAR, CLEAR)))
     deposit = light.on(ball_mesh, ball, coefficients)
     assert deposit.cells is not None
     known = np.flatnonzero(deposit.cells >= 0)

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE
+from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, Solution, solve
-from tetlux.meshing import InputError, Surface, TetMesh, sphere, surface_from_arrays
+from tetlux.fem.body import Body
+from tetlux.meshing import InputError, Surface, TetMesh, mesh_from_arrays, sphere, surface_from_arrays
 from tetlux.meshing.notes import Note, codes_of, in_region, prefixed
 
 NOTE = Note("low-albedo", "the reduced albedo is 0.5.", region="core", value=0.5)
@@ -58,7 +60,7 @@ def test_warnings_of_a_solution_are_notes(ball: Surface, ball_mesh: TetMesh) -> 
     assert missed.value == coarse.error_estimate
     dark = solve(ball, Medium(sigma_a=1.0, sigma_s_prime=1.0, eta=1.4), source, mesh=ball_mesh)
     assert "low-albedo" in codes_of(dark.warnings)
-    line = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line").deposit_in(ball, TISSUE)
+    line = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line").deposit_in(Body(ball, (TISSUE,)))
     assert codes_of(line.warnings) == {"beam-singular"}
 
 
@@ -75,6 +77,27 @@ def test_warnings_of_a_surface_are_notes(ball: Surface) -> None:
     points, faces = np.vstack([ball.points, ball.points + 30.0]), np.vstack([ball.faces, ball.faces + len(ball.points)])
     two = surface_from_arrays(points, faces)
     assert [parts(warning) for warning in two.warnings] == [("several-bodies", None, 2)]
+
+
+def test_warnings_of_a_mesh_of_labels_are_notes() -> None:
+    points, tetrahedra, places = cube_of_cubes(5, 4.0)
+    hollow = (places != 2).any(axis=1)
+    labels = np.where(places[hollow][:, 2] >= 3, 7, 1)
+    count = len(points)
+    # Its upper part with nodes of its own, which are joined; and the whole twice, apart.
+    doubled = np.where((labels == 7)[:, None], tetrahedra[hollow] + count, tetrahedra[hollow])
+    both = np.vstack([points, points, points + 100.0, points + 100.0])
+    mesh = mesh_from_arrays(
+        both, np.vstack([doubled, doubled + 2 * count]), labels=np.tile(labels, 2), names={7: "lid"}
+    )
+    absorbing = Medium(sigma_a=1.0, sigma_s_prime=1.0, eta=1.4)
+    solution = solve(mesh, {"lid": absorbing, 1: TISSUE}, [PointSource((10.0, 10.0, 4.0))], tolerance=0.5)
+    assert all(isinstance(warning, Note) for warning in solution.warnings)
+    assert {"mesh-repaired", "several-bodies", "cavities", "low-albedo"} <= codes_of(solution.warnings)
+    (note,) = [warning for warning in solution.warnings if isinstance(warning, Note) and warning.region]
+    assert note.startswith(f"{note.region}: the reduced albedo is 0.5")
+    assert note.region is not None
+    assert "lid" in note.region
 
 
 def test_an_error_keeps_what_is_wrong_and_what_to_do() -> None:

@@ -9,12 +9,13 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+import pyvista
 import trimesh
 
 from tetlux.cases import run as run_module
 from tetlux.cases.case import Case, load_cases
 from tetlux.cases.colours import LUMINANCE, preview, to_linear, to_srgb
-from tetlux.cases.results import results_of
+from tetlux.cases.results import Results, results_of
 from tetlux.cases.run import run_case
 from tetlux.cases.sensors import readings
 from tetlux.fem import solve
@@ -48,6 +49,10 @@ class Finished:
     summary: dict[str, Any]
     surface: meshio.Mesh
 
+    @property
+    def results(self) -> Results:
+        return results_of(self.case, self.solutions)
+
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
@@ -68,7 +73,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 
 def test_the_files_of_the_run(finished: Finished) -> None:
-    names = ["detectors.csv", "picture.png", "summary.json", "surface.ply", "volume.vtu"]
+    names = ["detectors.csv", "picture.png", "summary.json", "surface.ply", "surface.vtp", "volume.vtu"]
     assert sorted(p.name for p in finished.folder.iterdir()) == names
 
 
@@ -119,6 +124,40 @@ def test_the_surface_has_the_exitance_of_each(finished: Finished) -> None:
     np.testing.assert_allclose(sum(values[f"exitance_{c}"] for c in CHANNELS), values["exitance"], rtol=1e-9)
     assert not values["exitance_beam_blue"].any()
     assert values["exitance_beam_red"].max() > 1.5 * values["exitance_beam_green"].max()
+
+
+def test_vtk_shows_all_that_the_ply_holds(finished: Finished) -> None:
+    """Readers of VTK find no values in a PLY."""
+    shown = pyvista.read(finished.folder / "surface.vtp")
+    ply, colours = finished.surface, finished.results.preview[0]
+    assert shown.active_scalars_name == "exitance"
+    assert set(shown.point_data) == {*ply.point_data, "preview"}
+    for name, values in ply.point_data.items():
+        # meshio takes bytes for signed ones.
+        np.testing.assert_array_equal(shown.point_data[name], values.astype(shown.point_data[name].dtype))
+    np.testing.assert_array_equal(shown.point_data["preview"], colours)
+    np.testing.assert_array_equal(shown.points, ply.points)
+    np.testing.assert_array_equal(shown.regular_faces, ply.cells_dict["triangle"])
+    assert shown.field_data["units"] == ["lengths in mm, exitance in W/mm^2"]
+    assert shown.field_data["case"] == ["colours"]
+
+
+def test_the_summary_repeats_the_case_as_it_ran(finished: Finished) -> None:
+    told = finished.summary["as_ran"]
+    assert told["source"] == str(finished.case.source)
+    assert told["sweep"] == {}
+    assert told["scene"]["lights"][0] == {
+        "name": "beam",
+        "pencil": {"origin": [1, 0, 9], "direction": [0, 0, -1], "power": [2, 1, 0], "radius": 0, "deposit": "point"},
+    }
+    assert told["scene"]["lights"][1]["name"] == "point_1"
+    assert told["scene"]["tolerance"] == 0.3
+    assert [(row["channel"], row["region"]) for row in told["media"]] == [(name, "body") for name in CHANNELS]
+    blue = told["media"][2]
+    assert (blue["sigma_a"], blue["sigma_s_prime"], blue["eta"]) == (0.1, 1.2, 1.4)
+    assert blue["albedo"] == pytest.approx(1.2 / 1.3)
+    assert blue["mean_free_path"] == pytest.approx(1 / 1.3)
+    assert blue["sigma_tr"] == pytest.approx(np.sqrt(3 * 0.1 * 1.3))
 
 
 def test_the_surface_has_what_is_valid_in_all_channels(finished: Finished) -> None:

@@ -1,30 +1,80 @@
 """The package as it is installed."""
 
+import os
 import re
 import subprocess
 import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tetlux import cases, fem, meshing
-from tetlux.cases.case import library_folder
 from tetlux.cases.cli import main
+from tetlux.cases.shipped import library_folder
 
 ROOT = Path(__file__).parents[1]
+SETUPTOOLS: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> dict[str, str]:
+    """The environment of a Python that finds the package as `package-dir` lays it out, however it runs here."""
+    for name, folder in sorted(SETUPTOOLS["package-dir"].items()):
+        target = tmp_path.joinpath(*name.split("."))
+        if name == "tetlux":
+            target.mkdir()
+            for file in (ROOT / folder).glob("*.py"):
+                (target / file.name).symlink_to(file)
+        else:
+            target.symlink_to(ROOT / folder)
+    return {**os.environ, "PYTHONPATH": str(tmp_path)}
+
+
+def python(*arguments: str, env: dict[str, str] | None = None) -> str:
+    """What a Python prints that is run with these arguments and must find nothing wrong."""
+    done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, check=False, env=env)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_the_package_can_be_imported_by_its_name_alone(installed: dict[str, str]) -> None:
+    code = "import sys, tetlux; print(tetlux.__version__, 'numpy' in sys.modules, tetlux.fem.solve.__name__)"
+    assert python("-c", code, env=installed) == f"{version('tetlux')} False solve\n"
+
+
+def test_what_is_not_in_the_package_is_said_as_usual(installed: dict[str, str]) -> None:
+    code = "import tetlux; print(hasattr(tetlux, 'sphere'), hasattr(tetlux, 'meshing'), dir(tetlux))"
+    assert python("-c", code, env=installed) == "False True ['__version__', 'cases', 'fem', 'meshing']\n"
+
+
+@pytest.mark.parametrize("module", ["tetlux", "tetlux.cases"])
+def test_the_package_is_the_command(module: str, installed: dict[str, str]) -> None:
+    assert python("-m", module, "--version", env=installed) == f"tetlux {version('tetlux')}\n"
+
+
+@pytest.mark.parametrize("arguments", ["--help", "run --help", "list", "show hare"])
+def test_what_needs_no_numbers_imports_none(arguments: str) -> None:
+    """Numpy and what needs it take half a second, which is long for a word of help."""
+    code = (
+        "import sys\nfrom tetlux.cases.cli import main\n"
+        "try: main(sys.argv[1:])\nexcept SystemExit: pass\n"
+        "print(*sorted({'numpy', 'scipy', 'pydantic', 'yaml', 'tetlux.meshing'} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *arguments.split()], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "\n")
+    assert len(done.stdout) > 100
 
 
 def test_every_folder_of_code_is_in_the_package() -> None:
     """A subpackage that is not listed runs from a checkout and is missing from the wheel."""
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    found = {
-        f"tetlux.{'.'.join(path.parent.relative_to(ROOT).parts)}"
-        for top in ("meshing", "fem", "cases")
-        for path in (ROOT / top).rglob("*.py")
-    }
-    assert found == set(listed)
+    folders = {path.parent for top in ("meshing", "fem", "cases") for path in (ROOT / top).rglob("*.py")}
+    found = {f"tetlux.{'.'.join(folder.relative_to(ROOT).parts)}" for folder in folders}
+    # The package itself lies within a subpackage, of which it is no part.
+    assert SETUPTOOLS["package-dir"]["tetlux"] == "cases/package"
+    assert found - {"tetlux.cases.package"} | {"tetlux"} == set(SETUPTOOLS["packages"])
 
 
 def test_the_types_and_the_cases_ship() -> None:
@@ -75,6 +125,48 @@ def test_a_wrong_command_line_ends_with_two(arguments: list[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         main(arguments)
     assert stop.value.code == 2
+
+
+def test_the_cases_that_ship_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == sorted(path.stem for path in library_folder().glob("*.yaml"))
+    assert lines[1] == "hare       A figure with thick and thin parts: the beam enters at the root of an ear."
+
+
+def test_a_case_that_is_shown_can_be_run_from_elsewhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", "hare"]) == 0
+    mine = tmp_path / "mine.yaml"
+    mine.write_text(capsys.readouterr().out, encoding="utf-8")
+    assert main(["check", str(mine)]) == 0
+    assert "9,600 triangles" in capsys.readouterr().out
+    # A file of one's own is shown as it is.
+    mine.write_text("surface: {file: a.stl}  # µ\n", encoding="utf-8")
+    assert main(["show", str(mine)]) == 0
+    assert capsys.readouterr().out == "surface: {file: a.stl}  # µ\n"
+
+
+def test_what_cannot_be_shown_gets_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
+    for request, words in (
+        ("hair", 'hair: did you mean "hare"? it is neither a file nor one of the cases that ship: candle,'),
+        (str(tmp_path), "Is a directory"),
+        (str(tmp_path / "binary.yaml"), "is not UTF-8 text"),
+        ("no/such.yaml", "No such file"),
+        ("bunny.stl", "surface: {file: bunny.stl}"),
+    ):
+        assert main(["show", request]) == 2
+        shown = capsys.readouterr()
+        assert shown.out == ""
+        assert words in shown.err
+        assert shown.err.count("\n") == 1
+
+
+def test_a_command_that_does_not_exist_gets_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["runn", "hare"])
+    assert stop.value.code == 2
+    assert 'there is no command "runn"; did you mean "run"? the commands are run, check' in capsys.readouterr().err
 
 
 def test_the_module_is_the_command() -> None:

@@ -7,6 +7,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System, paths
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.loads import load_vector
@@ -106,7 +107,7 @@ def test_what_stays_in_a_thin_plate(thickness: float) -> None:
     lost, through, back = plate_by_hand(of, 1.0)
     deposit = PencilBeam((0.3, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
     plate = block((6, 6, 2), (16.0, 16.0, 1.0))
-    found = deposit.deposit_in(plate.surface, of).on(plate, plate.surface, coefficients_of(of))
+    found = deposit.deposit_in(Body(plate.surface, (of,))).on(plate, plate.surface, coefficients_of(of))
     scattered = load_vector(plate, coefficients_of(of), found).sum()
     stays = 1.0 - lost - through - back
     assert found.absorbed == pytest.approx(0.4 * stays, rel=1e-5)
@@ -136,7 +137,7 @@ def test_what_is_left_in_each_wall(kind: str) -> None:
     """At matched indices, without diffusion: power scattered or absorbed in a wall is what it takes off the beam."""
     of = medium(1.0)
     light = thin_beam((-10.0, 0.3, -1.4), (1.0, 0.0, 0.0), kind)
-    deposit = light.deposit_in(TROUGH.surface, of).on(TROUGH, TROUGH.surface, coefficients_of(of))
+    deposit = light.deposit_in(Body(TROUGH.surface, (of,))).on(TROUGH, TROUGH.surface, coefficients_of(of))
     beyond = deposit.starts[:, 0] > 0
     fade = math.exp(-4.0 * extinction(of))
     entered = [float(deposit.fluxes[some].sum()) / deposit.incident for some in (~beyond, beyond)]
@@ -157,7 +158,7 @@ def test_a_wedge_refracts(kind: str) -> None:
     wedge, of = TetMesh(points, whole.tetrahedra), medium(1.4)
     light = thin_beam((0.5, 0.3, 5.0), (0.0, 0.0, -1.0), kind)
     coefficients = coefficients_of(of)
-    deposit = light.deposit_in(wedge.surface, of).on(wedge, wedge.surface, coefficients)
+    deposit = light.deposit_in(Body(wedge.surface, (of,))).on(wedge, wedge.surface, coefficients)
     length = 3.0 + slope * 4.5
     first = np.argmax(deposit.fluxes)
     assert deposit.directions[first] == pytest.approx([0.0, 0.0, -1.0], abs=1e-12)
@@ -168,7 +169,7 @@ def test_a_wedge_refracts(kind: str) -> None:
         np.vstack([points, screen.points - [0.0, 0.0, 20.0]]),
         np.vstack([whole.tetrahedra, screen.tetrahedra + len(points)]),
     )
-    deposit = light.deposit_in(both.surface, of).on(both, both.surface, coefficients)
+    deposit = light.deposit_in(Body(both.surface, (of,))).on(both, both.surface, coefficients)
     caught = np.flatnonzero(np.abs(deposit.starts[:, 2] + 20.0) < 1e-9)
     bend = math.asin(1.4 * math.sin(math.radians(20.0))) - math.radians(20.0)
     # Away from the normal, which is towards the thick end, +x.
@@ -205,7 +206,9 @@ def test_a_beam_that_fades_stays_on_its_way(uniform: bool) -> None:
         of = Medium(sigma_a=0.4 * thick, sigma_s=0.6 * thick, g=0.0, eta=1.4)
         same = coefficients_of(of)
         cells = np.ones(len(CUBE.tetrahedra))
-        each = Coefficients(of.sigma_a * cells, of.sigma_t_prime * cells, 0.6 * thick * cells, 0.0 * cells, of)
+        each = Coefficients(
+            of.sigma_a * cells, of.sigma_t_prime * cells, 0.6 * thick * cells, 0.0 * cells, 0.0 * cells, of
+        )
         coefficients = same if uniform else each
         starts = np.array([[0.3, 0.2, 0.0], [-0.7, 0.1, 0.0]])
         deposit = follow(CUBE, coefficients, Rays(starts, np.array([[0.0, 0.0, -1.0]] * 2), np.array([1.0, 2.0])))
@@ -273,7 +276,7 @@ def test_the_path_on_a_finer_mesh_is_the_same() -> None:
     for counts in ((1, 1, 1), (2, 3, 5), (8, 8, 8)):
         mesh = block(counts, (4.0, 4.0, 4.0))
         light = thin_beam((-4.0, 0.3, 1.0), (1.0, 0.1, -0.9), "pencil")
-        deposit = light.deposit_in(mesh.surface, of).on(mesh, mesh.surface, coefficients_of(of))
+        deposit = light.deposit_in(Body(mesh.surface, (of,))).on(mesh, mesh.surface, coefficients_of(of))
         found.append(np.array([deposit.specular, deposit.absorbed, deposit.ballistic]))
     assert found[1] == pytest.approx(found[0], rel=1e-6)
     assert found[2] == pytest.approx(found[0], rel=1e-6)

@@ -17,14 +17,13 @@ from tetlux.cases.picture_stage import (
     BACKGROUND,
     DARK,
     OVERSAMPLING,
-    PANEL,
     SHADED,
-    Camera,
     build_stage,
     corner_normals,
     exitance_range,
     map_shares,
 )
+from tetlux.cases.picture_view import PANEL, Camera
 from tetlux.meshing import box, sphere, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.surface import Surface

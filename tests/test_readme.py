@@ -4,10 +4,14 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from tests.meshes_made import cube_of_cubes
 from tetlux.cases.case import load_cases
 from tetlux.cases.schema import CaseSpec
+from tetlux.meshing import TetMesh
+from tetlux.meshing.files import write_mesh
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -34,13 +38,14 @@ def test_the_python_lines_run_and_say_what_they_promise() -> None:
     lit = names["lit"]
     assert len(lit.of_lights) == 2
     assert lit.power.exited == pytest.approx(sum(each.power.exited for each in lit.of_lights))
+    assert names["halves"].power.balance_error == pytest.approx(0.0, abs=1e-9)
     # Marble is whiter in red than in blue.
     assert names["red"].power.exited > names["green"].power.exited > names["blue"].power.exited
     assert names["red"].mesh is names["blue"].mesh
 
 
 def test_the_case_file_is_right(tmp_path: Path) -> None:
-    text, marble = blocks("yaml")
+    text, marble, head = blocks("yaml")
     (tmp_path / "plate.yaml").write_text(text)
     assert [case.name for case in load_cases(tmp_path / "plate.yaml")] == [
         f"plate/medium.sigma_a={value}" for value in (0.001, 0.01, 0.1)
@@ -50,6 +55,15 @@ def test_the_case_file_is_right(tmp_path: Path) -> None:
     (tmp_path / "marble.yaml").write_text("surface: {sphere: {radius: 5}}\n" + marble)
     (case,) = load_cases(tmp_path / "marble.yaml")
     assert case.channel_names == ("red", "green", "blue")
+
+    # That of a mesh needs a light, and the mesh.
+    points, tetrahedra, places = cube_of_cubes(2, 10.0)
+    layers = np.where(places[:, 2] > 0, 1, 2)
+    write_mesh(TetMesh(points, tetrahedra, regions=layers, labels={1: "scalp"}), tmp_path / "head.msh")
+    (tmp_path / "head.yaml").write_text(head + "lights: [{diffuse: {irradiance: 1}}]\n")
+    (case,) = load_cases(tmp_path / "head.yaml")
+    assert case.mesh is not None
+    assert case.mesh.region_volumes == pytest.approx({1: 4000.0, 2: 4000.0})
 
 
 def test_every_key_of_the_case_file_is_explained() -> None:
@@ -66,6 +80,7 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("VolumeSpec", ["medium.sigma_a.volume."]),
         ("ImagesSpec", ["medium.sigma_a.images."]),
         ("ArraySpec", ["medium.sigma_a.array."]),
+        ("MeshSpec", ["mesh."]),
         ("RegionSpec", ["regions[]."]),
         ("PencilSpec", ["lights[].pencil."]),
         ("PointSpec", ["lights[].point."]),

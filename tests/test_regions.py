@@ -20,6 +20,7 @@ from tetlux.meshing import (
     cylinder,
     mesher,
     refine,
+    shells,
     slab,
     sphere,
     surface_from_arrays,
@@ -66,7 +67,7 @@ def test_a_mesh_has_one_region_unless_told() -> None:
     assert mesh.regions.tolist() == [0] * 6
     assert len(mesh.interfaces[0]) == 0
     wrong: Any
-    for wrong in (np.zeros(5, dtype=int), np.zeros(6), np.full(6, -1)):
+    for wrong in (np.zeros(5, dtype=int), np.zeros(6)):
         with pytest.raises(InputError, match="numbers of regions"):
             replace(mesh, regions=wrong)
 
@@ -179,14 +180,14 @@ def test_what_the_mesher_may_stray_follows_from_thickness_unless_nothing_is_left
             box((60.0, 60.0, upper), center=(0.0, 0.0, -0.5 * upper)),
             box((60.0, 60.0, 5.0 - upper), center=(0.0, 0.0, -0.5 * (upper + 5.0))),
         ]
-        body, *_ = mesher._shells(slab(60.0, 5.0), layers, 1.0)
+        body, *_ = shells.shells_of(slab(60.0, 5.0), layers, 1.0)
         assert body.deviation == 1.0
-    body, inner = mesher._shells(OUTER, [sphere(9.9, subdivisions=3)], 2.0)
+    body, inner = shells.shells_of(OUTER, [sphere(9.9, subdivisions=3)], 2.0)
     # The gap is 0.1 wide, and both of its sides are to keep out of each other's way.
     assert (body.deviation, inner.deviation) == pytest.approx((0.025, 0.025), rel=0.02)
-    body, inner = mesher._shells(OUTER, [INNER], 0.6)
+    body, inner = shells.shells_of(OUTER, [INNER], 0.6)
     assert body.deviation == 0.6
-    assert inner.deviation == pytest.approx(mesher.INNER_DEVIATION * 10.0 * np.sqrt(3), rel=0.01)
+    assert inner.deviation == pytest.approx(shells.INNER_DEVIATION * 10.0 * np.sqrt(3), rel=0.01)
 
 
 def test_a_thin_gap_stays_open() -> None:
@@ -429,11 +430,13 @@ def test_a_region_that_the_mesher_lost_is_missed(monkeypatch: pytest.MonkeyPatch
         epsilons.append(epsilon)
         return points, whole.tetrahedra
 
-    monkeypatch.setattr(mesher, "_run_pytetwild", run)
-    with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh lost it, .* give a smaller deviation, or leave"):
+    monkeypatch.setattr(mesher, "run_pytetwild", run)
+    with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh lost it, .*; leave it out, or make it larger\."):
         tetrahedralize(BODY, [sphere(0.2, center=(0.1, 0.2, 0.3))], cache=False)
     assert epsilons[1] == pytest.approx(mesher.SECOND * epsilons[0])
-    with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh's area is .* give a smaller deviation"):
+    with pytest.raises(
+        RunError, match=r"region 1 \(sphere\): the mesh's area is .* make them thicker, or leave them out\."
+    ):
         tetrahedralize(BODY, [sphere(3.0)], cache=False)
 
 

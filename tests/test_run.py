@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import picture, run
-from tetlux.cases.case import Case, find_case_file, load_cases
+from tetlux.cases import batch, picture, run
+from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
 from tetlux.cases.run import run_case
+from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab
 from tetlux.fem.solve import solve_each
 from tetlux.meshing import RunError
@@ -44,7 +45,8 @@ def case(tmp_path: Path) -> Case:
 
 
 def test_a_run_writes_its_files_and_no_others(finished: Path) -> None:
-    assert sorted(p.name for p in finished.iterdir()) == ["picture.png", "summary.json", "surface.ply", "volume.vtu"]
+    names = ["picture.png", "summary.json", "surface.ply", "surface.vtp", "volume.vtu"]
+    assert sorted(p.name for p in finished.iterdir()) == names
 
 
 def test_the_summary_holds_what_it_promises(finished: Path) -> None:
@@ -59,6 +61,11 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     assert channel["name"] == "all"
     assert channel["sigma_tr"] == pytest.approx(0.174069, rel=1e-5)
     assert channel["albedo"] == pytest.approx(1 / 1.01)
+    (medium,) = channel["media"]
+    assert medium.pop("name") == "body"
+    expected_medium = {"sigma_a": 0.01, "sigma_s_prime": 1.0, "sigma_tr": 0.174069, "albedo": 1 / 1.01}
+    assert {name: medium[name] for name in expected_medium} == pytest.approx(expected_medium, rel=1e-5)
+    assert (medium["eta"], medium["boundary"]) == (1.4, "exact")
     power = channel["power"]
     assert power["incident"] == 2.0
     assert abs(power["balance_error"]) < 1e-9
@@ -74,7 +81,7 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     assert near.startswith("within 2 mean free paths of where light enters")
     assert all("without PyVista" in warning for warning in others)
     validity = channel["validity"]
-    assert validity["albedo"] == channel["albedo"]
+    assert validity["albedo"] == pytest.approx(channel["albedo"])
     assert validity["least_thickness_in_mean_free_paths"] == pytest.approx(20 * 1.01, rel=0.03)
     assert validity["share_thin"] == 0.0
     # A cap of a height of 2 by 20 mean free paths, on a mesh that has some twenty facets there.
@@ -109,6 +116,34 @@ def test_warnings_are_printed_and_kept(tmp_path: Path, capsys: pytest.CaptureFix
     assert "the reduced albedo is 0.87" in summary["warnings"][0]
 
 
+def test_what_holds_for_a_sweep_is_said_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ball.yaml").write_text(QUICK + "outputs: []\nsweep: {medium.sigma_a: [0.01, 0.02, 0.03, 0.04]}\n")
+    (tmp_path / "alone.yaml").write_text(QUICK + "outputs: []\n")
+
+    def pretend(case: Case, out: Path, report: run.Report, *, cache: bool, note: run.Report) -> Path:
+        if "0.03" in case.name:
+            raise RunError("no luck")
+        note("of every run")
+        if "0.02" in case.name:
+            note("of one run")
+        return out
+
+    monkeypatch.setattr(batch, "run_case", pretend)
+    assert main(["run", str(tmp_path / "ball.yaml"), str(tmp_path / "alone.yaml"), "--out", str(tmp_path / "o")]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    notes = [line for line in lines if "of every run" in line or "of one run" in line]
+    assert notes[0].startswith("note, in 3 of 4 runs (ball/")
+    assert notes[1] == "note, in 1 of 4 runs (ball/medium.sigma_a=0.02): of one run"
+    assert notes[2].endswith("s  note: of every run")
+    assert len(notes) == 3
+    monkeypatch.setattr(batch, "run_case", lambda case, out, report, *, cache, note: note("of every run") or out)
+    assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "o")]) == 0
+    (said,) = [line for line in capsys.readouterr().out.splitlines() if "of every run" in line]
+    assert said == "note, in all 4 runs: of every run"
+
+
 def test_progress_is_printed_for_each_stage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "ball.yaml").write_text(QUICK + "outputs: []\n")
     assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")]) == 0
@@ -126,7 +161,7 @@ def test_a_run_replaces_the_files_of_an_earlier_one(case: Case, tmp_path: Path) 
         (target / name).write_text("old")
     (target / "notes.txt").write_text("mine")
     run_case(replace(case, outputs=("surface",)), tmp_path / "out")
-    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply"]
+    assert sorted(p.name for p in target.iterdir()) == ["notes.txt", "summary.json", "surface.ply", "surface.vtp"]
 
 
 def test_a_fault_while_writing_leaves_no_half_result(

@@ -7,6 +7,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Gaussian, Image, Medium, Rectangle
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.lights.spot import Spot
 from tetlux.meshing import InputError, TetMesh, box
@@ -22,7 +23,7 @@ NOISE = RNG.random((64, 48))
 
 
 def on_mesh(beam: CollimatedBeam, mesh: TetMesh) -> Deposit:
-    return beam.deposit_in(mesh.surface, MATCHED).on(mesh, mesh.surface, coefficients_of(MATCHED))
+    return beam.deposit_in(Body(mesh.surface, (MATCHED,))).on(mesh, mesh.surface, coefficients_of(MATCHED))
 
 
 def power(spot: Spot, mesh: TetMesh, *, direction: Vector = DOWN, from_center: bool = False) -> float:

@@ -26,7 +26,7 @@ from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.trials import Trial
 from tetlux.cases.stress.variants import CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
-from tetlux.fem import linear
+from tetlux.fem import direct, krylov, linear
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.notes import Note
 
@@ -147,14 +147,14 @@ def test_a_run_is_measured_against_the_closed_form() -> None:
 def test_residuals_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch) -> None:
     """A solver that believes in its answer and is off by a millionth is found out."""
 
-    def sloppy(product: linear.Product) -> linear.Method:
-        exact = linear.direct(product)
+    def sloppy(product: krylov.Product) -> krylov.Method:
+        exact = direct.direct(product)
 
-        def solve_once(loads: FloatArray) -> FloatArray:
+        def solve_once(loads: FloatArray) -> tuple[FloatArray, int]:
             # Loads come with a norm of 1; what is left of them to be mended is not.
             off = np.zeros_like(loads)
             off[:2] = 1e-6 * np.sqrt([[0.5], [0.5]]) * [[1.0], [-1.0]]
-            return exact(loads - off) if np.linalg.norm(loads) > 0.5 else np.zeros_like(loads)
+            return exact(loads - off) if np.linalg.norm(loads) > 0.5 else (np.zeros_like(loads), 0)
 
         return solve_once
 
@@ -166,9 +166,19 @@ def test_residuals_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch) ->
     assert "residual" in broken_rules(run_of(diagnostics))
 
 
+def test_a_large_residual_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve_truly = linear.Solver.solve
+    monkeypatch.setattr(
+        linear.Solver, "solve", lambda self, load: replace(solve_truly(self, load), residual=1e-6, iterations=7)
+    )
+    diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert (diagnostics.residual, diagnostics.iterations) == (1e-6, 7)
+    assert "residual" in broken_rules(run_of(diagnostics))
+
+
 def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     def iterate(matrix: Any, *_: Any) -> linear.Solver:
-        return linear.Solver(matrix, [linear.jacobi])
+        return linear.Solver(matrix, [krylov.jacobi])
 
     for module in ("assembly", "system"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)

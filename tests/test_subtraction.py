@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.assembly import Mass
+from tetlux.fem.body import Body
 from tetlux.fem.exact import half_space
 from tetlux.fem.sources import Subtract, sources_of
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of, patch_of
@@ -199,7 +200,7 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
     point = PointSource((0.0, 0.0, -9.0))
     for radius, most in ((2.5, 1), (20.0, 0)):
         wide = PencilBeam((0.0, 0.0, 30.0), (0.0, 0.0, -1.0), radius=min(radius, 9.0))
-        sources = sources_of([point, wide], ball, [TISSUE], "half-space")
+        sources = sources_of([point, wide], Body(ball, (TISSUE,)), "half-space")
         assert len(sources.charges[0].positions) > 1
         assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
         assert sum(float(d.powers.sum()) for d in sources.on_mesh) + sum(

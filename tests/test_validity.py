@@ -7,6 +7,8 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Medium, PencilBeam, PointSource
+from tetlux.fem.body import Body
+from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.lights.deposit import Light
@@ -24,7 +26,12 @@ FORWARD = Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4)
 
 
 def validity_of(mesh: TetMesh, medium: Medium, *lights: Light, surface: Surface | None = None) -> Validity:
-    return Validity(mesh, medium, lights, [light.deposit_in(surface or mesh.surface, medium) for light in lights])
+    return Validity(
+        mesh,
+        coefficients_of(medium),
+        lights,
+        [light.deposit_in(Body(surface or mesh.surface, (medium,))) for light in lights],
+    )
 
 
 @dataclass(frozen=True)
@@ -163,6 +170,11 @@ def test_what_is_said(ball_mesh: TetMesh) -> None:
     (near,) = sentences(fine, FORWARD, PENCIL)
     assert "within 2 mean free paths of where light enters" in near
     assert "off by about 1" in near
+    assert "assumed" not in near
+    # The same medium, of which it is not known how forward it scatters: the worst is expected, and that is said.
+    (unknown,) = sentences(fine, Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4), PENCIL)
+    assert "off by about 3" in unknown
+    assert "g = 0 assumed, as sigma_s_prime alone is given" in unknown
     dark = sentences(fine, Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4), PENCIL)
     assert "reduced albedo is 0.667" in dark[0]
     assert any("fades too fast at this absorption" in sentence for sentence in dark)

@@ -7,6 +7,7 @@ import numpy as np
 from tetlux.cases.case import Case
 from tetlux.cases.chart.reference import Reference, closed_form_reference, finer_run_reference
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
+from tetlux.fem.body import Body
 from tetlux.fem.exact.registry import ideal_sources
 from tetlux.fem.grading import lit_points
 from tetlux.fem.lights import Deposit
@@ -48,7 +49,7 @@ class Benchmark:
     @property
     def lit(self) -> tuple[FloatArray, FloatArray]:
         """See `tetlux.fem.grading.lit_points`."""
-        return lit_points(self.deposits, self.case.medium)
+        return lit_points(self.deposits)
 
     @property
     def sources(self) -> list[tuple[FloatArray, float]]:
@@ -77,8 +78,8 @@ def benchmark_of(case: Case, *, quick: bool = False) -> Benchmark:
     if not case.is_simple:
         raise RunError("a chart is of one channel and one even medium; leave lists, regions and fields out.")
     surface, medium = case.surface, case.medium
-    deposits = [light.deposit_in(surface, medium) for light in case.lights]
-    samples = surface_samples(surface, *lit_points(deposits, medium))
+    deposits = [light.deposit_in(Body(surface, (medium,))) for light in case.lights]
+    samples = surface_samples(surface, *lit_points(deposits))
     measured = closed_form_reference(surface.shape, medium, deposits, samples)
     if measured is None:
         # A surface is more than its triangles where these stand for a curve.

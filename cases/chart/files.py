@@ -6,7 +6,6 @@ import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from tetlux.cases.chart.picture import draw_chart
 from tetlux.cases.chart.runs import Charted, Measurement, exponents
 from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.summary import LIBRARIES
+from tetlux.meshing.libraries import installed_versions
 
 FILES = ("chart.csv", "chart.png", "chart.json")
 
@@ -55,8 +55,7 @@ def as_data(charted: Sequence[Charted]) -> dict[str, Any]:
         "radiative transfer, the difference of the two models",
         "machine": {"cores": os.cpu_count(), "processor": platform.machine()},
         "versions": {"python": platform.python_version()}
-        | {name: version(name) for name in LIBRARIES}
-        | {peer.package: version(peer.package) for peer in PEERS if peer.installed},
+        | installed_versions((*LIBRARIES, *(peer.package for peer in PEERS))),
     }
 
 

@@ -30,7 +30,7 @@ class Diagnostics:
     ledger : float
         Missing power, as a share of the incident power.
     residual : float
-        Largest relative residual of the linear systems on the last mesh.
+        Largest relative residual of the linear systems on the last mesh, computed anew from their solutions.
     iterations : int
         Most iterations that one of them took.
     estimate : float

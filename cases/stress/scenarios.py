@@ -9,6 +9,7 @@ from tetlux.cases.chart.samples import Samples, project_to_sphere, surface_sampl
 from tetlux.cases.stress.bodies import BODIES
 from tetlux.cases.stress.meshes import ball_of_layers, degrade
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
+from tetlux.fem.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.grading import lit_points
@@ -79,14 +80,14 @@ def in_range(decay: float) -> Medium:
 
 def _samples(surface: Surface, medium: Medium, light: Light) -> Samples:
     """Samples of the triangles of a surface; those of a ball are moved to the ball itself."""
-    samples = surface_samples(surface, *lit_points([light.deposit_in(surface, medium)], medium))
+    samples = surface_samples(surface, *lit_points([light.deposit_in(Body(surface, (medium,)))]))
     return project_to_sphere(samples, surface.shape) if isinstance(surface.shape, Sphere) else samples
 
 
 def _in_registry(surface: Surface, medium: Medium, light: Light) -> Truth:
     """The exitance by the closed form that the registry holds for a ball."""
     samples = _samples(surface, medium, light)
-    forms = closed_forms(surface.shape, medium, [light.deposit_in(surface, medium)])
+    forms = closed_forms(surface.shape, medium, [light.deposit_in(Body(surface, (medium,)))])
     return samples, forms["series"].exitance(samples.points)
 
 
@@ -144,7 +145,7 @@ def diffuse_by_core(absorption: float, radius: float) -> Scenario:
     """A ball of radius 10 and albedo .99 with a core, by its radius and its absorption times its scattering."""
     shell, core = turbid(0.99), Medium(sigma_a=absorption, sigma_s_prime=1.0, eta=INDEX)
     surface, light, outer = shapes.sphere(10.0), DiffuseLight(1.0), 10.0
-    transmitted = light.deposit_in(surface, shell).transmitted_irradiance
+    transmitted = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
     value = transmitted * concentric.diffuse_exitance(core, shell, core_radius=radius, radius=outer)
     truth = _uniform(_samples(surface, shell, light), float(value))
     regions = (Region(shapes.sphere(radius), core),)
@@ -183,7 +184,7 @@ def by_peak_and_index(g: float, eta: float) -> Scenario:
     medium = Medium(sigma_a=0.01, sigma_s=0.99 / (1.0 - g), g=g, eta=eta)
     surface = shapes.sphere(radius)
     light = PencilBeam((0.0, 0.0, 2.0 * radius), (0.0, 0.0, -1.0), deposit="line")
-    deposit = light.deposit_in(surface, medium)
+    deposit = light.deposit_in(Body(surface, (medium,)))
     entered = deposit.incident - deposit.specular
     samples = _samples(surface, medium, light)
     samples = samples.where(np.hypot(*samples.points[:, :2].T) > medium.mean_free_path)
@@ -226,7 +227,7 @@ def two_balls(
     inner = CORE_LAYERS / LAYERS * radius
     surface, light, bound = shapes.sphere(radius), _light_of_two_balls(light_kind), None
     if isinstance(light, DiffuseLight):
-        transmitted = light.deposit_in(surface, shell).transmitted_irradiance
+        transmitted = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
         value = transmitted * concentric.diffuse_exitance(core, shell, core_radius=inner, radius=radius)
         bound = 4.0 * shell.eta**2
     else:

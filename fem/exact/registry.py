@@ -121,9 +121,10 @@ def closed_forms(shape: Shape | None, medium: Medium, deposits: Sequence[Deposit
     --------
     >>> import numpy as np
     >>> from tetlux.fem import Medium, PointSource
+    >>> from tetlux.fem.body import Body
     >>> from tetlux.meshing import sphere
     >>> ball, medium = sphere(10.0), Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
-    >>> deposit = PointSource((0.0, 0.0, 9.0)).deposit_in(ball, medium)
+    >>> deposit = PointSource((0.0, 0.0, 9.0)).deposit_in(Body(ball, (medium,)))
     >>> forms = closed_forms(ball.shape, medium, [deposit])
     >>> list(forms)
     ['series']

@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive, unit_vector
 from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
-from tetlux.fem.medium import Medium
 from tetlux.fem.paths import Rays, entered, follow
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.subdivide import quartered
@@ -18,6 +19,8 @@ from tetlux.meshing.tetmesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.
 LOOKS = 2000
+# And at so many of these, at most, it is looked at how deep it reaches.
+DEPTHS = 64
 # Facets are quartered at most so many times to see a spot. What each part sees of it is looked up at so many points, at
 # least and at most, and at so many together where that lies in between.
 _CUTS = 16
@@ -58,22 +61,28 @@ class CollimatedBeam:
         unit_vector(self.direction, "direction")
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """Its rays are drawn on the facets of a mesh; here it is found where they meet the body."""
-        del uniform
+        surface = body.surface
         lit = self.entries(surface)
         if len(lit) == 0:
             raise InputError(
-                f"the collimated light along {tuple(self.direction)} misses the body, which spans "
+                f"the collimated light along {as_text(self.direction)} misses the body, which spans "
                 f"{surface.extent}; change its direction or the spot's center."
             )
-        scattering, _ = medium.delta_eddington
-        depth = 1.0 / (medium.sigma_a + scattering)
+        depth = self._least_depth(body, lit)
         # As far apart as rays on the body are, at least.
         apart = surface.diagonal / np.sqrt(LOOKS)
         # What is smaller than its depth in a spot is blurred; the spot itself may be a thin beam.
         narrow = np.inf if self.spot is None else max(0.5 * self.spot.reach, 0.5 * depth)
         return Deposit(resolution=min(max(depth, apart), narrow), lit=lit, entries=lit, on_mesh=self._on_mesh)
+
+    def _least_depth(self, body: Body, entries: FloatArray) -> float:
+        """Least depth, at some of the entries, at which the beam has faded to 1/e, unit."""
+        some = body.just_inside(entries[:: -(-len(entries) // DEPTHS)])
+        along = np.broadcast_to(unit_vector(self.direction, "direction"), some.shape)
+        _, ends = body.ways_out(some, along)
+        return float(body.paths(some, along, ends).place(np.ones(len(some)), peaked=True).min())
 
     def entries(self, surface: Surface) -> FloatArray:
         """Some of the places where the light meets the body first, (q, 3)."""

@@ -6,9 +6,10 @@ from typing import Protocol
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
-from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -95,6 +96,8 @@ class Deposit:
             return self
         return together([replace(self, on_mesh=None), self.on_mesh(mesh, surface, coefficients)])
 
+    __repr__ = one_line
+
 
 def together(parts: Sequence[Deposit]) -> Deposit:
     """Several deposits as one."""
@@ -135,15 +138,6 @@ def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:
 class Light(Protocol):
     """Anything that can say what it leaves in a body."""
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
-        """What this light leaves in a body.
-
-        Parameters
-        ----------
-        surface : Surface
-        medium : Medium
-            Of the body.
-        uniform : bool
-            Whether the body is of this medium throughout; otherwise paths are followed on its mesh.
-        """
+    def deposit_in(self, body: Body) -> Deposit:
+        """What this light leaves in a body."""
         ...

@@ -2,12 +2,11 @@
 
 from dataclasses import dataclass
 
+from tetlux.fem.body import Body
 from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
-from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -34,9 +33,9 @@ class DiffuseLight:
     def __post_init__(self) -> None:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """What passes the surface; its power depends on the mesh's area, and is known when solved."""
-        del surface, uniform
+        medium = body.outer
         if medium.boundary != "exact":
             raise InputError(
                 'diffuse light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
-from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -36,9 +36,9 @@ class Emission:
     def __post_init__(self) -> None:
         check_positive(self.density, "density", "W/unit³")
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """The same everywhere, or known on the mesh that has the region."""
-        del surface, medium, uniform
+        del body
         return Deposit(emission=self.density) if self.region is None else Deposit(on_mesh=self._on_mesh)
 
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:

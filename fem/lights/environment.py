@@ -6,13 +6,15 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.lights.spot import check_pixels
-from tetlux.fem.medium import Medium
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -54,7 +56,7 @@ class EnvironmentLight:
         check_pixels(self.radiance)
         if np.linalg.norm(np.cross(unit_vector(self.up, "up"), unit_vector(self.front, "front"))) < 1e-6:
             raise InputError(
-                f"up and front of the environment are both along {tuple(self.up)}; give another front.", field="up"
+                f"up and front of the environment are both along {as_text(self.up)}; give another front.", field="up"
             )
 
     @cached_property
@@ -89,10 +91,9 @@ class EnvironmentLight:
         found = total > 0
         return mean[found] / np.linalg.norm(mean[found], axis=1, keepdims=True), total[found]
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """What passes the surface is known on a mesh."""
-        del surface, uniform
-        if medium.boundary != "exact":
+        if body.outer.boundary != "exact":
             raise InputError(
                 'environment light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'
             )
@@ -119,3 +120,5 @@ class EnvironmentLight:
             mesh.to_boundary_nodes(each * mesh.boundary_areas) / mesh.boundary_node_areas for each in (outside, passed)
         )
         return Deposit(irradiance=irradiance, transmitted_irradiance=transmitted)
+
+    __repr__ = one_line

@@ -6,13 +6,15 @@ from typing import Literal
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
 from tetlux.fem.lights.deposit import Deposit, together
 from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.spot import Disc, sunflower
-from tetlux.fem.medium import Medium
+from tetlux.fem.optical_paths import OpticalPaths
 from tetlux.fem.paths import Rays, beyond, entered, follow
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
@@ -26,6 +28,8 @@ RAYS = (127, 2000)
 GRAZING = 0.1
 # A beam with this share of its power left at the far side stays there.
 NEGLIGIBLE = 1e-12
+# A thin beam is as good as this many points on it, as far as where a thousandth of it is left.
+LIT, FADED = 28, 7.0
 # A mesh's facets lie within this share of the body's diagonal from its surface.
 ASTRAY = 0.02
 
@@ -47,8 +51,10 @@ class PencilBeam:
     deposit : {"point", "line"}
         "point" puts the power times the reduced albedo at one mean free path ``1/sigma_t'`` along the
         refracted beam, the dipole's own source (Farrell 1992; Jensen 2001, sec. 2.1) and the better choice
-        for a thin beam at high albedo. "line" lets it fade along its refracted path by delta-Eddington:
-        ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)``.
+        for a thin beam at high albedo. Where the beam passes several media, that is where the integral of sigma_t'
+        along it is 1, and the albedo is the mean over where its light is lost: `OpticalPaths.albedo`. "line" lets it
+        fade along its refracted path by delta-Eddington: ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with
+        ``E = E0 exp(-sigma_t* l)``.
 
     Raises
     ------
@@ -87,39 +93,55 @@ class PencilBeam:
             raise self._missed(surface)
         return np.asarray(points[0])
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
-        origin, direction = as_vector(self.origin, "origin"), unit_vector(self.direction, "direction")
-        self._check_outside(surface, origin)
+        surface = body.surface
+        self._check_outside(surface, as_vector(self.origin, "origin"))
         if self.deposit == "line" and self.radius > 0:
-            return self._as_spot(surface, medium)
-        # Thin beams that make this one up.
-        spacing = 0.5 * medium.mean_free_path
-        count = 1 if self.radius == 0 else int(np.clip(np.pi * (self.radius / spacing) ** 2, *RAYS))
-        origins = origin + (sunflower(count, self.radius, direction) if count > 1 else np.zeros((1, 3)))
-        points, normals = _entries(surface, origins, direction)
-        if len(points) == 0:
-            raise self._missed(surface)
-        met = Rays(points, np.broadcast_to(direction, points.shape), np.full(len(points), self.power / count))
-        inside, specular = entered(met, normals, medium.eta)
-        deposit = replace(
-            _as_points(inside, surface, medium)
-            if self.deposit == "point"
-            else _as_line(inside, surface, medium, uniform=uniform),
-            incident=float(met.powers.sum()),
-            specular=specular,
-            entries=points,
+            return self._as_spot(body)
+        if self.deposit == "line":
+            beams = self._beams(body, 1)
+            found = _as_line(beams.inside, body)
+        else:
+            beams = self._beams(body, 1 if self.radius == 0 else RAYS[0])
+            # As far apart as is little for the light that is deposited.
+            spacing = 0.5 * _unit_of_depth(beams.inside, body)
+            wanted = int(np.clip(np.pi * (self.radius / spacing) ** 2, *RAYS))
+            if self.radius > 0 and wanted > beams.count:
+                beams = self._beams(body, wanted)
+            found = _as_points(beams.inside, body)
+        return replace(
+            found,
+            incident=self.power * len(beams.entries) / beams.count,
+            specular=beams.specular,
+            entries=beams.entries,
+            warnings=(*found.warnings, *self._warnings(beams, body)),
         )
-        warnings = list(deposit.warnings)
-        if len(points) < count:
-            warnings.append(_partly_missed(1 - len(points) / count))
-        apart = self.radius * math.sqrt(math.pi / count) / medium.mean_free_path
+
+    def _beams(self, body: Body, count: int) -> "_Beams":
+        """The thin beams that make this one up, where and how they enter the body."""
+        origin, direction = as_vector(self.origin, "origin"), unit_vector(self.direction, "direction")
+        origins = origin + (sunflower(count, self.radius, direction) if count > 1 else np.zeros((1, 3)))
+        points, normals = _entries(body.surface, origins, direction)
+        if len(points) == 0:
+            raise self._missed(body.surface)
+        met = Rays(points, np.broadcast_to(direction, points.shape), np.full(len(points), self.power / count))
+        inside, specular = entered(met, normals, body.outer.eta)
+        return _Beams(count, points, inside, specular)
+
+    def _warnings(self, beams: "_Beams", body: Body) -> list[str]:
+        warnings: list[str] = []
+        if len(beams.entries) < beams.count:
+            warnings.append(_partly_missed(1 - len(beams.entries) / beams.count))
+        apart = self.radius * math.sqrt(math.pi / beams.count)
+        if apart > 0:
+            apart /= _unit_of_depth(beams.inside, body)
         if apart > 1.0:
             warnings.append(
                 Note(
                     "beam-spotted",
-                    f"the beam is so wide that the {count} thin ones it is made of lie {apart:.2g} mean free paths "
-                    "apart: its exitance is spotted close to where it enters.",
+                    f"the beam is so wide that the {beams.count} thin ones it is made of lie {apart:.2g} mean free "
+                    "paths apart: its exitance is spotted close to where it enters.",
                     value=apart,
                 )
             )
@@ -131,27 +153,27 @@ class PencilBeam:
                     "or read its exitance a mean free path away.",
                 )
             )
-        return replace(deposit, warnings=tuple(warnings))
+        return warnings
 
-    def _as_spot(self, surface: Surface, medium: Medium) -> Deposit:
+    def _as_spot(self, body: Body) -> Deposit:
         spot = Disc(self.origin, self.radius)
         beam = CollimatedBeam(self.direction, self.power / spot.area, spot, from_center=True)
-        entries = beam.entries(surface)
+        entries = beam.entries(body.surface)
         if len(entries) == 0:
-            raise self._missed(surface)
+            raise self._missed(body.surface)
         missed = 1.0 - len(entries) / (LOOKS + 1)
-        return replace(beam.deposit_in(surface, medium), warnings=(_partly_missed(missed),) if missed > 0 else ())
+        return replace(beam.deposit_in(body), warnings=(_partly_missed(missed),) if missed > 0 else ())
 
     def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
         if surface.contains(origin[None])[0]:
             raise InputError(
-                f"the beam starts inside the body, at {tuple(self.origin)}; move its origin outside, "
+                f"the beam starts inside the body, at {as_text(self.origin)}; move its origin outside, "
                 "or use a point source."
             )
 
     def _missed(self, surface: Surface) -> InputError:
         return InputError(
-            f"the beam from {tuple(self.origin)} along {tuple(self.direction)} misses the body, which spans "
+            f"the beam from {as_text(self.origin)} along {as_text(self.direction)} misses the body, which spans "
             f"{surface.extent}; change its origin or direction."
         )
 
@@ -183,22 +205,63 @@ def _entries(
     return points + way[:, None] * direction, np.where(grazing[:, None], flat, normals)
 
 
-def _as_points(rays: Rays, surface: Surface, medium: Medium) -> Deposit:
-    mean_free_path = medium.mean_free_path
-    distances, faces = surface.rays.first(rays.starts, rays.directions)
-    # On a curved surface a beam starts above the triangle that it met, and meets it again.
-    again = np.flatnonzero(np.einsum("ij,ij->i", rays.directions, surface.normals[faces]) < 0)
-    places = rays.starts[again] + distances[again, None] * rays.directions[again]
-    distances[again] += surface.rays.first(places, rays.directions[again])[0]
-    paths = np.where(np.isfinite(distances), distances, 0.0)
-    if surface.overlaps:
-        # A triangle inside the body is no way out.
-        for ray in np.flatnonzero(paths < 2.0 * mean_free_path).tolist():
-            way_out = surface.exit(rays.starts[ray], rays.directions[ray])
-            paths[ray] = way_out[0] if way_out else 0.0
-    depths = np.minimum(mean_free_path, 0.5 * paths)
+@dataclass(frozen=True, eq=False)
+class _Beams:
+    """Thin beams that make up one.
+
+    Attributes
+    ----------
+    count : int
+        How many there are, with those that miss the body.
+    entries : (e, 3) ndarray
+        Where they meet the surface.
+    inside : Rays
+        Those that pass it, refracted.
+    specular : float
+        Power that is reflected there, W.
+    """
+
+    count: int
+    entries: FloatArray
+    inside: Rays
+    specular: float
+
+
+def _paths(rays: Rays, body: Body) -> OpticalPaths:
+    """What thin beams meet from the surface to their way out."""
+    begins, lengths = body.ways_out(rays.starts, rays.directions)
+    paths = body.paths(rays.starts, rays.directions, lengths, begins)
+    short = np.flatnonzero(body.surface.overlaps & (paths.totals < 2.0)).tolist()
+    if not short:
+        return paths
+    # A triangle inside the body is no way out.
+    for ray in short:
+        way_out = body.surface.exit(rays.starts[ray], rays.directions[ray])
+        lengths[ray] = way_out[0] if way_out else 0.0
+    return body.paths(rays.starts, rays.directions, lengths, begins)
+
+
+def _depths(paths: OpticalPaths) -> FloatArray:
+    """Optical depths (r,) at which beams are deposited: 1, or half of what there is."""
+    return np.minimum(1.0, 0.5 * paths.totals)
+
+
+def _unit_of_depth(rays: Rays, body: Body) -> float:
+    """The mean free path between the surface and where thin beams are deposited, of the shallowest one, unit."""
+    if len(rays.powers) == 0:
+        return body.shortest_mean_free_path
+    return float(_paths(rays, body).place(np.ones(len(rays.powers))).min())
+
+
+def _as_points(rays: Rays, body: Body) -> Deposit:
+    """One point on each beam, where its optical depth is 1."""
+    if len(rays.powers) == 0:
+        return Deposit()
+    paths = _paths(rays, body)
+    depths, albedo = paths.place(_depths(paths)), paths.albedo
+    points = rays.starts + depths[:, None] * rays.directions
     warnings: tuple[str, ...] = ()
-    if (depths < mean_free_path).any():
+    if (paths.totals < 2.0).any():
         warnings = (
             Note(
                 "too-thin-for-point",
@@ -207,22 +270,20 @@ def _as_points(rays: Rays, surface: Surface, medium: Medium) -> Deposit:
             ),
         )
     return Deposit(
-        absorbed=(1.0 - medium.albedo) * float(rays.powers.sum()),
-        points=rays.starts + depths[:, None] * rays.directions,
-        powers=medium.albedo * rays.powers,
-        resolution=float(depths.min(initial=mean_free_path)),
+        absorbed=float((1.0 - albedo) @ rays.powers),
+        points=points,
+        powers=albedo * rays.powers,
+        resolution=float(depths.min()),
         warnings=warnings,
     )
 
 
-def _as_line(rays: Rays, surface: Surface, medium: Medium, *, uniform: bool) -> Deposit:
+def _as_line(rays: Rays, body: Body) -> Deposit:
     """A beam without width: through one medium to the far side at once; the rest, and several media, on the mesh."""
     if len(rays.powers) == 0:
         return Deposit()
-    scattering, _ = medium.delta_eddington
-    extinction = medium.sigma_a + scattering
+    surface, medium = body.surface, body.only_medium
     start, direction, power = rays.starts[0], rays.directions[0], float(rays.powers[0])
-    resolution = 0.5 / extinction
 
     def ray_on(mesh: TetMesh) -> Rays:
         """The beam from where it meets a facet of the mesh."""
@@ -232,15 +293,20 @@ def _as_line(rays: Rays, surface: Surface, medium: Medium, *, uniform: bool) -> 
         place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
         return replace(rays, starts=place)
 
-    if not uniform:
-        on_the_way = start + np.linspace(0.0, 4.0 / extinction, 9)[:, None] * direction
+    way_out = surface.exit(start, direction)
+    length = way_out[0] if way_out else 0.0
+    paths = body.paths(rays.starts, rays.directions, np.array([length]), body.ways_out(rays.starts, rays.directions)[0])
+    resolution = 0.5 * float(paths.place(np.ones(1), peaked=True)[0])
+    rows = np.linspace(0.0, FADED, LIT)
+    along = np.minimum([paths.place(np.array([depth]), peaked=True)[0] for depth in rows], length)
+    lit = start + np.unique(along)[:, None] * direction
+    if medium is None:
         return Deposit(
-            lit=on_the_way[surface.contains(on_the_way)],
+            lit=lit,
             resolution=resolution,
             on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)),
         )
-    way_out = surface.exit(start, direction)
-    length = way_out[0] if way_out else 0.0
+    extinction = medium.sigma_a + medium.delta_eddington[0]
     end = power * math.exp(-extinction * length)
     segment = Deposit(
         absorbed=(power - end) * medium.sigma_a / extinction,
@@ -248,6 +314,7 @@ def _as_line(rays: Rays, surface: Surface, medium: Medium, *, uniform: bool) -> 
         directions=rays.directions,
         lengths=np.array([length]),
         fluxes=rays.powers,
+        lit=lit,
         resolution=resolution,
     )
     if end <= NEGLIGIBLE * power:

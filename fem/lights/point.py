@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.body import Body
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.medium import Medium
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
 
 # A point nearer to the surface than this share of the body's diagonal is on it.
 ON_SURFACE = 1e-9
@@ -19,9 +19,12 @@ FAINTEST = 1e-60
 
 def as_vector(value: Vector, name: str) -> FloatArray:
     """Three finite coordinates as an array, or an InputError that names them."""
-    vector = np.asarray(value, dtype=float)
+    try:
+        vector = np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} is {value!r}; give three finite coordinates.", field=name) from error
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} is {value}; give three finite coordinates.", field=name)
+        raise InputError(f"{name} is {vector.tolist()}; give three finite coordinates.", field=name)
     return vector
 
 
@@ -69,26 +72,22 @@ class PointSource:
         as_vector(self.position, "position")
         check_positive(self.power, "power", "watts")
 
-    def deposit_in(self, surface: Surface, medium: Medium, *, uniform: bool = True) -> Deposit:
+    def deposit_in(self, body: Body) -> Deposit:
         """All of its power at one point."""
-        del uniform
-        position = as_vector(self.position, "position")
+        surface, position = body.surface, as_vector(self.position, "position")
         if not surface.contains(position[None])[0]:
             raise InputError(
-                f"the point source at {_text(position)} lies outside the body, which spans {surface.extent}; "
+                f"the point source at {as_text(position)} lies outside the body, which spans {surface.extent}; "
                 "move it inside."
             )
         nearest, _ = surface.closest(position[None])
         depth = float(np.linalg.norm(nearest[0] - position))
         if depth <= ON_SURFACE * surface.diagonal:
-            raise InputError(f"the point source at {_text(position)} lies on the surface; move it inside.")
+            raise InputError(f"the point source at {as_text(position)} lies on the surface; move it inside.")
+        mean_free_path = float(body.mean_free_paths(position[None])[0])
         return Deposit(
             incident=self.power,
             points=position[None],
             powers=np.array([self.power]),
-            resolution=max(depth, min(0.1 * medium.mean_free_path, 0.02 * surface.diagonal)),
+            resolution=max(depth, min(0.1 * mean_free_path, 0.02 * surface.diagonal)),
         )
-
-
-def _text(vector: FloatArray) -> str:
-    return "(" + ", ".join(f"{x:.4g}" for x in vector) + ")"

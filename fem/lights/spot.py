@@ -8,7 +8,9 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.lights.point import as_vector
+from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 # A Gaussian spot is cut off where it has fallen to exp(-8), 0.03 %, of its middle.
@@ -217,7 +219,7 @@ def _axes(direction: FloatArray, up: Vector) -> tuple[FloatArray, FloatArray]:
     length = float(np.linalg.norm(raised))
     if not length > 1e-6 * float(np.linalg.norm(up)):
         raise InputError(
-            f"up of the spot is {tuple(up)}, along the beam; give another direction that is up.", field="up"
+            f"up of the spot is {as_text(up)}, along the beam; give another direction that is up.", field="up"
         )
     raised /= length
     return np.cross(direction, raised), raised
@@ -386,6 +388,8 @@ class Image:
         within = scattered(count)
         places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
         return np.asarray(places * [self.width, self.height] @ np.stack(_axes(direction, self.up)))
+
+    __repr__ = one_line
 
 
 # Spots that stay what they are, of which what they light may be remembered.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem import CollimatedBeam, DiffuseLight, Light, Medium, PointSource, Solution
+from tetlux.fem.body import Body
 from tetlux.fem.exact import cylinder as exact_cylinder
 from tetlux.fem.exact import slab as exact_slab
 from tetlux.fem.exact import sphere as exact_sphere
@@ -92,7 +93,7 @@ def furnace(name: str, medium: Medium) -> Scene:
     """Diffuse light on a sphere: the exitance is the same everywhere."""
     scene = ball(name, depth=1.0, medium=medium)
     light = DiffuseLight(irradiance=1.0)
-    deposit = light.deposit_in(scene.surface, medium)
+    deposit = light.deposit_in(Body(scene.surface, (medium,)))
     k, zb, a = medium.sigma_tr, medium.extrapolation_length, 10.0
     # phi + zb phi' = 4 E_t/(1 - 2 C1) at r = a for phi = c sinh(k r)/r; what flows in, -D phi', does not come out.
     growth = k / np.tanh(k * a) - 1.0 / a

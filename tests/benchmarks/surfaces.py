@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.case import library_folder
+from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, PencilBeam, solve
 from tetlux.meshing import Surface, read_surface
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest

@@ -11,6 +11,7 @@ import yaml
 from hypothesis import strategies as st
 from PIL import Image
 
+from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import TetMesh, box
 from tetlux.meshing.files import write_mesh
 
@@ -76,6 +77,17 @@ medium:
 lights: [{pencil: {origin: [0, 0, 20], direction: [0, 0, -1], radius: 1.0, deposit: line}}]
 """,
         """
+mesh:
+  file: head.msh
+  scale: 1.0
+  labels:
+    1: {sigma_a: [0.1, 0.2], sigma_s_prime: 1, eta: 1.4}
+    bone: {sigma_a: 0.1, sigma_s: 10, g: 0.9, eta: 1.4}
+lights: [{point: {position: [5.1, 5.2, 5.3]}}, {emission: {density: 1, region: bone}}]
+tolerance: 0.9
+sweep: {mesh.labels.bone.sigma_a: [0.1, 0.2], mesh.labels.1.eta: [1.4]}
+""",
+        """
 surface: {box: {size: [10, 10, 10]}}
 medium:
   - {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}
@@ -92,6 +104,7 @@ WRONG: list[Any] = [
     *(
         "values.npy",
         "values.vtu",
+        "head.msh",
         "x" * 300,
         "é",
         "漢字",
@@ -370,8 +383,10 @@ def traps() -> Iterator[tuple[str, bytes]]:
             "~/x.stl",
         ),
     ):
-        for place in ("surface", "spot", "environment", "array", "volume", "images"):
-            data = copy.deepcopy(RIGHT[{"surface": 1, "spot": 1, "environment": 1, "images": 4}.get(place, 3)])
+        for place in ("surface", "spot", "environment", "array", "volume", "images", "mesh"):
+            data = copy.deepcopy(
+                RIGHT[{"surface": 1, "spot": 1, "environment": 1, "images": 4, "mesh": 5}.get(place, 3)]
+            )
             if place == "surface":
                 data["surface"]["file"] = file
             elif place == "spot":
@@ -380,6 +395,8 @@ def traps() -> Iterator[tuple[str, bytes]]:
                 data["lights"][5]["environment"]["file"] = file
             elif place == "array":
                 data["medium"]["sigma_a"]["array"]["file"] = file
+            elif place == "mesh":
+                data["mesh"]["file"] = file
             elif place == "volume":
                 data["medium"]["sigma_s_prime"]["volume"]["file"] = file
             else:
@@ -401,8 +418,11 @@ def companions(folder: Path) -> None:
     corners = np.array([[-50.0, -50, -50], [150, -50, -50], [-50, 150, -50], [-50, -50, 150]])
     mesh = TetMesh(corners, np.array([[0, 1, 2, 3]]))
     write_mesh(mesh, folder / "values.vtu", {"coefficient": np.full(4, 1.0)})
+    points, tetrahedra, places = cube_of_cubes(3, 4.0)
+    labels = np.where(places[:, 2] == 0, 1, 2)
+    write_mesh(TetMesh(points, tetrahedra, regions=labels, labels={2: "bone"}), folder / "head.msh")
     (folder / "folder").mkdir()
-    for suffix in ("stl", "png", "npy", "vtu"):
+    for suffix in ("stl", "png", "npy", "vtu", "msh"):
         (folder / f"zero.{suffix}").symlink_to("/dev/zero")
         os.mkfifo(folder / f"pipe.{suffix}")
     (folder / "loop.stl").symlink_to("loop.stl")

@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from tests.fuzz.case_files import case_files, companions, traps
 from tests.fuzz.outcome import Outcome, complaint, outcome_of
 from tests.fuzz.surfaces import Malformed, surfaces
-from tests.fuzz.volumes import case_of, volumes
+from tests.fuzz.volumes import MESH, case_of, volumes
 from tetlux.cases.case import load_cases
 
 # What file systems hold.
@@ -80,7 +80,7 @@ def write_surface(folder: Path, malformed: Malformed, tolerance: float = 0.02) -
     # Twenty mean free paths, if it is of the size that it should be.
     across = 20.0 / malformed.size
     case = {
-        "surface": {"file": file.name},
+        "surface": {"file": file.name, "holes": malformed.holes},
         "medium": {"sigma_a": 0.01 * across, "sigma_s_prime": across, "eta": 1.4},
         "lights": [{"diffuse": {"irradiance": 1.0}}],
         "tolerance": tolerance,
@@ -129,13 +129,21 @@ def run_surfaces(folder: Path, limit: float, names: Collection[str] = ()) -> Ite
 
 
 def check_volumes(folder: Path) -> Iterator[Outcome]:
-    """Read each file of coefficients, and each image."""
+    """Read each file of coefficients, each image and each mesh, and solve on the meshes that are let pass."""
     for malformed in volumes():
         file = folder / f"data.{malformed.suffix}"
         file.write_bytes(malformed.content)
         path = folder / "case.yaml"
         path.write_text(yaml.safe_dump(case_of(malformed.kind, file.name)), encoding="utf-8")
-        yield outcome_of(f"{malformed.kind}: {malformed.name}", ["check", str(path)])
+        for suffix, content in malformed.beside.items():
+            (folder / f"data.{suffix}").write_bytes(content)
+        found = outcome_of(f"{malformed.kind}: {malformed.name}", ["check", str(path)])
+        yield found
+        if malformed.kind == MESH and found.code == 0 and "wrong" not in malformed.name:
+            run = ["run", str(path), "--out", str(folder / "out")]
+            yield outcome_of(f"run: {malformed.name}", run, allowed=(0, 1))
+        for suffix in malformed.beside:
+            (folder / f"data.{suffix}").unlink()
 
 
 def in_a_folder(outcomes: Callable[[Path], Iterator[Outcome]]) -> list[Outcome]:

@@ -17,12 +17,16 @@ Arrays = tuple[FloatArray, IntArray]
 
 @dataclass(frozen=True)
 class Malformed:
-    """A surface file by its name, with what it holds; `size` is that of the body that it should be, unit."""
+    """A surface file by its name, with what it holds; `size` is that of the body that it should be, unit.
+
+    `holes` is what the case file says of them.
+    """
 
     name: str
     suffix: str
     content: bytes
     size: float = 20.0
+    holes: str = "small"
 
 
 def off(points: FloatArray, faces: IntArray) -> bytes:
@@ -458,9 +462,71 @@ def files() -> Iterator[Malformed]:
         yield Malformed(f"an ending of {suffix!r}", suffix, right["stl"])
 
 
+def _half_split(surface: Surface, count: int, random: np.random.Generator, stray: float) -> Arrays:
+    """T-junctions: edges get a vertex that only one of their two triangles knows, somewhere along them."""
+    points, faces = list(surface.points), surface.faces.tolist()
+    for i in random.permutation(len(faces))[:count]:
+        a, b, c = faces[i]
+        along = random.uniform(0.05, 0.95)
+        points.append((1.0 - along) * points[a] + along * points[b] + random.normal(scale=stray, size=3))
+        new = len(points) - 1
+        faces[i] = [a, new, c]
+        faces.append([new, b, c])
+    return np.array(points), np.array(faces)
+
+
+def exports() -> Iterator[tuple[str, Arrays]]:
+    """What CAD programs, scanners and modellers write: T-junctions, two sides, corners nearly at one place, specks."""
+    random = np.random.default_rng(8)
+    ball, cube = sphere(10.0, subdivisions=2), box((14.0, 14.0, 14.0))
+    p, f = arrays_of(ball)
+    for surface, what in ((ball, "ball"), (cube, "cube")):
+        for count in (1, 3, 10, 300):
+            for stray in (0.0, 1e-6, 1e-4, 1e-2):
+                arrays = _half_split(surface, count, random, stray)
+                yield f"a {what} with {count} T-junctions, {stray:g} off", arrays
+    for share in (0.02, 0.3, 0.9):
+        double = f[random.random(len(f)) < share]
+        yield f"{share:.0%} of a ball on both sides", (p, random.permutation(np.vstack([f, double[:, ::-1]])))
+        yield (
+            f"{share:.0%} of a ball left out on both sides",
+            (p, np.vstack([f, f[:, ::-1]])[: int(2 * share * len(f))]),
+        )
+    stitched = _half_split(ball, 20, random, 0.0)
+    yield "T-junctions on both sides", (stitched[0], np.vstack([stitched[1], stitched[1][:, ::-1]]))
+    soup = p[f].reshape(-1, 3)
+    for gap in (0.2e-7, 0.5e-7, 1e-7, 2e-7, 1e-6, 1e-5):
+        apart = soup + random.choice([0.0, gap * 34.6], size=soup.shape)
+        yield f"corners {gap:g} of the size apart", (apart, np.arange(len(soup)).reshape(-1, 3))
+    crumb = sphere(1.0, subdivisions=1)
+    for size in (1e-6, 1e-3, 0.05, 0.2, 0.5, 1.0):
+        for count in (1, 30, 1200):
+            at = random.normal(scale=20.0, size=(count, 3))
+            crumbs = [(size * crumb.points + place, crumb.faces) for place in at]
+            yield f"{count} specks of {size:g}", together((p, f), *crumbs)
+        open_ones = [(size * crumb.points + place, crumb.faces[3:]) for place in random.normal(scale=20.0, size=(9, 3))]
+        yield f"9 open specks of {size:g}", together((p, f), *open_ones)
+
+
+# Bodies with holes, which are also read with all of them closed.
+OPEN = (
+    "ball without",
+    "ball open",
+    "cube without",
+    "a sheet",
+    "a strip",
+    "a pipe",
+    "five fins",
+    "a layer 0.1",
+    "9 open",
+)
+
+
 def surfaces() -> Iterator[Malformed]:
     """All of them."""
-    for name, (points, faces) in bodies():
+    for name, (points, faces) in (*bodies(), *exports()):
         yield Malformed(name, "off", off(points, faces))
+        if name.startswith(OPEN):
+            yield Malformed(f"{name}, holes closed", "off", off(points, faces), holes="close")
     yield from placed()
     yield from files()

@@ -1,12 +1,12 @@
-"""Malformed files of coefficients and of light: arrays, images and volume meshes."""
+"""Malformed files of coefficients, of light and of bodies: arrays, images and volume meshes."""
 
 import base64
 import io
 import pickle
 import struct
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,24 +14,31 @@ import meshio
 import numpy as np
 from PIL import Image
 
+from tests.fuzz.meshes import broken, damaged, tables
+
 # A file holds one of these, and a case names it there.
-ARRAY, VOLUME, IMAGES, SPOT, SKY = "array", "volume", "images", "spot", "environment"
+ARRAY, VOLUME, IMAGES, SPOT, SKY, MESH = "array", "volume", "images", "spot", "environment", "mesh"
 
 
 @dataclass(frozen=True)
 class MalformedVolume:
-    """A file by its name and what it is of, with what it holds."""
+    """A file by its name and what it is of, with what it holds; and files beside it, by their suffixes."""
 
     name: str
     kind: str
     suffix: str
     content: bytes
+    beside: Mapping[str, bytes] = field(default_factory=dict)
 
 
 def case_of(kind: str, file: str) -> dict[str, Any]:
     """A case that is right, but for the file."""
     medium: dict[str, Any] = {"sigma_a": 0.01, "sigma_s_prime": 1.0, "eta": 1.4}
     light: dict[str, Any] = {"diffuse": {"irradiance": 1.0}}
+    if kind == MESH:
+        labels = {1: medium, 2: {**medium, "sigma_a": 0.1}}
+        light = {"point": {"position": [5.1, 5.2, 5.3]}}
+        return {"mesh": {"file": file, "labels": labels}, "lights": [light], "tolerance": 0.9, "outputs": ["volume"]}
     if kind == ARRAY:
         medium["sigma_a"] = {"array": {"file": file, "origin": [-6, -6, -6], "spacing": 4}}
     elif kind == VOLUME:
@@ -225,3 +232,9 @@ def volumes() -> Iterator[MalformedVolume]:
             yield MalformedVolume(f"{kind}, {name}", kind, suffix, content)
     for name, content in meshes():
         yield MalformedVolume(f"volume, {name}", VOLUME, "vtu", content)
+    for name, content in broken():
+        yield MalformedVolume(f"mesh, {name}", MESH, "vtu", content)
+    for suffix, name, content in damaged():
+        yield MalformedVolume(f"mesh, {name}", MESH, suffix, content)
+    for name, files in tables():
+        yield MalformedVolume(f"mesh, NIRFAST, {name}", MESH, "node", files["node"], files)

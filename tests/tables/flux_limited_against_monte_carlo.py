@@ -49,6 +49,7 @@ from scipy.optimize import brentq
 from tests.tables.diffusion_against_monte_carlo import entered, head, medium_of, ratio, ratios, row
 from tetlux.fem import Medium, PencilBeam
 from tetlux.fem.assembly import Assembly
+from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate
@@ -173,16 +174,16 @@ def pencils(photons: int) -> None:
 def exitances_of_ball(medium: Medium, radius: float, edges: FloatArray) -> list[FloatArray]:
     """Means over rings by each model, all on one mesh."""
     surface = sphere(radius=radius)
-    deposit = PencilBeam((0.0, 0.0, 3.0 * radius), (0.0, 0.0, -1.0)).deposit_in(surface, medium)
+    deposit = PencilBeam((0.0, 0.0, 3.0 * radius), (0.0, 0.0, -1.0)).deposit_in(Body(surface, (medium,)))
     mesh = tetrahedralize(surface, edge_length=radius / 9.0)
-    mesh = graded_towards(mesh, surface, *lit_points([deposit], medium), 200_000, longest=0.35)
+    mesh = graded_towards(mesh, surface, *lit_points([deposit]), 200_000, longest=0.35)
     load = load_vector(mesh, coefficients_of(medium), deposit)
     assembly, escape = Assembly(mesh), 0.5 / medium.boundary_factor
     corners = mesh.points[mesh.tetrahedra]
     inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
 
     def solved(diffusion: FloatArray) -> Solved:
-        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, escape), 1).solve(load[:, None])[:, 0]
+        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, escape), 1).solve(load).x
         at = fluence[mesh.tetrahedra]
         slope = (inverse @ (at[:, 1:] - at[:, :1])[..., None])[..., 0]
         return fluence, at.mean(axis=1), np.linalg.norm(slope, axis=1)

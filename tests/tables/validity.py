@@ -26,7 +26,7 @@ from tetlux.fem.validity_tables import (
     NEAR_RINGS,
     THICKNESSES,
     near_error,
-    near_row,
+    near_rows,
 )
 from tetlux.meshing.arrays import FloatArray
 
@@ -201,7 +201,7 @@ def discs() -> None:
                 caught = areas * (apart < radius**2).mean(axis=1)
                 measured = abs(caught @ point / (caught @ run.front) - 1.0)
                 distance = np.hypot(max(outside, 0.0), radius)
-                expected = near_error(near_row(medium, g), np.array([distance]))[0]
+                expected = near_error(near_rows(np.array([medium.albedo]), np.array([g])), np.array([distance]))[0]
                 found.append(f"{max(outside, 0.0):g} outside: {measured:.2f}, expected {expected:.2f}")
             print(f"    g {g:g}, radius {radius:g}:", "; ".join(found).replace("0 outside", "middle", 1))
 

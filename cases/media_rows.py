@@ -1,0 +1,87 @@
+"""Coefficients of each medium of a run, for its summary."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from tetlux.cases.case import Case
+from tetlux.cases.lighting import BODY
+from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, at_cells, base_of, by_label, coefficients_on
+from tetlux.fem.medium import Medium
+from tetlux.fem.scene import media_of
+from tetlux.fem.varying import VaryingMedium
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.tetmesh import TetMesh
+
+
+def media_rows(case: Case, mesh: TetMesh) -> list[list[dict[str, Any]]]:
+    """Coefficients of the body outside of its regions and of each region, or of each label, for each channel.
+
+    Parameters
+    ----------
+    case : Case
+    mesh : TetMesh
+        That the case was solved on.
+
+    Returns
+    -------
+    list of list of dict
+        Coefficients in 1/unit, lengths in unit; means over the volume where they vary.
+    """
+    names = dict(enumerate((BODY, *(region.surface.name for region in case.regions))))
+    if case.mesh is not None:
+        names = {label: case.mesh.labels.get(label, str(label)) for label in case.mesh.region_volumes}
+    channels = []
+    for media in _media_by_label(case):
+        on_mesh = coefficients_on(mesh, media)
+        channels.append([_row(names[region], medium, mesh, on_mesh, region) for region, medium in media.items()])
+    return channels
+
+
+def _media_by_label(case: Case) -> list[MediaByLabel]:
+    if case.mesh is not None:
+        return [channel.media for channel in case.channels if not isinstance(channel.media, AnyMedium)]
+    media = [channel.medium for channel in case.channels]
+    return [by_label(each) for each in media_of(media, case.regions, len(media))]
+
+
+def _row(name: str, medium: AnyMedium, mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, Any]:
+    if isinstance(medium, Medium):
+        return {"name": name, **coefficients(medium)}
+    cells: IntArray = np.flatnonzero(mesh.regions == region)
+    sigma_a, total = (
+        _mean(at_cells(each, cells), mesh.volumes[cells]) for each in (on_mesh.sigma_a, on_mesh.sigma_t_prime)
+    )
+    means = {
+        "sigma_a": sigma_a,
+        "sigma_s_prime": total - sigma_a,
+        "albedo": 1.0 - sigma_a / total,
+        "sigma_tr": math.sqrt(3.0 * sigma_a * total),
+        "mean_free_path": 1.0 / total,
+    }
+    return {"name": name, **coefficients(medium), **means}
+
+
+def coefficients(medium: AnyMedium) -> dict[str, Any]:
+    """What is known of a medium, those of the base of one that varies."""
+    base = base_of(medium)
+    figures: dict[str, Any] = {
+        "sigma_a": base.sigma_a,
+        "sigma_s_prime": base.reduced_scattering,
+        "eta": base.eta,
+        "boundary": base.boundary,
+        "albedo": base.albedo,
+        "sigma_tr": base.sigma_tr,
+        "mean_free_path": base.mean_free_path,
+    }
+    if base.sigma_s is not None:
+        figures |= {"sigma_s": base.sigma_s, "g": base.mean_cosine}
+    if isinstance(medium, VaryingMedium):
+        figures["varies"] = [name for name in ("sigma_a", "sigma_s_prime") if getattr(medium, name) is not None]
+    return figures
+
+
+def _mean(values: FloatArray, weights: FloatArray) -> float:
+    """Weighted mean, without rounding where all values are alike."""
+    return float(values[0] if np.ptp(values) == 0 else weights @ values / weights.sum())

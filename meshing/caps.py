@@ -1,0 +1,193 @@
+"""A cap over a hole: a triangulated rim, refined to the rim's own density and stretched like a membrane.
+
+Liepa, Filling holes in meshes, SGP 2003; with the harmonic surface in place of his thin plate, since that stays within
+the convex hull of the rim: a flat rim gets a flat cap.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.topology import Edges
+
+# Longer rims are triangulated over every second, third, ... vertex first: time goes with the cube (.3 s).
+LONGEST_RIM = 300
+# Weight of squared sides beside area: of the triangulations of a flat rim, which have one area, it picks a compact one.
+COMPACT = 1e-3
+# A triangle is split until its sides are this many times as long as the rim's edges (Liepa's alpha).
+DENSITY = 2.0
+# Rounds of splitting and flipping: each halves the lengths at least.
+ROUNDS = 12
+# Triangles of one cap. A rim of n edges needs about n squared / 10.
+MOST = 20_000
+# What is gained by turning over the edge a-b of triangles abc and bad, (e,), from the corners (e, 3).
+Gain = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
+
+
+def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, IntArray]:
+    """Triangles over a hole.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    loop : (k,) ndarray
+        The vertices of the rim, as the triangles along it walk them.
+    first : int
+        The number of the first new vertex.
+
+    Returns
+    -------
+    added : (a, 3) ndarray
+        New vertices.
+    faces : (f, 3) ndarray
+        Turned as the triangles along the rim.
+    """
+    rim = points[loop]
+    faces = triangulate_polygon(rim)[:, ::-1]
+    inner, faces = _refined(rim, faces) if len(loop) > 4 else (rim[:0], faces)
+    inner = _membrane(rim, inner, faces)
+    names = np.concatenate([loop, first + np.arange(len(inner))])
+    return inner, names[faces]
+
+
+def triangulate_polygon(corners: FloatArray) -> IntArray:
+    """Triangles (k - 2, 3) of a polygon in space (k, 3), turned as it is: those of least area."""
+    count = len(corners)
+    if count <= LONGEST_RIM:
+        return _least_area(corners)
+    coarse = np.arange(0, count, -(-count // LONGEST_RIM))
+    parts = [coarse[_least_area(corners[coarse])]]
+    for start, end in zip(coarse, [*coarse[1:], count], strict=True):
+        if end - start > 1:
+            chain = np.arange(start, end + 1) % count
+            parts.append(chain[_least_area(corners[chain])])
+    faces = np.vstack(parts)
+    # Where the rim is hollow a chain's triangles are folded onto the others; flips unfold them.
+    for _ in range(ROUNDS):
+        faces, flips = _flipped(corners, faces, _area_saved)
+        if not flips:
+            break
+    return faces
+
+
+def _least_area(corners: FloatArray) -> IntArray:
+    """By dynamic programming over chains of the rim (Barequet & Sharir 1995), all chains of one length at a time."""
+    count = len(corners)
+    if count == 3:
+        return np.arange(3).reshape(1, 3)
+    squares = ((corners[:, None] - corners) ** 2).sum(axis=2)
+    best = np.zeros((count, count))
+    apex = np.zeros((count, count), dtype=np.int64)
+    for gap in range(2, count):
+        i = np.arange(count - gap)[:, None]
+        k = i + np.arange(1, gap)
+        j = i + gap
+        a, b, c = squares[i, k], squares[k, j], squares[i, j]
+        # Heron, by squares of sides: cross products take three times as long.
+        area = 0.25 * np.sqrt(np.maximum(4.0 * a * b - (a + b - c) ** 2, 0.0))
+        weight = best[i, k] + best[k, j] + area + COMPACT * (a + b + c)
+        least = weight.argmin(axis=1)
+        rows = i[:, 0]
+        best[rows, rows + gap] = weight[rows, least]
+        apex[rows, rows + gap] = rows + 1 + least
+    faces, todo = [], [(0, count - 1)]
+    while todo:
+        one, other = todo.pop()
+        if other - one > 1:
+            middle = int(apex[one, other])
+            faces.append((one, middle, other))
+            todo += [(one, middle), (middle, other)]
+    return np.array(faces, dtype=np.int64)
+
+
+def _refined(rim: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """New vertices within, as dense as those of the rim beside them, and the triangles of rim and new ones."""
+    step = np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1)
+    size = 0.5 * (step + np.roll(step, -1))
+    points = rim
+    for _ in range(ROUNDS):
+        corners, wanted = points[faces], size[faces]
+        middle = corners.mean(axis=1)
+        reach = np.linalg.norm(corners - middle[:, None], axis=2)
+        large = (np.sqrt(DENSITY) * reach > wanted.mean(axis=1)[:, None]).all(axis=1)
+        if not large.any() or len(faces) + 2 * large.sum() > MOST:
+            break
+        new = len(points) + np.arange(large.sum())
+        a, b, c = faces[large].T
+        pieces = [np.column_stack(each) for each in ((a, b, new), (b, c, new), (c, a, new))]
+        faces = np.vstack([faces[~large], *pieces])
+        points, size = np.vstack([points, middle[large]]), np.concatenate([size, wanted[large].mean(axis=1)])
+        for _ in range(ROUNDS):
+            faces, flips = _flipped(points, faces, _angles_beyond)
+            if not flips:
+                break
+    return points[len(rim) :], faces
+
+
+def _flipped(points: FloatArray, faces: IntArray, gain: Gain) -> tuple[IntArray, int]:
+    """Inner edges a-b between triangles with apexes c and d, made edges c-d where that gains; no two of a triangle."""
+    edges = Edges(faces)
+    count = len(faces)
+    inner = edges.sides((edges.triangles == 2) & (edges.balance == 0))
+    pairs = inner[np.argsort(edges.edge[inner], kind="stable")].reshape(-1, 2)
+    if len(pairs) == 0:
+        return faces, 0
+    apex = faces.T[[2, 0, 1]].ravel()
+    a, b, c, d = edges.start[pairs[:, 0]], edges.end[pairs[:, 0]], apex[pairs[:, 0]], apex[pairs[:, 1]]
+    gains = gain(*(points[corner] for corner in (a, b, c, d)))
+    existing = set((np.minimum(edges.start, edges.end) * len(points) + np.maximum(edges.start, edges.end)).tolist())
+    busy = np.zeros(count, dtype=bool)
+    result = faces.copy()
+    flips = 0
+    for i in np.argsort(-gains):
+        if gains[i] <= 0:
+            break
+        first, second = pairs[i] % count
+        key = int(min(c[i], d[i]) * len(points) + max(c[i], d[i]))
+        if busy[first] or busy[second] or key in existing:
+            continue
+        result[first], result[second] = (a[i], d[i], c[i]), (d[i], b[i], c[i])
+        busy[first] = busy[second] = True
+        existing.add(key)
+        flips += 1
+    return result, flips
+
+
+def _angles_beyond(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """By how much the angles at c and d exceed two right ones together: the Delaunay criterion."""
+
+    def angle(apex: FloatArray) -> FloatArray:
+        u, v = a - apex, b - apex
+        return np.asarray(np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v)))
+
+    return angle(c) + angle(d) - np.pi - 1e-6
+
+
+def _area_saved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
+    """How much less area two triangles have that were folded onto each other."""
+
+    def area(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.norm(np.cross(q - p, r - p), axis=1))
+
+    before, after = area(a, b, c) + area(a, b, d), area(a, c, d) + area(b, c, d)
+    return before * (1.0 - 1e-9) - after
+
+
+def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:
+    """Inner vertices, each in the middle of its neighbours, weighted by the inverse of their distances."""
+    if len(inner) == 0:
+        return inner
+    from scipy.sparse import coo_matrix  # noqa: PLC0415
+    from scipy.sparse.linalg import spsolve  # noqa: PLC0415
+
+    count, fixed = len(rim) + len(inner), len(rim)
+    points = np.vstack([rim, inner])
+    sides = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    length = np.linalg.norm(points[sides[:, 0]] - points[sides[:, 1]], axis=1)
+    weight = 1.0 / np.maximum(length, 1e-12 * length.max())
+    rows, columns = np.concatenate([sides, sides[:, ::-1]]).T
+    joined = coo_matrix((np.tile(weight, 2), (rows, columns)), shape=(count, count)).tocsr()[fixed:]
+    degree = np.asarray(joined.sum(axis=1)).ravel()
+    system = coo_matrix((degree, (np.arange(len(inner)), np.arange(len(inner)))), shape=(len(inner),) * 2).tocsc()
+    return np.asarray(spsolve(system - joined[:, fixed:].tocsc(), joined[:, :fixed] @ rim)).reshape(-1, 3)

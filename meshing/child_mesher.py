@@ -1,0 +1,81 @@
+"""pytetwild in a process of its own, with a time limit: it can crash, hang and take all memory."""
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.errors import RunError
+from tetlux.meshing.scratch import run_child, scratch
+
+# The command that fills input.npz of its working directory; -S, since it is told where modules are.
+MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
+MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
+
+
+def run_pytetwild(
+    points: FloatArray,
+    faces: IntArray,
+    *,
+    edge_length: float,
+    epsilon: float,
+    stop_energy: float,
+    seconds: float,
+    time_limit: float,
+    name: str,
+    filtered: bool = True,
+) -> tuple[FloatArray, IntArray]:
+    """Points and tetrahedra; if not filtered, also those round the body."""
+    try:
+        with scratch("mesher") as folder:
+            np.savez(
+                folder / "input.npz",
+                points=points,
+                faces=faces.astype(np.int32),
+                edge_length=edge_length,
+                epsilon=epsilon,
+                stop_energy=stop_energy,
+                filtered=filtered,
+            )
+            # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
+            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+            done = run_child([*MESHER, _whereabouts()], folder, seconds, environment)
+            result = folder / "output.npz"
+            if done.returncode != 0 or not result.exists():
+                raise _failed(name, done)
+            with np.load(result) as data:
+                return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
+    except subprocess.TimeoutExpired as error:
+        raise RunError(
+            f"{name}: the mesher was stopped after {time_limit:g} s; leave out thin parts and the smallest "
+            "regions, or simplify the surface in a mesh editor."
+        ) from error
+    except OSError as error:
+        raise RunError(f"{name}: the mesher could not be run ({error.strerror or error}); {MAKE_ROOM}") from error
+
+
+def _failed(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
+    """What to say of a mesher that ended without a mesh."""
+    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+    cause = f"signal {-done.returncode}" if done.returncode < 0 else last
+    remedy = "repair or simplify the surface in a mesh editor and try again."
+    if last.startswith("OSError"):
+        remedy = MAKE_ROOM
+    elif done.returncode == -9:
+        remedy = "it was killed, as the system does when memory runs out: free some, or simplify the surface."
+    return RunError(f"{name}: the mesher failed ({cause}); {remedy}")
+
+
+def _whereabouts() -> str:
+    """What `_mesher_process` is told: where modules are (an editable install may know it by a hook only)."""
+    spec = importlib.util.find_spec("pytetwild")
+    folder = (spec.submodule_search_locations or [""])[0] if spec else ""
+    places = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
+    # Relative ones are relative to another working directory.
+    paths = [place for place in dict.fromkeys(places) if Path(place).is_absolute()]
+    return json.dumps({"paths": paths, "pytetwild": folder, "parent": os.getpid()})

@@ -1,0 +1,132 @@
+"""Whether tetrahedra fill a body without gaps and overlaps: each face between two of them, or on the boundary."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from tetlux.meshing.arrays import BoolArray, IntArray
+from tetlux.meshing.blocks import grouped
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
+from tetlux.meshing.tetmesh import FACES, TetMesh
+
+# How far outside the middle of a facet another tetrahedron is looked for, as a share of the facet's size; and of the
+# mesh's diagonal, since files round coordinates.
+OUTSIDE, ROUNDED = 1e-4, 2e-6
+# A tetrahedron that holds the middle of a facet deeper than this many times that distance is overlapped.
+DEEP = 20.0
+# The share of the boundary's area that may lie against or inside other tetrahedra: more is refused, less is said.
+MOST_INSIDE = 1e-3
+
+
+def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
+    """The number of faces that more than one tetrahedron has on the same side, so that these overlap.
+
+    Parameters
+    ----------
+    corners : (m, 4) ndarray
+        Of positively oriented tetrahedra.
+    nodes : int
+        How many there are.
+    """
+    faces = corners[:, FACES].reshape(-1, 3)
+    low, high = faces.min(axis=1), faces.max(axis=1)
+    middle = faces.sum(axis=1) - low - high
+    pairs = grouped((low * nodes + middle).astype(np.uint64))[1].astype(np.uint64)
+    _, face = grouped(pairs * np.uint64(nodes) + high.astype(np.uint64))
+    # A face is seen the same way round from one side: the order of its corners is an even or an odd permutation.
+    first, second = faces[:, 0], faces[:, 1]
+    even = ((first < second) & ((second < faces[:, 2]) | (faces[:, 2] < first))) | (
+        (first > second) & (second < faces[:, 2]) & (faces[:, 2] < first)
+    )
+    count = int(face.max()) + 1
+    covered = np.bincount(face[even], minlength=count), np.bincount(face[~even], minlength=count)
+    return int((np.maximum(*covered) > 1).sum())
+
+
+def check_overlap(corners: IntArray, nodes: int) -> None:
+    """Refuse tetrahedra that have a face in common and lie on the same side of it.
+
+    Raises
+    ------
+    InputError
+    """
+    overlapped = doubly_covered_faces(corners, nodes)
+    if overlapped:
+        raise InputError(
+            f"tetrahedra overlap: {overlapped:,} of their faces have several tetrahedra on one side, as when some are "
+            "given twice; give each part of the volume once."
+        )
+
+
+def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
+    """Refuse a mesh that counts a volume twice, or has parts that touch but have no nodes in common.
+
+    Returns
+    -------
+    tuple of str
+        What a user should know: facets that lie against others, if they are few.
+
+    Raises
+    ------
+    InputError
+    """
+    check_overlap(mesh.tetrahedra, len(mesh.points))
+    return check_facets(mesh)
+
+
+def conformity_of(mesh: TetMesh) -> tuple[str, ...]:
+    """`check_conformity`, once for each mesh."""
+    return mesh.remembered(check_conformity, lambda: check_conformity(mesh))
+
+
+def check_facets(mesh: TetMesh) -> tuple[str, ...]:
+    """The part of `check_conformity` that looks at the boundary."""
+    against, inside = _covered_facets(mesh)
+    area = float(mesh.boundary_areas[against | inside].sum())
+    if area == 0.0:
+        parts = _parts(mesh)
+        if parts == 1:
+            return ()
+        sentence = f"the mesh is {parts} parts without a common node; no light passes between them."
+        return (Note("several-bodies", sentence, value=parts),)
+    figure = f"{area:.3g} {mesh.unit}²"
+    if area <= MOST_INSIDE * mesh.area:
+        sentence = f"{figure} of the mesh's boundary face each other inside it; no light passes there."
+        return (Note("facets-covered", sentence, value=area),)
+    if mesh.boundary_areas[inside].sum() > 0.5 * area:
+        raise InputError(
+            f"tetrahedra overlap: {figure} of the boundary lie inside other tetrahedra; give each part of the volume "
+            "once."
+        )
+    raise InputError(
+        f"parts touch without having their nodes in common: {figure} of the boundary face each other inside, and no "
+        "light would pass there; mesh the parts together, so that they share the nodes between them (in gmsh with "
+        "BooleanFragments or Coherence), or give doubled nodes to mesh_from_arrays, which joins them."
+    )
+
+
+def _parts(mesh: TetMesh) -> int:
+    """How many parts it has that have no node in common."""
+    size = len(mesh.points)
+    used = np.unique(mesh.tetrahedra).size
+    links = coo_array((np.ones(len(mesh.edges), dtype=bool), mesh.edges.T), shape=(size, size))
+    # A node that no tetrahedron uses is a part of its own.
+    return int(connected_components(links, directed=False)[0]) - (size - used)
+
+
+def _covered_facets(mesh: TetMesh) -> tuple[BoolArray, BoolArray]:
+    """Which facets of the boundary lie against another tetrahedron, and which inside one, (f,) each."""
+    corners = mesh.points[mesh.boundary_faces]
+    middles = corners.mean(axis=1)
+    normals, areas = mesh.surface.normals, mesh.boundary_areas
+    steps = np.maximum(OUTSIDE * np.sqrt(areas), ROUNDED * mesh.diagonal)
+    cells, weights = mesh.locate(middles + steps[:, None] * normals)
+    covered = (cells >= 0) & (cells != mesh.boundary_cells)
+    rows = np.flatnonzero(covered)
+    # The distance from the nearest face of that tetrahedron: a coordinate times its height, the inverse of its slope.
+    heights = 1.0 / np.linalg.norm(mesh.hat_gradients[cells[rows]], axis=2)
+    deep = (weights[rows] * heights).min(axis=1) > DEEP * steps[rows]
+    inside = np.zeros(len(cells), dtype=bool)
+    inside[rows[deep]] = True
+    return covered & ~inside, inside

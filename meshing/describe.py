@@ -1,0 +1,54 @@
+"""One line for an object that holds arrays: what it is, how large, with units."""
+
+from dataclasses import MISSING, Field, fields
+from typing import Any
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray
+
+# Letters of the text of one value, and of a whole line.
+LONGEST_VALUE, LONGEST_LINE = 90, 180
+
+
+def count(number: int, thing: str, several: str | None = None) -> str:
+    """A number of things, as in 1 node and 6,966 triangles."""
+    return f"{number:,} {thing if number == 1 else several or thing + 's'}"
+
+
+def size(points: FloatArray, unit: str) -> str:
+    """Lengths of the box round points (n, 3), as in 34.2 x 30 x 26 mm."""
+    lengths = np.ptp(points, axis=0) if len(points) else np.zeros(3)
+    return f"{' x '.join(f'{length:.3g}' for length in lengths)} {unit}"
+
+
+def one_line(self: Any) -> str:
+    """A ``__repr__`` for dataclasses that hold arrays, of which it tells types and shapes; defaults are left out."""
+    told = [f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if not _is_default(self, one)]
+    return _cut(f"{type(self).__name__}({', '.join(told)})", LONGEST_LINE)
+
+
+def _is_default(self: Any, one: "Field[Any]") -> bool:
+    value = getattr(self, one.name)
+    default = one.default_factory() if one.default_factory is not MISSING else one.default
+    if isinstance(value, np.ndarray) or isinstance(default, np.ndarray):
+        return isinstance(value, np.ndarray) and value.size == 0
+    return bool(value is default or value == default)
+
+
+def _short(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape}"
+    if isinstance(value, list | tuple):
+        text = f"({', '.join(map(_short, value))})"
+        return text if len(text) <= LONGEST_VALUE else count(len(value), "value")
+    if isinstance(value, dict):
+        return f"{{{', '.join(map(str, value))}}}"
+    if callable(value) and hasattr(value, "__name__"):
+        return str(value.__name__)
+    return _cut(repr(value), LONGEST_VALUE)
+
+
+def _cut(text: str, longest: int) -> str:
+    line = " ".join(text.split())
+    return line if len(line) <= longest else f"{line[: longest - 3]}..."

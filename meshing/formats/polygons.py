@@ -1,0 +1,54 @@
+"""Polygons of a file made into triangles."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.caps import triangulate_polygon
+
+
+def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
+    """Triangles (t, 3) of polygons; those of fewer than three corners are left out.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    corners : (c,) ndarray
+        The vertices of all polygons, one after the other.
+    counts : (p,) ndarray
+        How many corners each has.
+    """
+    if (counts == 3).all():
+        return corners.reshape(-1, 3)
+    if corners.min() < 0 or corners.max() >= len(points):
+        raise ValueError("a polygon names a vertex that does not exist")
+    start = np.cumsum(counts) - counts
+    place, triangles = [], []
+    for count in np.unique(counts[counts >= 3]):
+        which = np.flatnonzero(counts == count)
+        polygons = corners[start[which, None] + np.arange(count)]
+        fans = np.stack([polygons[:, [0, i, i + 1]] for i in range(1, count - 1)], axis=1)
+        for i in _hollow(points, fans):
+            fans[i] = polygons[i][triangulate_polygon(points[polygons[i]])]
+        triangles.append(fans.reshape(-1, 3))
+        place.append(np.repeat(start[which], count - 2))
+    if not triangles:
+        return np.zeros((0, 3), dtype=np.int64)
+    return np.concatenate(triangles)[np.argsort(np.concatenate(place), kind="stable")]
+
+
+def _hollow(points: FloatArray, fans: IntArray) -> IntArray:
+    """The polygons (p, k - 2, 3), as fans, whose triangles do not all face one way."""
+    if fans.shape[1] < 2:
+        return np.zeros(0, dtype=np.int64)
+    corners = points[fans]
+    normals = np.cross(corners[:, :, 1] - corners[:, :, 0], corners[:, :, 2] - corners[:, :, 0])
+    along = np.einsum("pki,pi->pk", normals, normals.sum(axis=1))
+    return np.flatnonzero((along < 0).any(axis=1))
+
+
+def flatten(rows: Sequence[Sequence[object]]) -> tuple[list[object], IntArray]:
+    """What the rows hold, one after the other, and how much each holds."""
+    counts = np.fromiter(map(len, rows), dtype=np.int64, count=len(rows))
+    return [value for row in rows for value in row], counts

@@ -1,0 +1,262 @@
+"""Tetrahedra made elsewhere, mended where that is safe and checked before they become a `TetMesh`."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
+
+# The largest coordinate, in whatever unit.
+LONGEST = 1e30
+# Nodes nearer to each other than this share of the mesh's diagonal are one node (files round at a tenth of it), unless
+# the second share of the shortest edge is less.
+SAME_PLACE, OF_SHORTEST_EDGE = 1e-6, 1e-3
+# A tetrahedron whose volume is less than this share of its longest edge cubed is flat: rounding makes it so.
+FLAT = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class _Tetrahedra:
+    """Tetrahedra on their way to a mesh.
+
+    Attributes
+    ----------
+    points : (n, 3) ndarray
+    corners : (m, 4) ndarray
+    nodes, cells : (n,), (m,) ndarray
+        The numbers that nodes and tetrahedra were given with.
+    repairs : tuple of str
+    """
+
+    points: FloatArray
+    corners: IntArray
+    nodes: IntArray
+    cells: IntArray
+    repairs: tuple[str, ...] = ()
+
+    def only(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
+        """Those that are kept, with a sentence that says why the others are not."""
+        if kept.all():
+            return self
+        if not kept.any():
+            raise InputError("all of its tetrahedra are flat; check its coordinates.")
+        return replace(self, corners=self.corners[kept], cells=self.cells[kept], repairs=(*self.repairs, repair))
+
+
+def mesh_from_arrays(
+    points: npt.ArrayLike,
+    tetrahedra: npt.ArrayLike,
+    *,
+    labels: npt.ArrayLike | None = None,
+    names: Mapping[int, str] | None = None,
+    unit: str = "mm",
+    numbered_from: int | None = None,
+) -> TetMesh:
+    """Make a mesh of tetrahedra that come from elsewhere: mend what can be mended safely, and refuse the rest.
+
+    Parameters
+    ----------
+    points : (n, 3) array_like
+        Nodes, in `unit`.
+    tetrahedra : (m, 4) array_like of int
+        Corners, either way round.
+    labels : (m,) array_like of int, optional
+        What each tetrahedron is of: any integers. Media are given by them, see `tetlux.fem.solve`.
+    names : mapping of int to str, optional
+        Of the labels.
+    unit : str
+        Unit of the coordinates.
+    numbered_from : {0, 1}, optional
+        The number of the first node in `tetrahedra`; if not given it is 1 where number n is used and 0 is not, which
+        `repairs` then says, and else 0.
+
+    Returns
+    -------
+    TetMesh
+        `repairs` says what was mended: nodes that lie at one place are joined, unused nodes, flat tetrahedra and
+        copies are left out, inverted tetrahedra are turned.
+
+    Raises
+    ------
+    InputError
+        If shapes or numbers are wrong, tetrahedra overlap, or parts touch without having their nodes in common.
+
+    Examples
+    --------
+    >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> mesh = mesh_from_arrays(corners, [[1, 2, 3, 4]], labels=[7], names={7: "skin"})
+    >>> mesh.labels, mesh.regions, mesh.repairs
+    ({7: 'skin'}, array([7]), ('nodes are numbered from 1.',))
+    """
+    given = Given(points, tetrahedra, labels, names or {}, numbered_from)
+    return checked_mesh(given, unit)[0]
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Arrays as `mesh_from_arrays` takes them, and what is to be said of how they were read."""
+
+    points: npt.ArrayLike
+    tetrahedra: npt.ArrayLike
+    labels: npt.ArrayLike | None = None
+    names: Mapping[int, str] = field(default_factory=dict)
+    numbered_from: int | None = 0
+    repairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
+    """The mesh that arrays make, and the number that each of its nodes was given with, (k,).
+
+    Raises
+    ------
+    InputError
+        As `mesh_from_arrays`.
+    """
+    numbered = _numbered(given.points, given.tetrahedra, given.numbered_from)
+    regions = None if given.labels is None else whole_numbers(given.labels, len(numbered.corners))
+    if given.labels is not None and regions is None:
+        raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
+    mended = _without_copies(_turned(_without_flat(_joined(numbered))))
+    mesh = TetMesh(
+        mended.points,
+        mended.corners,
+        unit,
+        labels=dict(given.names),
+        repairs=(*given.repairs, *mended.repairs),
+        warnings=given.warnings,
+        **({} if regions is None else {"regions": regions[mended.cells]}),
+    )
+    found = check_facets(mesh)
+    if found:
+        mesh = replace(mesh, warnings=(*given.warnings, *found))
+    # So that it is not checked again when it is solved on.
+    mesh.remembered(check_conformity, lambda: found)
+    return mesh, mended.nodes
+
+
+def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
+    """`mesh_from_arrays` without labels, and the number that each of the mesh's nodes was given with, (k,)."""
+    return checked_mesh(Given(points, cells), unit)
+
+
+def unjoined(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
+    """Tetrahedra that only carry values, whose parts may have nodes of their own: turned where they are inverted.
+
+    Returns
+    -------
+    mesh : TetMesh
+    nodes : (k,) ndarray
+        The number that each of its nodes was given with.
+    """
+    given = _turned(_numbered(points, cells))
+    return TetMesh(given.points, given.corners, unit), given.nodes
+
+
+def _numbered(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
+    """Tetrahedra with nodes that exist, lie somewhere, and are all used."""
+    try:
+        vertices, corners = np.asarray(points, dtype=np.float64), np.array(cells)
+    except (TypeError, ValueError) as error:
+        raise InputError("its points and tetrahedra are no arrays of numbers.") from error
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise InputError(f"its nodes are an array of shape {vertices.shape}; give three coordinates for each.")
+    if corners.ndim != 2 or corners.shape[1] != 4 or len(corners) == 0 or corners.dtype.kind not in "iu":
+        raise InputError(f"its tetrahedra are an array of shape {corners.shape}; give four node numbers for each.")
+    corners = corners.astype(np.int64)
+    repairs: list[str] = []
+    if numbered_from is None and corners.min() >= 1 and corners.max() == len(vertices):
+        repairs.append("nodes are numbered from 1.")
+        numbered_from = 1
+    corners -= numbered_from or 0
+    if corners.min() < 0 or corners.max() >= len(vertices):
+        raise InputError("a tetrahedron names a node that does not exist; the file is damaged.")
+    vertices, corners, nodes = _used(vertices, corners, np.arange(len(vertices)))
+    if not (np.abs(vertices) < LONGEST).all():
+        raise InputError("a node's coordinate is no number, or absurdly large; export the file again.")
+    return _Tetrahedra(vertices, corners, nodes, np.arange(len(corners)), tuple(repairs))
+
+
+def _used(points: FloatArray, corners: IntArray, nodes: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Points, corners and node numbers without the nodes that no tetrahedron uses."""
+    used = np.zeros(len(points), dtype=bool)
+    used[corners] = True
+    if used.all():
+        return points, corners, nodes
+    return points[used], (np.cumsum(used) - 1)[corners], nodes[used]
+
+
+def _joined(given: _Tetrahedra) -> _Tetrahedra:
+    """One node for all that lie at one place."""
+    points, corners = given.points, given.corners
+    near = SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    if len(pairs) == 0:
+        return given
+    # Nodes of a tetrahedron that small are not one node.
+    starts, ends = points[corners[:, EDGES]].transpose(2, 0, 1, 3)
+    lengths = np.linalg.norm(ends - starts, axis=2)
+    shortest = float(lengths.min(initial=near / OF_SHORTEST_EDGE, where=lengths > 0.0))
+    pairs = pairs[np.linalg.norm(np.diff(points[pairs], axis=1)[:, 0], axis=1) <= OF_SHORTEST_EDGE * shortest]
+    if len(pairs) == 0:
+        return given
+    size = len(points)
+    _, place = connected_components(coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size)), directed=False)
+    _, first = np.unique(place, return_index=True)
+    repair = f"{size - len(first):,} nodes that lie where another one does were joined with it."
+    vertices, corners, nodes = _used(points[first], place[corners].astype(np.int64), given.nodes[first])
+    return replace(given, points=vertices, corners=corners, nodes=nodes, repairs=(*given.repairs, repair))
+
+
+def _without_flat(given: _Tetrahedra) -> _Tetrahedra:
+    points, corners = given.points, given.corners
+    volumes = np.abs(tetrahedron_volumes(points, corners))
+    sizes = np.ptp(points[corners], axis=1).max(axis=1)
+    flat = volumes <= FLAT * sizes**3
+    found = given.only(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
+    vertices, corners, nodes = _used(found.points, found.corners, found.nodes)
+    return replace(found, points=vertices, corners=corners, nodes=nodes)
+
+
+def _turned(given: _Tetrahedra) -> _Tetrahedra:
+    inverted = tetrahedron_volumes(given.points, given.corners) < 0
+    if not inverted.any():
+        return given
+    corners = given.corners.copy()
+    corners[inverted] = corners[inverted][:, [1, 0, 2, 3]]
+    which = "all" if inverted.all() else f"{inverted.sum():,} of {len(corners):,}"
+    return replace(
+        given, corners=corners, repairs=(*given.repairs, f"{which} tetrahedra were inverted and have been turned.")
+    )
+
+
+def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
+    """Each tetrahedron once."""
+    if not doubly_covered_faces(given.corners, len(given.points)):
+        return given
+    first = np.zeros(len(given.corners), dtype=bool)
+    first[np.unique(np.sort(given.corners, axis=1), axis=0, return_index=True)[1]] = True
+    found = given.only(
+        first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once, as the first of each."
+    )
+    check_overlap(found.corners, len(found.points))
+    return found
+
+
+def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:
+    """Values as integers, if there are so many and they are whole and below 2^31, whatever their type; else None."""
+    array = np.asarray(values)
+    if array.size != count or array.ndim > 2 or array.shape[:1] != (count,) or array.dtype.kind not in "biuf":
+        return None
+    numbers = array.reshape(-1).astype(np.float64)
+    if not (np.isfinite(numbers).all() and (numbers == np.round(numbers)).all()) or np.abs(numbers).max() >= 2**31:
+        return None
+    return numbers.astype(np.int64)

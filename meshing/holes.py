@@ -1,0 +1,136 @@
+"""Holes of a surface: which are closed, which are refused, and with what words."""
+
+from typing import Literal
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.caps import cap
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface import place_words, triangle_areas
+from tetlux.meshing.topology import Edges, boundary_loops
+
+Holes = Literal["small", "close", "refuse"]
+# A hole wider than this share of the diagonal is a missing part, and closing it would invent a shape.
+LARGEST_HOLE = 0.05
+# A wider one is closed all the same if its cap is smaller than this share of the diagonal's square: a slit.
+SLIT = 1e-4
+# Triangles do not join if more edges than both of these belong to one triangle only: in all, and per triangle.
+MOST_RIMS = (300, 0.25)
+# Caps that are described one by one.
+DESCRIBED = 5
+
+
+def close_holes(
+    points: FloatArray, faces: IntArray, name: str, unit: str, holes: Holes, repairs: list[str]
+) -> tuple[FloatArray, IntArray]:
+    """Cap holes, small ones or all, and say so.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    faces : (m, 3) ndarray
+    name, unit : str
+        Used in messages.
+    holes : "small", "close" or "refuse"
+        Which holes are capped: those that leave no choice (narrow ones, slits, those of three edges), all, or none.
+    repairs : list of str
+        Sentences are added to it.
+
+    Returns
+    -------
+    points, faces : ndarray
+
+    Raises
+    ------
+    InputError
+        If a hole is left open.
+    """
+    edges = Edges(faces)
+    _check_joined(edges, len(faces), name)
+    loops = boundary_loops(edges)
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    small = [_is_small(points[loop], diagonal) for loop in loops]
+    if holes == "refuse" and loops:
+        raise InputError(
+            f"{_largest(name, points, loops)}; close it in a mesh editor, or leave out surface.holes: refuse."
+        )
+    wide = [loop for loop, is_small in zip(loops, small, strict=True) if not is_small]
+    if holes == "small" and wide:
+        raise InputError(
+            f'{_largest(name, points, wide)}; cap it with surface.holes: close (in Python holes="close"), or close '
+            "it in a mesh editor."
+        )
+    new_points, new_faces, count = [points], [faces], len(points)
+    for loop in loops:
+        inner, added = cap(points, loop, count)
+        count += len(inner)
+        new_points.append(inner)
+        new_faces.append(added)
+    points = np.vstack(new_points)
+    if any(small):
+        repairs.append(f"closed {sum(small)} small {'hole' if sum(small) == 1 else 'holes'}.")
+    if wide:
+        areas = [float(triangle_areas(points, added)[1].sum()) for added in new_faces[1:]]
+        wide_areas = [area for area, is_small in zip(areas, small, strict=True) if not is_small]
+        repairs.append(_caps_sentence(wide_areas, [_middle(points, loop) for loop in wide], unit))
+    return points, np.vstack(new_faces)
+
+
+def check_closed(faces: IntArray, name: str) -> None:
+    """Refuse a surface that is still open.
+
+    Raises
+    ------
+    InputError
+    """
+    triangles = Edges(faces).triangles
+    odd = int((triangles % 2).sum())
+    if odd:
+        raise InputError(
+            f"{name}: the surface is open: {odd} edges belong to an odd number of triangles; "
+            "repair it in a mesh editor."
+        )
+
+
+def _check_joined(edges: Edges, count: int, name: str) -> None:
+    rims = int((edges.triangles == 1).sum())
+    if rims > max(MOST_RIMS[0], MOST_RIMS[1] * count):
+        raise InputError(
+            f"{name}: the surface is open: {rims:,} of {len(edges.triangles):,} edges belong to one triangle only, as "
+            "if its triangles did not join; merge its vertices by distance in a mesh editor."
+        )
+
+
+def _is_small(rim: FloatArray, diagonal: float) -> bool:
+    """Whether closing a hole leaves no choice: narrow or of three edges."""
+    if len(rim) == 3 or np.linalg.norm(np.ptp(rim, axis=0)) <= LARGEST_HOLE * diagonal:
+        return True
+    spokes = rim - rim.mean(axis=0)
+    fan = 0.5 * np.linalg.norm(np.cross(spokes, np.roll(spokes, -1, axis=0)), axis=1).sum()
+    return bool(fan <= SLIT * diagonal**2)
+
+
+def _largest(name: str, points: FloatArray, loops: list[IntArray]) -> str:
+    """The first half of a refusal: how many edges and how wide the widest hole is, and where."""
+    widths = [float(np.linalg.norm(np.ptp(points[loop], axis=0))) for loop in loops]
+    widest = int(np.argmax(widths))
+    loop = loops[widest]
+    others = "" if len(loops) == 1 else f", the largest of {len(loops)}"
+    return (
+        f"{name}: the surface is open: a hole of {len(loop)} edges, {widths[widest]:.4g} wide around "
+        f"{_middle(points, loop)}{others}"
+    )
+
+
+def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
+    """What was capped: number, area and place of each, the largest first."""
+    order = np.argsort(areas)[::-1]
+    each = [f"{areas[i]:.4g} {unit}² around {places[i]}" for i in order[:DESCRIBED]]
+    more = f" and {len(areas) - DESCRIBED} smaller ones" if len(areas) > DESCRIBED else ""
+    return f"capped {len(areas)} {'hole' if len(areas) == 1 else 'holes'}: {', '.join(each)}{more}."
+
+
+def _middle(points: FloatArray, loop: IntArray) -> str:
+    """Where a hole is."""
+    return place_words(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))

@@ -1,0 +1,50 @@
+"""Rays by VTK's static cell locator: what stands in for Embree where that has no wheel."""
+
+from typing import Any
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.proximity import cell_locator
+
+# A ray that passes a triangle by less than this still meets it. With 0, one ray in fifty that is aimed at an edge or a
+# vertex of a sphere passes between its triangles.
+TOLERANCE = 1e-10
+# Rays begin at most one extent before the middle of the triangles, and half an extent beside it: those that begin
+# farther away meet nothing, and all have passed the triangles after this length.
+NEAR = 1.5
+LENGTH = 3.0
+# Triangles in a bucket of the locator: a ray takes 30 % less time than with the usual ten.
+PER_BUCKET = 3
+
+
+class RayLocator:
+    """Triangles in VTK's static cell locator, in double precision, at about 5 to 15 µs a ray.
+
+    Parameters
+    ----------
+    corners : (f, 3, 3) ndarray
+        About the origin, with an extent of 1.
+    """
+
+    def __init__(self, corners: FloatArray) -> None:
+        triangles = np.arange(3 * len(corners)).reshape(-1, 3)
+        self._locator = cell_locator(corners.reshape(-1, 3), triangles, PER_BUCKET)
+
+    def __call__(self, starts: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The first triangle that each ray (q, 3) meets, -1 for none, and the distance."""
+        from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
+
+        faces, distances = np.full(len(starts), -1), np.full(len(starts), np.inf)
+        # What is no number must not reach VTK, which makes bucket numbers of it. Comparisons with nan are false.
+        near = np.flatnonzero((np.abs(starts) <= NEAR).all(axis=1) & np.isfinite(directions).all(axis=1))
+        ends = starts[near] + LENGTH * directions[near]
+        share: Any = reference(0.0)
+        sub: Any = reference(0)
+        face: Any = reference(0)
+        place, weights = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        meet = self._locator.IntersectWithLine
+        for ray, start, end in zip(near.tolist(), starts[near].tolist(), ends.tolist(), strict=True):
+            if meet(start, end, TOLERANCE, share, place, weights, sub, face):
+                faces[ray], distances[ray] = int(face), LENGTH * float(share)
+        return faces, distances

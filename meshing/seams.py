@@ -1,0 +1,144 @@
+"""Seams whose two sides do not share their vertices: T-junctions, as CAD programs export them, and hair cracks."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.merge import near_pairs, without_collapsed
+from tetlux.meshing.proximity import overlapping_boxes
+from tetlux.meshing.topology import Edges, compact, components
+
+# A vertex of a rim nearer to an edge of a rim than this share of the diagonal lies on it: text of six digits rounds
+# at 1e-6. A vertex is no nearer to another than this share of the rim's edges there, or they are one.
+ON_EDGE = 1e-5
+NEAR = 0.1
+# A triangle lower than this share of the diagonal, and of its longest side, only fills a seam.
+SLIVER = 1e-6
+# Vertices that are put on edges make new edges; chains of them end after a few rounds.
+ROUNDS = 4
+
+
+def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[FloatArray, IntArray]:
+    """Close the seams of an open surface: insert the vertices that already lie on its edges.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    faces : (m, 3) ndarray
+    repairs : list of str
+        A sentence is added to it.
+
+    Returns
+    -------
+    points, faces : ndarray
+        The same surface, of which no point has moved farther than ``ON_EDGE`` of the diagonal.
+    """
+    before = Edges(faces)
+    if before.closed:
+        return points, faces
+    tolerance = ON_EDGE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    stitched, inserted, joined = faces, 0, 0
+    for _ in range(ROUNDS):
+        same = _joined_rims(points, Edges(stitched), tolerance)
+        stitched = _without_slivers(points, without_collapsed(same[stitched])[0], SLIVER / ON_EDGE * tolerance)
+        stitched, added = _with_vertices_on_edges(points, stitched, tolerance)
+        merged = int((same != np.arange(len(points))).sum())
+        inserted, joined = inserted + added, joined + merged
+        if added == merged == 0:
+            break
+    # Of triangles that do not join at all some would, here and there.
+    if len(stitched) == 0 or (Edges(stitched).triangles % 2).sum() >= (before.triangles % 2).sum():
+        return points, faces
+    if joined:
+        repairs.append(f"closed hair cracks: joined {joined} {'vertex' if joined == 1 else 'vertices'} to others.")
+    if inserted:
+        repairs.append(f"stitched {inserted} {'T-junction' if inserted == 1 else 'T-junctions'}.")
+    return compact(points, stitched)
+
+
+def _joined_rims(points: FloatArray, edges: Edges, tolerance: float) -> IntArray:
+    """For every vertex the one that it is joined to, (n,): on rims, those nearer than rims have corners."""
+    same = np.arange(len(points))
+    sides = edges.sides(edges.triangles % 2 == 1)
+    start, end = edges.start[sides], edges.end[sides]
+    length = np.linalg.norm(points[end] - points[start], axis=1)
+    shortest = np.full(len(points), np.inf)
+    np.minimum.at(shortest, start, length)
+    np.minimum.at(shortest, end, length)
+    rim = np.flatnonzero(np.isfinite(shortest))
+    pairs = rim[near_pairs(points[rim], tolerance)]
+    apart = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
+    pairs = pairs[apart < NEAR * shortest[pairs].min(axis=1)]
+    if len(pairs):
+        _, first, kind = np.unique(components(len(points), pairs), return_index=True, return_inverse=True)
+        same = first[kind.reshape(-1)]
+    return same
+
+
+def _without_slivers(points: FloatArray, faces: IntArray, height: float) -> IntArray:
+    """Without the triangles of no area that have a corner in the middle of their longest side."""
+    corners = points[faces]
+    sides = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
+    longest = sides.max(axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = (area / longest <= height) & (area / longest <= SLIVER * longest)
+    return np.asarray(faces[~low])
+
+
+def _with_vertices_on_edges(points: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, int]:
+    """Triangles split at the rim vertices that lie on their open edges; how many splits that took."""
+    edges = Edges(faces)
+    sides = edges.sides(edges.triangles % 2 == 1)
+    if len(sides) == 0:
+        return faces, 0
+    rim = np.unique(np.concatenate([edges.start[sides], edges.end[sides]]))
+    side, vertex, share = _on_sides(points, edges.start[sides], edges.end[sides], rim, tolerance)
+    if len(side) == 0:
+        return faces, 0
+    on: dict[tuple[int, int], list[int]] = {}
+    for i in np.lexsort([share, side]):
+        at = sides[side[i]]
+        on.setdefault((int(edges.start[at]), int(edges.end[at])), []).append(int(vertex[i]))
+    touched = np.zeros(len(faces), dtype=bool)
+    touched[sides[side] % len(faces)] = True
+    split: list[tuple[int, int, int]] = []
+    for a, b, c in faces[touched].tolist():
+        split += _split(a, b, c, on)
+    added = len(split) - int(touched.sum())
+    return np.vstack([faces[~touched], np.array(split, dtype=np.int64)]), added
+
+
+def _split(a: int, b: int, c: int, on: dict[tuple[int, int], list[int]]) -> list[tuple[int, int, int]]:
+    """Triangles in place of one whose sides bear vertices: a fan from the corner opposite each such side."""
+    for start, end, apex in ((a, b, c), (b, c, a), (c, a, b)):
+        inner = [vertex for vertex in on.get((start, end), []) if vertex != apex]
+        if inner:
+            chain = [start, *inner, end]
+            return [piece for one, following in pairwise(chain) for piece in _split(one, following, apex, on)]
+    return [(a, b, c)]
+
+
+def _on_sides(
+    points: FloatArray, start: IntArray, end: IntArray, rim: IntArray, tolerance: float
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Which sides bear which vertices in between, and at what share of the side's length."""
+    a, b, v = points[start], points[end], points[rim]
+    low = np.vstack([np.minimum(a, b) - tolerance, v])
+    high = np.vstack([np.maximum(a, b) + tolerance, v])
+    found: list[tuple[IntArray, IntArray, FloatArray]] = []
+    for one, other in overlapping_boxes(low, high):
+        pair = np.sort(np.column_stack([one, other]), axis=1)
+        i, j = pair[(pair[:, 0] < len(a)) & (pair[:, 1] >= len(a))].T
+        j = j - len(a)
+        along, to = b[i] - a[i], v[j] - a[i]
+        length2 = np.einsum("ij,ij->i", along, along)
+        share = np.einsum("ij,ij->i", along, to) / np.where(length2 > 0, length2, 1.0)
+        off = np.linalg.norm(to - share[:, None] * along, axis=1)
+        margin = tolerance / np.sqrt(np.where(length2 > 0, length2, np.inf))
+        between = (off <= tolerance) & (share > margin) & (share < 1.0 - margin)
+        between &= (rim[j] != start[i]) & (rim[j] != end[i])
+        found.append((i[between], rim[j[between]], share[between]))
+    sides, vertices, shares = (np.concatenate(each) for each in zip(*found, strict=True))
+    return sides, vertices, shares
