@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tetlux.cases.body import CaseBody, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
-from tetlux.cases.compare import Comparison, comparison_for
+from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.document import Document, read_document
 from tetlux.cases.lighting import keys_of, light_names, light_of
 from tetlux.cases.picture_view import UPRIGHT, toward_camera
@@ -23,6 +23,7 @@ from tetlux.fem.region import Region
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note, in_region
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -81,11 +82,11 @@ class Case:
     mesh : TetMesh, optional
         Tetrahedra that are used as they are; `surface` is then their boundary.
     comparison : Comparison, optional
-        Closed forms to hold the run against.
+        Closed forms to compare the run with.
     spec : CaseSpec
         What the case file says of this run.
     swept : mapping of str to float or str
-        The values of this run of a sweep, by their dotted keys.
+        The values of this run of a sweep, by their dotted keys; empty if there is none.
     """
 
     name: str
@@ -123,12 +124,15 @@ class Case:
 
     def named(self, warning: str) -> str:
         """A warning with the name of the region that it numbers."""
-        number, colon, rest = warning.partition(":")
+        if not isinstance(warning, Note) or warning.region is None:
+            return warning
         names = {f"region {i}": region.surface.name for i, region in enumerate(self.regions, 1)}
-        return f"{names.get(number, number)}{colon}{rest}"
+        return warning.in_region(names.get(warning.region, warning.region))
 
     def _of_surfaces(self, name: str) -> tuple[str, ...]:
-        inner = [f"{region.surface.name}: {note}" for region in self.regions for note in getattr(region.surface, name)]
+        inner = [
+            in_region(note, region.surface.name) for region in self.regions for note in getattr(region.surface, name)
+        ]
         return (*getattr(self.surface, name), *inner)
 
     @property
@@ -189,8 +193,7 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values:
         if spec.compare:
             if len(media) > 1 or body.regions or not isinstance(media[0], Medium):
                 raise InputError("closed forms are those of one channel and one even medium; leave compare out.")
-            assert spec.surface is not None
-            comparison = comparison_for(spec.surface, media[0], deposits, spec.compare)
+            comparison = comparison_for(surface.shape, media[0], deposits, spec.compare)
     check_different(document, "detectors", [detector.name for detector in spec.detectors])
     sensors = []
     for i, detector in enumerate(spec.detectors):
@@ -234,7 +237,7 @@ def _lights(
     lights: list[dict[str, Light]] = [{} for _ in bodies]
     deposits = []
     for i, light_spec in enumerate(spec.lights):
-        with document.at(("lights", i), keys_of(light_spec, reader)):
+        with document.at(("lights", i), keys_of(light_spec)):
             for channel, of_channel in enumerate(bodies):
                 light = light_of(light_spec, channel, len(bodies), body.parts, reader)
                 if light is None:

@@ -163,13 +163,13 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart import DEFAULT_CASES, chart  # noqa: PLC0415
+    from tetlux.cases.chart.command import DEFAULT_CASES, chart  # noqa: PLC0415
 
     return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
 
 
 def _stress(options: argparse.Namespace) -> int:
-    from tetlux.cases.stress import stress  # noqa: PLC0415
+    from tetlux.cases.stress.command import stress  # noqa: PLC0415
 
     return stress(options.out, quick=options.quick)
 

@@ -107,14 +107,14 @@ class Document:
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
 
     @contextmanager
-    def at(self, key: Key, names: Mapping[str, Key] | None = None) -> Iterator[None]:
-        """Within this, an error is one of the value at a key, or at that of the name that its message begins with.
+    def at(self, key: Key, fields: Mapping[str, Key] | None = None) -> Iterator[None]:
+        """Within this, an error is one of the value at a key, or at that of the field that it names.
 
         Parameters
         ----------
         key : Key
-        names : mapping of str to Key, optional
-            Of what lies within, where in it that is.
+        fields : mapping of str to Key, optional
+            Where within `key` the values of fields are.
 
         Raises
         ------
@@ -124,9 +124,8 @@ class Document:
         try:
             yield
         except InputError as error:
-            text = str(error)
-            found = [within for name, within in (names or {}).items() if text.startswith((f"{name} ", f"{name}:"))]
-            raise self.error((*key, *found[0]) if found else key, text) from error
+            within = (fields or {}).get(error.field or "", ())
+            raise self.error((*key, *within), str(error)) from error
 
 
 def dotted(key: Key) -> str:

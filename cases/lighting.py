@@ -48,14 +48,12 @@ def light_names(spec: CaseSpec) -> tuple[str, ...]:
     )
 
 
-def keys_of(spec: BaseModel, reader: Reader) -> dict[str, Key]:
-    """Where in the section of a light its values stand, by their names and by the paths of files."""
+def keys_of(spec: BaseModel) -> dict[str, Key]:
+    """Where in the section of a light its values stand, by their names."""
     found: dict[str, Key] = {}
     for name, value in spec:
         if isinstance(value, BaseModel):
-            found |= {word: (name, *key) for word, key in keys_of(value, reader).items()}
-        elif name == "file":
-            found[str(reader.folder / value)] = (name,)
+            found |= {word: (name, *key) for word, key in keys_of(value).items()}
         else:
             found[name] = (name,)
     return found

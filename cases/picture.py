@@ -14,6 +14,7 @@ from tetlux.cases.picture_plain import draw_plain
 from tetlux.cases.picture_stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
 from tetlux.cases.picture_view import PANEL, UPRIGHT, Ray
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.meshing.notes import Note
 from tetlux.meshing.scratch import run_child, scratch
 
 __all__ = ["Ray", "Scene", "Shape", "draw"]
@@ -23,9 +24,10 @@ RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process
 # Seconds; 50,000 triangles take about two without a graphics card.
 TIME_LIMIT = 120.0
 # Measured on a bare Debian 12: either package alone is not enough.
-WITHOUT_PYVISTA = (
+WITHOUT_PYVISTA = Note(
+    "no-pyvista",
     "the picture was drawn without PyVista, which could not render on this machine; "
-    "on Debian, `apt-get install libgl1 libegl1` brings what it needs."
+    "on Debian, `apt-get install libgl1 libegl1` brings what it needs.",
 )
 
 
@@ -99,7 +101,7 @@ def draw(scene: Scene, path: Path) -> list[str]:
     extent = np.ptp(scene.points, axis=0)
     marks = marks_of(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
     image = _drawn_with_pyvista(stage)
-    warnings = [] if image is not None else [WITHOUT_PYVISTA]
+    warnings: list[str] = [] if image is not None else [WITHOUT_PYVISTA]
     unfinished = path.with_name(path.name + ".part")
     try:
         frame(

@@ -12,6 +12,7 @@ from tetlux.cases.schema_parts import Encoding
 from tetlux.fem.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.files import read_mesh
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.surface import Surface
@@ -67,7 +68,10 @@ class Reader:
         """An image, (rows, columns, 3)."""
         label = file, encoding
         if label not in self._pixels:
-            self._pixels[label] = read_pixels(self.folder / file, encoding)
+            try:
+                self._pixels[label] = read_pixels(self.folder / file, encoding)
+            except InputError as error:
+                raise error.about("file") from error
         return self._pixels[label]
 
 

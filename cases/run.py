@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from tetlux.cases.case import Case
-from tetlux.cases.compare import as_json, compare
-from tetlux.cases.compare_picture import draw_comparison
+from tetlux.cases.compare.differences import as_json, compare
+from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.picture import Scene, Shape, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply
@@ -20,6 +20,7 @@ from tetlux.cases.vtp import write_vtp
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files import write_mesh
+from tetlux.meshing.notes import prefixed
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
@@ -173,7 +174,7 @@ def _warnings(results: Results) -> list[str]:
     return [
         *results.case.region_warnings,
         *(
-            warning if len(whose) == len(names) else f"in {' and '.join(whose)}: {warning}"
+            warning if len(whose) == len(names) else prefixed(warning, f"in {' and '.join(whose)}: ")
             for warning, whose in told.items()
         ),
     ]

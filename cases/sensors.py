@@ -4,13 +4,11 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
-
-import numpy as np
+from typing import Any
 
 from tetlux.cases.schema_lights import DetectorSpec
 from tetlux.fem.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.exitance_field import Dark
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Solution
 from tetlux.meshing.surface import Surface
@@ -42,8 +40,7 @@ def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
         assert spec.fibre is not None
         detector = FibreDetector(spec.fibre.center, spec.fibre.radius, spec.fibre.numerical_aperture)
     # It is read once in the dark, so that what is wrong with its place is said before anything is solved.
-    dark = SimpleNamespace(surface=surface, medium=medium, exitance_on=lambda points: np.zeros(len(points)))
-    read(detector, cast(Solution, dark))
+    read(detector, Dark(surface, medium))
     return Sensor(spec.name, spec.kind, detector)
 
 

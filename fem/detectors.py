@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.charges.solution import ChargeSolution
+from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.lights.point import as_vector
 from tetlux.fem.radiance import collected_share
-from tetlux.fem.solution import Solution
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
@@ -125,7 +124,7 @@ class Reading:
     power: float | None = None
 
 
-def read(detector: Detector, solution: Solution | ChargeSolution) -> Reading:
+def read(detector: Detector, solution: ExitanceField) -> Reading:
     """Read a detector.
 
     A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
@@ -135,7 +134,7 @@ def read(detector: Detector, solution: Solution | ChargeSolution) -> Reading:
     Parameters
     ----------
     detector : PointDetector, DiscDetector or FibreDetector
-    solution : Solution or ChargeSolution
+    solution : Solution or another ExitanceField
 
     Returns
     -------
@@ -170,7 +169,7 @@ def read(detector: Detector, solution: Solution | ChargeSolution) -> Reading:
 
 
 def _on_surface(
-    solution: Solution | ChargeSolution, name: str, given: Vector, reach: float, what: str
+    solution: ExitanceField, name: str, given: Vector, reach: float, what: str
 ) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
     wanted = as_vector(given, name)

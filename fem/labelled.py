@@ -13,6 +13,7 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.validity import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface import signed_volume, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -154,8 +155,12 @@ def warnings_for_cavities(solution: Solution) -> list[str]:
     figure = f"{share:.2%}" if share >= NEGLIGIBLE else "next to none"
     whose, there = ("whose wall is a boundary", "it") if count == 1 else ("whose walls are boundaries", "them")
     return [
-        f"the mesh has {which} of {volume:.3g} {mesh.unit}³, {whose} to the outside: {figure} of the incident power "
-        f"leaves into {there} and counts as exited."
+        Note(
+            "cavities",
+            f"the mesh has {which} of {volume:.3g} {mesh.unit}³, {whose} to the outside: {figure} of the incident "
+            f"power leaves into {there} and counts as exited.",
+            value=share,
+        )
     ]
 
 

@@ -13,6 +13,7 @@ from tetlux.fem.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import RunError
+from tetlux.meshing.notes import Note
 
 # A solution whose true relative residual is above this is refused.
 REFUSED = 1e-8
@@ -59,7 +60,7 @@ class Solver:
     Attributes
     ----------
     note : str
-        A sentence for the user where the first method was not enough; else nothing.
+        A `Note` for the user where the first method was not enough; else empty.
     """
 
     def __init__(self, matrix: csr_array, methods: Sequence[Callable[[Product], Method]]) -> None:
@@ -130,9 +131,10 @@ class Solver:
             if residual <= krylov.AIM:
                 break
             if residual > REFUSED and number > 0:
-                self.note = (
+                self.note = Note(
+                    "solver-fallback",
                     f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
-                    "takes longer: coefficients are far apart, or tetrahedra flat."
+                    "takes longer: coefficients are far apart, or tetrahedra flat.",
                 )
             if number == len(self._ready):
                 self._ready.append(method(self._product))

@@ -55,15 +55,15 @@ class Medium:
         for name in ("sigma_a", "eta", "sigma_s_prime", "sigma_s", "g"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
-                raise InputError(f"{name} is {value}; give a finite number.")
+                raise InputError(f"{name} is {value}; give a finite number.", field=name)
         for name in ("sigma_a", "sigma_s_prime", "sigma_s"):
             value = getattr(self, name)
             if value is not None and value < 0:
-                raise InputError(f"{name} is {value:g}; a coefficient cannot be negative.")
+                raise InputError(f"{name} is {value:g}; a coefficient cannot be negative.", field=name)
         if not 0.1 <= self.eta <= 10:
-            raise InputError(f"eta is {self.eta:g}; give a refractive index between 0.1 and 10.")
+            raise InputError(f"eta is {self.eta:g}; give a refractive index between 0.1 and 10.", field="eta")
         if self.boundary not in ("exact", "classic"):
-            raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".')
+            raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".', field="boundary")
         self._check_scattering()
         if self.sigma_t_prime <= 0:
             raise InputError("the medium neither scatters nor absorbs; give a coefficient greater than 0.")
@@ -76,18 +76,24 @@ class Medium:
             if given:
                 raise InputError(
                     f"{given[0]} is given together with sigma_s_prime; "
-                    "give either sigma_s_prime, or sigma_s and g or a phase function."
+                    "give either sigma_s_prime, or sigma_s and g or a phase function.",
+                    field=given[0],
                 )
             return
         if self.sigma_s is None:
             raise InputError("scattering is missing; give either sigma_s_prime, or sigma_s and g or a phase function.")
         if len(given) == 1:
-            raise InputError("g is missing; sigma_s needs it (0 for isotropic scattering), or a phase function.")
+            raise InputError(
+                "g is missing; sigma_s needs it (0 for isotropic scattering), or a phase function.", field="g"
+            )
         if len(given) == 3:
-            raise InputError("g is given together with phase, which has a mean cosine of its own; give one of them.")
+            raise InputError(
+                "g is given together with phase, which has a mean cosine of its own; give one of them.", field="g"
+            )
         if not -1 < self.mean_cosine < 1:
-            name = "g" if self.phase is None else "phase has a mean cosine that"
-            raise InputError(f"{name} is {self.mean_cosine:g}; it must be greater than -1 and less than 1.")
+            field, whose = ("g", "") if self.phase is None else ("phase", " has a mean cosine that")
+            cosine = f"{self.mean_cosine:g}; it must be greater than -1 and less than 1."
+            raise InputError(f"{field}{whose} is {cosine}", field=field)
 
     @cached_property
     def mean_cosine(self) -> float:

@@ -9,20 +9,20 @@ Rendering has it so; divide by that share for a radiance that adds up to M, as f
 import numpy as np
 import numpy.typing as npt
 
+from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.fresnel import reflectance
-from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
 
-def radiance(solution: Solution, points: npt.ArrayLike, viewer: npt.ArrayLike) -> FloatArray:
+def radiance(solution: ExitanceField, points: npt.ArrayLike, viewer: npt.ArrayLike) -> FloatArray:
     """Radiance that leaves the surface towards a viewer.
 
     What of the body stands in between is not looked at, nor what the surface reflects.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Solution or another ExitanceField
     points : (n, 3) array_like
         Taken to the nearest points of the surface.
     viewer : (3,) or (n, 3) array_like

@@ -14,6 +14,7 @@ from tetlux.fem.system import System
 from tetlux.fem.validity import check_media, warnings_for_regions
 from tetlux.meshing.conformity import conformity_of
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -68,7 +69,8 @@ class Scene:
         if not given:
             return found
         mesh = solution.mesh
-        said = [*mesh.repairs, *mesh.warnings, *(conformity_of(mesh) if self.checked else ())]
+        repairs = [Note("mesh-repaired", repair) for repair in mesh.repairs]
+        said = [*repairs, *mesh.warnings, *(conformity_of(mesh) if self.checked else ())]
         return [*found, *said, *warnings_for_cavities(solution)]
 
 

@@ -70,6 +70,7 @@ class Solution:
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
+        Plain sentences, each a `tetlux.meshing.notes.Note` with a code.
     moved : float
         Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.limiter`.
     of_lights : tuple of Solution
@@ -79,7 +80,7 @@ class Solution:
     residual : float
         Largest relative residual of the linear systems on `mesh`, computed anew from their solutions.
     iterations : int
-        Most that one of them took.
+        Most iterations that one of them took; 0 if all were solved directly.
     """
 
     mesh: TetMesh

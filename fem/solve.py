@@ -27,6 +27,7 @@ from tetlux.fem.validity import warnings_for
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
+from tetlux.meshing.notes import Note
 from tetlux.meshing.refine import refine
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
@@ -391,24 +392,38 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str
     warnings += [*sources.warnings, *solution.warnings]
     if not solution.error_estimate <= tolerance:
         warnings.append(
-            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
-            f"{where}."
+            Note(
+                "tolerance-missed",
+                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
+                f"{where}.",
+                value=solution.error_estimate,
+            )
         )
     bulge = solution.surface.bulge
     if abs(bulge) > LARGEST_BULGE:
         warnings.append(
-            f"the body is taken as smooth, which changes its volume by about {bulge:+.1%}; give it more triangles, or "
-            "a crease_angle of 0 if they are meant to be flat."
+            Note(
+                "surface-bulges",
+                f"the body is taken as smooth, which changes its volume by about {bulge:+.1%}; give it more triangles, "
+                "or a crease_angle of 0 if they are meant to be flat.",
+                value=bulge,
+            )
         )
     power = solution.power
     if min(power.absorbed, power.exited) < -NEGLIGIBLE_POWER * power.incident:
         warnings.append(
-            "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
-            "tolerance, or give a finer mesh."
+            Note(
+                "power-negative",
+                "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
+                "tolerance, or give a finer mesh.",
+            )
         )
     if abs(solution.power.exited) <= ROUNDING * solution.power.incident:
         warnings.append(
-            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed."
+            Note(
+                "no-light-leaves",
+                "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",
+            )
         )
     lowest = float(solution.fluence.min())
     if lowest < -NEGLIGIBLE_DIP * float(solution.fluence.max()):
@@ -418,21 +433,34 @@ def _warnings(solution: Solution, sources: Sources, tolerance: float, where: str
             else "where tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
         )
         share = lowest / float(solution.fluence.max())
-        warnings.append(f"the fluence dips below zero, to {share:.1e} of its largest value, {cause}")
+        warnings.append(
+            Note(
+                "fluence-negative",
+                f"the fluence dips below zero, to {share:.1e} of its largest value, {cause}",
+                value=share,
+            )
+        )
     if solution.moved > NEGLIGIBLE_POWER * power.incident:
         warnings.append(
-            f"{solution.moved / power.incident:.2%} of the power was moved between nodes to keep the fluence from "
-            "going below zero, where tetrahedra are too coarse or too flat for light that fades so fast; ask for a "
-            "smaller tolerance, or give a finer mesh."
+            Note(
+                "power-moved",
+                f"{solution.moved / power.incident:.2%} of the power was moved between nodes to keep the fluence from "
+                "going below zero, where tetrahedra are too coarse or too flat for light that fades so fast; ask for a "
+                "smaller tolerance, or give a finer mesh.",
+                value=solution.moved / power.incident,
+            )
         )
     warnings += _shallow(solution)
     brightest = float(np.max(solution.transmitted_irradiance))
     if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
         shallowest = 1.0 / solution.validity.steepest if solution.validity else np.nan
         warnings.append(
-            "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
-            f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
-            "medium absorbs so much that light does not diffuse in it; do not rely on what leaves."
+            Note(
+                "exitance-negative",
+                "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
+                f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+                "medium absorbs so much that light does not diffuse in it; do not rely on what leaves.",
+            )
         )
     return list(dict.fromkeys(warnings))
 
@@ -449,8 +477,11 @@ def _shallow(solution: Solution) -> list[str]:
         worst = int(np.argmax(off / depths))
         if off[worst] > SHALLOW * depths[worst]:
             return [
-                f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} "
-                "below the mesh's facets, and what leaves above it may be off by as much; give a finer mesh, or put it "
-                "deeper."
+                Note(
+                    "source-depth-off",
+                    f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} "
+                    "below the mesh's facets, and what leaves above it may be off by as much; give a finer mesh, or "
+                    "put it deeper.",
+                )
             ]
     return []

@@ -9,6 +9,7 @@ from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface import Surface
 
 # Bodies of fewer or more mean free paths than these are a mistaken unit, not a scene.
@@ -107,14 +108,19 @@ def _of_albedo(validity: Validity) -> list[str]:
         return []
     albedo, where = validity.below.albedo[low].min(), "" if low.all() else f" below {share:.0%} of the surface"
     return [
-        f"the reduced albedo is {albedo:.3g}{where}, below the {LOW_ALBEDO} that diffusion is good for: expect "
-        "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at an "
-        "index of 1.4, and by more close to the light."
+        Note(
+            "low-albedo",
+            f"the reduced albedo is {albedo:.3g}{where}, below the {LOW_ALBEDO} that diffusion is good for: expect "
+            "reflectances too high by 3 % at 0.9 and 7 % at 0.6 where refractive indices match, by 8 % and 21 % at an "
+            "index of 1.4, and by more close to the light.",
+            value=float(albedo),
+        )
     ]
 
 
 def _of_distance(validity: Validity) -> list[str]:
-    found, middles = [], validity.middles
+    found: list[str] = []
+    middles = validity.middles
     distances, near = validity.distances(middles), validity.near_errors(middles)
     close = distances < NEAR
     if (near[close] > WORTH_SAYING).any():
@@ -124,14 +130,21 @@ def _of_distance(validity: Validity) -> list[str]:
             # A point stands for a beam half as well where scattering is isotropic, so the figure hangs on it.
             assumed = " (g = 0 assumed, as sigma_s_prime alone is given: give sigma_s and g instead)"
         found.append(
-            f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
-            f"diffusion itself is off by about {error:.0%}, whatever the mesh{assumed}."
+            Note(
+                "near-light",
+                f"within {NEAR:g} mean free paths of where light enters, {validity.mean(close):.1%} of the surface, "
+                f"diffusion itself is off by about {error:.0%}, whatever the mesh{assumed}.",
+                value=error,
+            )
         )
     dim = validity.far_errors(middles, np.arange(len(middles))) > DIM
     if validity.mean(dim) > NEGLIGIBLE_PART:
         found.append(
-            f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
-            f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}."
+            Note(
+                "strong-absorption",
+                f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
+                f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}.",
+            )
         )
     return found
 
@@ -143,23 +156,31 @@ def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
     errors = validity.thin_errors
     if mean < THIN:
         return [
-            f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: expect "
-            f"the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more."
+            Note(
+                "thin-body",
+                f"the body is {mean:.2g} mean free paths thick on average, below the {THIN:g} that diffusion needs: "
+                f"expect the exitance off by {validity.mean(errors):.0%} on average, and transmitted light by more.",
+                value=mean,
+            )
         ]
     thin = validity.thickness < THIN
     share = validity.mean(thin)
     if share <= NEGLIGIBLE_PART or validity.mean(errors * thin) < WORTH_SAYING * share:
         return []
     return [
-        f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there off "
-        f"by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more."
+        Note(
+            "thin-parts",
+            f"{share:.0%} of the surface bounds parts thinner than {THIN:g} mean free paths: expect the exitance there "
+            f"off by {validity.mean(errors * thin) / share:.0%} on average, and transmitted light by more.",
+            value=share,
+        )
     ]
 
 
 def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]) -> list[str]:
     """The same of the media of regions, the body's own first, in short."""
     outer, *inner = map(base_of, media)
-    found = []
+    found: list[str] = []
     for number, (surface, medium) in enumerate(zip(surfaces, inner, strict=True), 1):
         found += warning_for_part(f"region {number}", 4.0 * surface.volume / surface.area, medium, outer)
     return found
@@ -170,12 +191,22 @@ def warning_for_part(name: str, chord: float, medium: Medium, outer: Medium) -> 
     across = chord / medium.mean_free_path
     if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
         return [
-            f"{name}: it is {across:.2g} of its mean free paths thick and scatters much less than what is around it; "
-            "light does not diffuse through such a void, and what comes through or past it is only a guess."
+            Note(
+                "void",
+                f"it is {across:.2g} of its mean free paths thick and scatters much less than what is around it; "
+                "light does not diffuse through such a void, and what comes through or past it is only a guess.",
+                region=name,
+                value=across,
+            )
         ]
     if medium.albedo < LOW_ALBEDO:
         return [
-            f"{name}: the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for; "
-            "light that is absorbed there is only roughly right."
+            Note(
+                "low-albedo",
+                f"the reduced albedo is {medium.albedo:.3g}, below the {LOW_ALBEDO} that diffusion is good for; "
+                "light that is absorbed there is only roughly right.",
+                region=name,
+                value=medium.albedo,
+            )
         ]
     return []

@@ -39,7 +39,9 @@ class VaryingMedium:
         for name in ("sigma_a", "sigma_s_prime"):
             field = getattr(self, name)
             if field is not None and not callable(field):
-                raise InputError(f"{name} is {field!r}; give a function of points, and what is constant to the base.")
+                raise InputError(
+                    f"{name} is {field!r}; give a function of points, and what is constant to the base.", field=name
+                )
 
     def at(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Coefficients at given points.
@@ -99,12 +101,14 @@ def _values(name: str, field: Field | None, constant: float, points: FloatArray)
     try:
         values = np.asarray(field(points), dtype=np.float64)
     except InputError as error:
-        raise InputError(f"{name} is not known everywhere: {error}") from error
+        raise InputError(f"{name} is not known everywhere: {error}", field=name) from error
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} gives no numbers at points (n, 3): {error}.") from error
+        raise InputError(f"{name} gives no numbers at points (n, 3): {error}.", field=name) from error
     if values.shape != (len(points),):
         raise InputError(
-            f"{name} gives an array of shape {values.shape} for {len(points)} points; it must give one number for each."
+            f"{name} gives an array of shape {values.shape} for {len(points)} points; it must give one number "
+            "for each.",
+            field=name,
         )
     _refuse(name, values, ~np.isfinite(values), "a coefficient must be a finite number", points)
     return values
@@ -113,4 +117,4 @@ def _values(name: str, field: Field | None, constant: float, points: FloatArray)
 def _refuse(name: str, values: FloatArray, bad: BoolArray, reason: str, points: FloatArray) -> None:
     if bad.any():
         first = int(np.argmax(bad))
-        raise InputError(f"{name} is {values[first]:g} at {as_text(points[first])}; {reason}.")
+        raise InputError(f"{name} is {values[first]:g} at {as_text(points[first])}; {reason}.", field=name)

@@ -7,6 +7,7 @@ from scipy.sparse.csgraph import connected_components
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.blocks import grouped
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.tetmesh import FACES, TetMesh
 
 # How far outside the middle of a facet another tetrahedron is looked for, as a share of the facet's size; and of the
@@ -85,12 +86,14 @@ def check_facets(mesh: TetMesh) -> tuple[str, ...]:
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:
         parts = _parts(mesh)
-        return (
-            () if parts == 1 else (f"the mesh is {parts} parts without a common node; no light passes between them.",)
-        )
+        if parts == 1:
+            return ()
+        sentence = f"the mesh is {parts} parts without a common node; no light passes between them."
+        return (Note("several-bodies", sentence, value=parts),)
     figure = f"{area:.3g} {mesh.unit}²"
     if area <= MOST_INSIDE * mesh.area:
-        return (f"{figure} of the mesh's boundary face each other inside it; no light passes there.",)
+        sentence = f"{figure} of the mesh's boundary face each other inside it; no light passes there."
+        return (Note("facets-covered", sentence, value=area),)
     if mesh.boundary_areas[inside].sum() > 0.5 * area:
         raise InputError(
             f"tetrahedra overlap: {figure} of the boundary lie inside other tetrahedra; give each part of the volume "

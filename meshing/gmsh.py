@@ -13,6 +13,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.gmsh_numbers import BinaryNumbers, TextNumbers
+from tetlux.meshing.notes import Note
 from tetlux.meshing.raw import RawMesh
 
 Numbers = TextNumbers | BinaryNumbers
@@ -72,7 +73,8 @@ def read_gmsh(path: Path) -> RawMesh:
     several = sum(len(found) > 1 for (dimension, _), found in groups.items() if dimension == 3)
     notes: tuple[str, ...] = ()
     if several:
-        notes = (f"{several} volumes are in several physical groups; the first of each is its label.",)
+        sentence = f"{several} volumes are in several physical groups; the first of each is its label."
+        notes = (Note("labels-overlap", sentence, value=several),)
     solid = [i for i, block in enumerate(elements) if block.kind == "tetra"]
     grouped = any(physical[i].any() for i in solid)
     arrays = {PHYSICAL: physical} if grouped else {ENTITY: [block.entity for block in elements]}

@@ -9,6 +9,7 @@ from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.given import whole_numbers
 from tetlux.meshing.gmsh import ENTITY, PHYSICAL
+from tetlux.meshing.notes import Note
 from tetlux.meshing.raw import RawMesh
 
 REGION = "region"
@@ -77,8 +78,8 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
         return Labels(values, _names(raw, name, values))
     candidates = _candidates(raw)
     odd = " and ".join(f'"{each}"' for each in raw.arrays if each.lower() in ORDER and each not in candidates)
-    not_whole = (f"its array {odd} holds no whole numbers, one for each tetrahedron, and is not taken for labels.",)
-    notes = not_whole if odd else ()
+    not_whole = f"its array {odd} holds no whole numbers, one for each tetrahedron, and is not taken for labels."
+    notes = (Note("labels-not-whole", not_whole),) if odd else ()
     likely = sorted((each for each in candidates if each.lower() in ORDER), key=lambda each: ORDER[each.lower()])
     if not likely and raw.sets:
         return _labels_of_sets(raw)
@@ -86,24 +87,27 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
     if chosen is None:
         several = " and ".join(f'"{each}"' for each in candidates)
         note = f"its arrays {several} may be labels; choose one of them, or all tetrahedra are of label 0."
-        return Labels(notes=(*notes, note) if several else notes)
+        return Labels(notes=(*notes, Note("labels-unclear", note)) if several else notes)
     values = candidates[chosen]
     if chosen == ENTITY and len(np.unique(values)) == 1:
-        return Labels(notes=("it has no physical groups of volumes; all tetrahedra are of label 0.",))
+        return Labels(
+            notes=(Note("labels-none", "it has no physical groups of volumes; all tetrahedra are of label 0."),)
+        )
     return Labels(values, _names(raw, chosen, values), (*notes, *_notes(chosen, values, list(candidates))))
 
 
 def _notes(chosen: str, values: IntArray, candidates: list[str]) -> tuple[str, ...]:
     """What to say of a choice."""
     if chosen == ENTITY:
-        return ("it has no physical groups of volumes; labels are the numbers of its volumes.",)
+        return (Note("labels-chosen", "it has no physical groups of volumes; labels are the numbers of its volumes."),)
     if chosen == PHYSICAL:
         none = int((values == 0).sum())
-        return (f"{none:,} tetrahedra are in no physical group; their label is 0.",) if none else ()
+        sentence = f"{none:,} tetrahedra are in no physical group; their label is 0."
+        return (Note("labels-missing", sentence, value=none),) if none else ()
     others = " and ".join(f'"{each}"' for each in candidates if each != chosen)
     if others:
-        return (f'labels are the array "{chosen}"; {others} may be labels too.',)
-    return () if chosen.lower() in ORDER else (f'labels are the array "{chosen}".',)
+        return (Note("labels-chosen", f'labels are the array "{chosen}"; {others} may be labels too.'),)
+    return () if chosen.lower() in ORDER else (Note("labels-chosen", f'labels are the array "{chosen}".'),)
 
 
 def _candidates(raw: RawMesh) -> dict[str, IntArray]:
@@ -142,9 +146,11 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
     names = {number: name for name, number in numbers.items() if number in present}
     notes = []
     if sum(int(inside.sum()) for inside in solid.values()) > int((values > 0).sum()):
-        notes.append("some tetrahedra are in several sets; the smallest of them is their label.")
+        text = "some tetrahedra are in several sets; the smallest of them is their label."
+        notes.append(Note("labels-overlap", text))
     if 0 in present:
-        notes.append(f"{(values == 0).sum():,} tetrahedra are in no set; their label is 0.")
+        none = int((values == 0).sum())
+        notes.append(Note("labels-missing", f"{none:,} tetrahedra are in no set; their label is 0.", value=none))
     return Labels(values, names, tuple(notes))
 
 

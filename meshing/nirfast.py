@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.paths import is_file
 from tetlux.meshing.raw import RawMesh
 
@@ -86,5 +87,6 @@ def _regions(values: FloatArray, cells: IntArray, nodes: int) -> tuple[FloatArra
     low, high = corners[:, 1], corners[:, 2]
     more = (corners == high[:, None]).sum(axis=1) > (corners == low[:, None]).sum(axis=1)
     mixed = int((corners[:, 0] != corners[:, 3]).sum())
-    note = f"{mixed:,} tetrahedra have nodes of several regions; each is in that of most of its corners."
+    sentence = f"{mixed:,} tetrahedra have nodes of several regions; each is in that of most of its corners."
+    note = Note("labels-mixed", sentence, value=mixed)
     return np.where(more, high, low), (note,) if mixed else ()

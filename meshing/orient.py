@@ -4,6 +4,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.proximity import winding_number
 from tetlux.meshing.surface import signed_volume
 from tetlux.meshing.topology import Edges, bodies, components
@@ -59,14 +60,16 @@ def face_outward(
     inner = _inner_bodies(points, parts, inward, name)
     if inner:
         which = f"body {inner[0]} of {count} lies" if len(inner) == 1 else f"{len(inner)} bodies of {count} lie"
-        warnings.append(f"{which} inside another and {'changes' if len(inner) == 1 else 'change'} nothing.")
+        sentence = f"{which} inside another and {'changes' if len(inner) == 1 else 'change'} nothing."
+        warnings.append(Note("nested-bodies", sentence, value=len(inner)))
     several = int(inward.sum())
     if several:
         surfaces = "an inside-out surface" if several == 1 else f"{several} inside-out surfaces"
         repairs.append(f"turned {surfaces} outward.")
     outer = count - len(inner)
     if outer > 1:
-        warnings.append(f"the surface consists of {outer} bodies; light does not pass between those that are apart.")
+        sentence = f"the surface consists of {outer} bodies; light does not pass between those that are apart."
+        warnings.append(Note("several-bodies", sentence, value=outer))
     return np.where(inward[body][:, None], faces[:, ::-1], faces), bool(inner)
 
 

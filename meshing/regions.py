@@ -391,4 +391,4 @@ def _apart_from(surface: Surface, others: tuple[Surface, ...]) -> Surface:
         shared[whole[_on(surface.points[surface.faces[whole]].mean(axis=1), other, near)]] = True
     if not shared.any() or shared.all():
         return surface
-    return replace(surface, faces=surface.faces[~shared])
+    return replace(surface, faces=surface.faces[~shared], shape=None)

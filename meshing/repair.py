@@ -10,6 +10,7 @@ from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.holes import Holes, check_closed, close_holes
 from tetlux.meshing.merge import MERGE_TOLERANCE, merge_vertices, single_faces, without_pairs
+from tetlux.meshing.notes import Note
 from tetlux.meshing.orient import face_outward, wind_consistently
 from tetlux.meshing.pinches import mend_parts
 from tetlux.meshing.resolution import FLAT
@@ -61,6 +62,7 @@ def surface_from_arrays(
 
     Examples
     --------
+    >>> from tetlux.meshing import box
     >>> cube = box((1.0, 1.0, 1.0))
     >>> surface_from_arrays(cube.points, cube.faces[2:], holes="close").volume
     1.0
@@ -86,8 +88,12 @@ def surface_from_arrays(
     crowded = int((Edges(faces).triangles > 2).sum())
     if crowded:
         warnings.append(
-            f"{crowded} {'edge is' if crowded == 1 else 'edges are'} shared by more than two triangles: parts of the "
-            "body touch there, and no light passes where they share an edge only."
+            Note(
+                "edges-shared",
+                f"{crowded} {'edge is' if crowded == 1 else 'edges are'} shared by more than two triangles: parts of "
+                "the body touch there, and no light passes where they share an edge only.",
+                value=crowded,
+            )
         )
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     if 2.0 * signed_volume(points, faces) <= FLAT * diagonal * float(triangle_areas(points, faces)[1].sum()):
@@ -95,8 +101,12 @@ def surface_from_arrays(
     crossing = _check_crossings(points, faces, name, warnings)
     if rounding > COARSE:
         warnings.append(
-            f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its size; "
-            "move it to the origin where it was made, and write it again."
+            Note(
+                "far-from-origin",
+                f"the surface lies so far from the origin that its coordinates are rounded to {rounding:.1%} of its "
+                "size; move it to the origin where it was made, and write it again.",
+                value=rounding,
+            )
         )
     # Walls between bodies that touch count on both sides.
     overlaps = nested or crossing or crowded > 0
@@ -131,8 +141,11 @@ def _check_crossings(points: FloatArray, faces: IntArray, name: str, warnings: l
     crossing = count_self_intersections(points, faces)
     if crossing is None:
         warnings.append(
-            "whether the surface crosses itself was not looked at, since too many of its triangles lie side by side, "
-            "like the needles of a fan; evenly shaped triangles are quicker and more accurate."
+            Note(
+                "crossing-unchecked",
+                "whether the surface crosses itself was not looked at, since too many of its triangles lie side by "
+                "side, like the needles of a fan; evenly shaped triangles are quicker and more accurate.",
+            )
         )
     elif crossing > max(TANGLE[0], TANGLE[1] * len(faces)):
         raise InputError(
@@ -140,7 +153,13 @@ def _check_crossings(points: FloatArray, faces: IntArray, name: str, warnings: l
             "body; repair it in a mesh editor."
         )
     elif crossing:
-        warnings.append(f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.")
+        warnings.append(
+            Note(
+                "crossing",
+                f"the surface crosses itself at {crossing} triangles; the union of what it encloses is taken.",
+                value=crossing,
+            )
+        )
     return bool(crossing)
 
 

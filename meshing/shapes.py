@@ -1,12 +1,14 @@
 """Built-in shapes: sphere, box, slab, cylinder, torus."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
-from tetlux.meshing.arrays import IntArray, Vector
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair import LONGEST, surface_from_arrays
+from tetlux.meshing.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 from tetlux.meshing.surface import Surface
 
 
@@ -34,7 +36,7 @@ def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return surface_from_arrays(mesh.vertices + np.asarray(center), mesh.faces, unit=unit, name="sphere")
+    return _surface_of(Sphere(radius, _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
 
 
 def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> Surface:
@@ -57,7 +59,7 @@ def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> 
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.box(extents=size)
-    return surface_from_arrays(mesh.vertices + np.asarray(center), mesh.faces, unit=unit, name="box")
+    return _surface_of(Box(_vector(size), _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
 
 
 def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
@@ -70,7 +72,7 @@ def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
     """
     _positive(width=width, depth=depth)
     plate = box((width, width, depth), center=(0.0, 0.0, -0.5 * depth), unit=unit)
-    return Surface(plate.points, plate.faces, unit, "slab")
+    return replace(plate, name="slab", shape=Slab(width, depth))
 
 
 def cylinder(
@@ -102,7 +104,8 @@ def cylinder(
     last = rows * segments
     faces.append(np.column_stack([following, here, np.full(segments, bottom)]))
     faces.append(np.column_stack([here + last, following + last, np.full(segments, top)]))
-    return surface_from_arrays(points + np.asarray(center), np.vstack(faces), unit=unit, name="cylinder")
+    shape = Cylinder(radius, height, _vector(center))
+    return _surface_of(shape, points + np.asarray(center), np.vstack(faces), unit)
 
 
 def torus(
@@ -140,11 +143,23 @@ def torus(
         [(distance * np.cos(uu)).ravel(), (distance * np.sin(uu)).ravel(), (minor * np.sin(vv)).ravel()]
     )
     faces = _grid_faces(rows, segments, closed_rows=True)
-    return surface_from_arrays(points + np.asarray(center), faces, unit=unit, name="torus")
+    return _surface_of(Torus(major, minor, _vector(center)), points + np.asarray(center), faces, unit)
+
+
+def _surface_of(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
+    """Check the triangles that stand for a shape, and keep the shape with them."""
+    name = type(shape).__name__.lower()
+    return replace(surface_from_arrays(points, faces, unit=unit, name=name), shape=shape)
+
+
+def _vector(values: Vector) -> Vector:
+    """Three floats, whatever numbers were given."""
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 def _grid_faces(rows: int, columns: int, *, closed_rows: bool) -> IntArray:
-    """Two triangles a cell of a grid whose columns close on themselves, and whose rows may."""
+    """Split each cell of a grid into two triangles; its columns are periodic, its rows only if `closed_rows`."""
     i, j = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
     up = (i + 1) % rows if closed_rows else i + 1
     right = (j + 1) % columns

@@ -10,6 +10,7 @@ from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.rays import RayCaster
+from tetlux.meshing.solids import Shape, lies_on
 
 # Triangles beyond which a surface is taken to be fine enough.
 MOST_BULGING = 20_000
@@ -70,6 +71,9 @@ class Surface:
     crease_angle : float
         Triangles that bend by less than this at their common edge, in degrees, are parts of one smooth surface,
         and `on_curve` is where it is; 0 means the triangles themselves.
+    shape : Sphere, Box, Slab, Cylinder or Torus, optional
+        What the triangles stand for, if they were made from a built-in shape. It is kept by whatever copies the
+        surface (``replace``) and dropped where a vertex does not lie on it.
     """
 
     points: FloatArray
@@ -80,6 +84,12 @@ class Surface:
     warnings: tuple[str, ...] = field(default=())
     overlaps: bool = False
     crease_angle: float = 30.0
+    shape: Shape | None = None
+
+    def __post_init__(self) -> None:
+        # A copy with moved vertices must not be taken for the shape that it was.
+        if self.shape is not None and not lies_on(self.points, self.shape):
+            object.__setattr__(self, "shape", None)
 
     @cached_property
     def normals(self) -> FloatArray:

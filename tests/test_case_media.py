@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.conftest import block
 from tetlux.cases.case import Case, load_cases
-from tetlux.cases.chart_scene import scene_of
+from tetlux.cases.chart.benchmark import benchmark_of
 from tetlux.cases.cli import main
 from tetlux.fem import Medium, PencilBeam, PointSource
 from tetlux.fem.materials import material
@@ -255,7 +255,7 @@ def test_a_wrong_medium_gets_one_sentence(
 def test_a_chart_is_of_simple_cases_only(load: Load) -> None:
     for case in (load("{material: marble}"), load(more=ball())):
         with pytest.raises(RunError, match="a chart is of one channel and one even medium"):
-            scene_of(case, quick=True)
+            benchmark_of(case, quick=True)
 
 
 def test_repairs_of_a_region_bear_its_name(load: Load, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

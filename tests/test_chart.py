@@ -16,16 +16,20 @@ from PIL import Image
 
 from tests.conftest import TISSUE
 from tetlux import cases, fem, meshing
-from tetlux.cases import chart as chart_module
-from tetlux.cases import chart_methods, chart_peers, chart_runs, chart_scene
 from tetlux.cases.case import load_cases
-from tetlux.cases.chart_measure import fitted_exponent, pareto_front, relative_error, surface_samples
-from tetlux.cases.chart_methods import FINITE_ELEMENTS, OURS, Method, Outcome
-from tetlux.cases.chart_models import MODELS, MONTE_CARLO
-from tetlux.cases.chart_peers import PEERS, Peer, answer
-from tetlux.cases.chart_picture import LOOKS
-from tetlux.cases.chart_runs import Run, exponents, runs_on
-from tetlux.cases.chart_scene import Reference, Samples, Scene, scene_of
+from tetlux.cases.chart import benchmark as chart_benchmark
+from tetlux.cases.chart import command as chart_module
+from tetlux.cases.chart import files, finite_elements, reference
+from tetlux.cases.chart.benchmark import Benchmark, benchmark_of
+from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, OURS
+from tetlux.cases.chart.methods import Method, Outcome
+from tetlux.cases.chart.models import MODELS, MONTE_CARLO
+from tetlux.cases.chart.peers import PEERS, Peer, run_peer
+from tetlux.cases.chart.picture import LOOKS
+from tetlux.cases.chart.reference import Reference
+from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure_methods
+from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
+from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
 from tetlux.cases.cli import main
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
@@ -37,14 +41,16 @@ BY_NAME = {method.name: method for method in (*MODELS, *FINITE_ELEMENTS, MONTE_C
 
 
 @pytest.fixture(scope="module")
-def ball_scene() -> Scene:
-    return scene_of(load_cases(find_case_file("sphere"))[0], quick=True)
+def ball_benchmark() -> Benchmark:
+    return benchmark_of(load_cases(find_case_file("sphere"))[0], quick=True)
 
 
-def few(scene: Scene, count: int = 50) -> Scene:
-    """A scene with a few samples, for methods whose values do not matter."""
-    samples = Samples(*(np.asarray(getattr(scene.samples, name))[:count] for name in ("points", "normals", "weights")))
-    return replace(scene, samples=samples, reference=replace(scene.reference, exitance=np.ones(count)))
+def few(benchmark: Benchmark, count: int = 50) -> Benchmark:
+    """A benchmark with a few samples, for methods whose values do not matter."""
+    samples = Samples(
+        *(np.asarray(getattr(benchmark.samples, name))[:count] for name in ("points", "normals", "weights"))
+    )
+    return replace(benchmark, samples=samples, reference=replace(benchmark.reference, exitance=np.ones(count)))
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -107,27 +113,27 @@ def test_exponents_are_fitted_to_three_runs_or_more() -> None:
     assert fitted_exponent(x, [1.0, 0.0, 2.0]) is None
 
 
-# Scenes
+# Benchmarks
 
 
-def test_the_sphere_is_measured_on_the_true_sphere(ball_scene: Scene) -> None:
+def test_the_sphere_is_measured_on_the_true_sphere(ball_benchmark: Benchmark) -> None:
     """Power that leaves, by the samples and by the closed form."""
-    points, weights = ball_scene.samples.points, ball_scene.samples.weights
+    points, weights = ball_benchmark.samples.points, ball_benchmark.samples.weights
     assert np.allclose(np.linalg.norm(points, axis=1), 10.0, rtol=1e-12)
     # The triangles' own area is 0.12 % less.
     assert weights.sum() == pytest.approx(400.0 * math.pi, rel=1e-6)
-    ((source, power),) = ball_scene.sources
+    ((source, power),) = ball_benchmark.sources
     total = power * sphere.point_total(TISSUE, radius=10.0, source_radius=float(np.linalg.norm(source)))
-    assert weights @ ball_scene.reference.exitance == pytest.approx(total, rel=1e-4)
-    assert ball_scene.reference.kind == "closed form"
+    assert weights @ ball_benchmark.reference.exitance == pytest.approx(total, rel=1e-4)
+    assert ball_benchmark.reference.kind == "closed form"
 
 
 def test_the_slab_is_measured_on_both_faces() -> None:
-    scene = scene_of(load_cases(find_case_file("slab"))[0], quick=True)
-    ((source, power),) = scene.sources
-    emitted = scene.samples.weights * scene.reference.exitance
-    front = scene.samples.normals[:, 2] > 0
-    assert np.allclose(scene.samples.points[:, 2], np.where(front, 0.0, -10.0), atol=1e-9)
+    benchmark = benchmark_of(load_cases(find_case_file("slab"))[0], quick=True)
+    ((source, power),) = benchmark.sources
+    emitted = benchmark.samples.weights * benchmark.reference.exitance
+    front = benchmark.samples.normals[:, 2] > 0
+    assert np.allclose(benchmark.samples.points[:, 2], np.where(front, 0.0, -10.0), atol=1e-9)
     depth = -float(source[2])
     sides: list[tuple[np.ndarray, slab.Face]] = [(front, "front"), (~front, "back")]
     for side, face in sides:
@@ -137,26 +143,28 @@ def test_the_slab_is_measured_on_both_faces() -> None:
 
 
 def test_without_a_closed_form_the_reference_is_a_finer_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chart_scene, "QUICK_TOLERANCES", (0.1,))
+    monkeypatch.setattr(reference, "QUICK_TOLERANCES", (0.1,))
     (tmp_path / "block.yaml").write_text(
         "surface: {box: {size: [10, 10, 10]}}\n"
         "medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}\n"
         "lights:\n  - diffuse: {irradiance: 1.0}\n"
     )
-    scene = scene_of(load_cases(tmp_path / "block.yaml")[0], quick=True)
-    assert scene.reference.kind == "finer run"
-    assert scene.reference.told.startswith("tetlux itself on ")
-    assert 0 < scene.reference.error <= 0.1
-    assert scene.samples.weights.sum() == pytest.approx(600.0, rel=1e-12)
-    # Diffuse light is deposited in no point: what needs one does not do this scene.
-    fitting = {name for name, method in BY_NAME.items() if method.fits(scene)}
+    benchmark = benchmark_of(load_cases(tmp_path / "block.yaml")[0], quick=True)
+    assert benchmark.reference.kind == "finer run"
+    assert benchmark.reference.description.startswith("tetlux itself on ")
+    assert 0 < benchmark.reference.error <= 0.1
+    assert benchmark.samples.weights.sum() == pytest.approx(600.0, rel=1e-12)
+    # Diffuse light is deposited in no point: what needs one does not do this benchmark.
+    fitting = {name for name, method in BY_NAME.items() if method.fits(benchmark)}
     assert fitting == {"P1, uniform", "P1, adaptive", OURS}
-    assert not any(method.fits(scene) for peer in PEERS for method in peer.methods)
+    assert not any(method.fits(benchmark) for peer in PEERS for method in peer.methods)
 
 
-def test_tolerances_below_the_reference_are_left_out(ball_scene: Scene) -> None:
-    rough = replace(ball_scene, reference=Reference("finer run", "", ball_scene.reference.exitance, error=0.004))
-    assert BY_NAME[OURS].ladder_for(ball_scene) == BY_NAME[OURS].ladder
+def test_tolerances_below_the_reference_are_left_out(ball_benchmark: Benchmark) -> None:
+    rough = replace(
+        ball_benchmark, reference=Reference("finer run", "", ball_benchmark.reference.exitance, error=0.004)
+    )
+    assert BY_NAME[OURS].ladder_for(ball_benchmark) == BY_NAME[OURS].ladder
     assert BY_NAME[OURS].ladder_for(rough) == (0.05, 0.02)
     assert BY_NAME["P1, uniform"].ladder_for(rough) == BY_NAME["P1, uniform"].ladder
 
@@ -164,16 +172,16 @@ def test_tolerances_below_the_reference_are_left_out(ball_scene: Scene) -> None:
 # Methods
 
 
-def test_closed_forms_of_the_half_space_on_the_sphere(ball_scene: Scene) -> None:
+def test_closed_forms_of_the_half_space_on_the_sphere(ball_benchmark: Benchmark) -> None:
     """Both differ from the sphere's own closed form by what the curvature does, and the dipole by its boundary."""
-    errors = {m.name: ball_scene.error_of(m.run(ball_scene, 0.0).exitance) for m in MODELS}
+    errors = {m.name: ball_benchmark.error_of(m.run(ball_benchmark, 0.0).exitance) for m in MODELS}
     assert errors["dipole alone"] == pytest.approx(0.402, abs=0.01)
     assert errors["half-space alone"] == pytest.approx(0.113, abs=0.005)
 
 
-def test_tetlux_meets_its_tolerance_on_the_sphere(ball_scene: Scene) -> None:
-    outcome = BY_NAME[OURS].run(ball_scene, 0.02)
-    assert 0.001 < ball_scene.error_of(outcome.exitance) < 0.02
+def test_tetlux_meets_its_tolerance_on_the_sphere(ball_benchmark: Benchmark) -> None:
+    outcome = BY_NAME[OURS].run(ball_benchmark, 0.02)
+    assert 0.001 < ball_benchmark.error_of(outcome.exitance) < 0.02
     assert outcome.estimate is not None
     assert outcome.estimate <= 0.02
     assert outcome.unknowns is not None
@@ -181,35 +189,35 @@ def test_tetlux_meets_its_tolerance_on_the_sphere(ball_scene: Scene) -> None:
     assert 300 < outcome.unknowns < outcome.tetrahedra
 
 
-def test_monte_carlo_sees_the_same_power(ball_scene: Scene) -> None:
+def test_monte_carlo_sees_the_same_power(ball_benchmark: Benchmark) -> None:
     """Transfer and diffusion differ near the source by a third, in all that leaves by little."""
-    outcome = MONTE_CARLO.run(ball_scene, 50_000)
-    assert 0.3 < ball_scene.error_of(outcome.exitance) < 0.45
-    weights = ball_scene.samples.weights
+    outcome = MONTE_CARLO.run(ball_benchmark, 50_000)
+    assert 0.3 < ball_benchmark.error_of(outcome.exitance) < 0.45
+    weights = ball_benchmark.samples.weights
     # Two runs of 50,000 and 1,000,000: 1.033.
-    assert weights @ outcome.exitance == pytest.approx(weights @ ball_scene.reference.exitance, rel=0.06)
+    assert weights @ outcome.exitance == pytest.approx(weights @ ball_benchmark.reference.exitance, rel=0.06)
 
 
 def fake(name: str, seconds: list[float], off: list[float], *, comparable: bool = True) -> Method:
     """A method that takes so long and errs by so much."""
 
-    def run(scene: Scene, value: float) -> Outcome:
+    def run(benchmark: Benchmark, value: float) -> Outcome:
         index = int(value)
         if math.isnan(off[index]):
             raise RunError("the mesher failed.")
-        return Outcome((1.0 + off[index]) * scene.reference.exitance, seconds[index], 10 * (index + 1), 40)
+        return Outcome((1.0 + off[index]) * benchmark.reference.exitance, seconds[index], 10 * (index + 1), 40)
 
     return Method(name, "step", tuple(map(float, range(len(seconds)))), run, comparable=comparable, quick=1)
 
 
-def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_scene: Scene) -> None:
+def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_benchmark: Benchmark) -> None:
     methods = [
-        fake("slow", [1.0, 1.1 * chart_runs.LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
+        fake("slow", [1.0, 1.1 * LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
         fake("broken", [1.0, 2.0, 3.0], [0.4, math.nan, 0.2]),
         fake("other model", [1e-3], [0.01], comparable=False),
     ]
     lines: list[str] = []
-    runs = runs_on(few(ball_scene), methods, quick=False, report=lines.append)
+    runs = measure_methods(few(ball_benchmark), methods, quick=False, report=lines.append)
     assert [(run.method, run.parameter, run.on_front) for run in runs] == [
         ("slow", "step=0", False),
         ("slow", "step=1", True),
@@ -219,7 +227,7 @@ def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_scene: Scene) ->
     ]
     assert [run.error for run in runs] == pytest.approx([0.5, 0.1, 0.4, 0.2, 0.01])
     assert "  broken step=1: failed: the mesher failed." in lines
-    assert [run.method for run in runs_on(few(ball_scene), methods, quick=True, report=lines.append)] == [
+    assert [run.method for run in measure_methods(few(ball_benchmark), methods, quick=True, report=lines.append)] == [
         "slow",
         "broken",
         "other model",
@@ -227,8 +235,8 @@ def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_scene: Scene) ->
 
 
 def test_exponents_by_method() -> None:
-    def row(n: int) -> Run:
-        return Run("c", "m", "", 1e-3 * n**1.2, n, 5 * n, 2.0 * n**-0.5, None, False, "closed form")
+    def row(n: int) -> Measurement:
+        return Measurement("c", "m", "", 1e-3 * n**1.2, n, 5 * n, 2.0 * n**-0.5, None, False, "closed form")
 
     plain = replace(row(1), method="dipole alone", unknowns=None)
     found = exponents([row(100), row(1000), row(5000), plain])
@@ -262,9 +270,9 @@ def test_peers_are_never_imported_here() -> None:
 
 def test_a_peer_that_fails_is_an_error_of_one_line() -> None:
     with pytest.raises(RunError, match="can't open file"):
-        answer("_peer_of_nobody.py", {"points": np.zeros(3)})
+        run_peer("_peer_of_nobody.py", {"points": np.zeros(3)})
     with pytest.raises(RunError, match=r"KeyError|No module named") as failure:
-        answer("_peer_redbird.py", {"points": np.zeros(3)})
+        run_peer("_peer_redbird.py", {"points": np.zeros(3)})
     assert "\n" not in str(failure.value)
 
 
@@ -273,21 +281,21 @@ def installed(package: str) -> Callable[[Callable[..., None]], Callable[..., Non
 
 
 @installed("ngsolve")
-def test_ngsolve_on_the_exact_sphere(ball_scene: Scene) -> None:
+def test_ngsolve_on_the_exact_sphere(ball_benchmark: Benchmark) -> None:
     third = next(m for peer in PEERS for m in peer.methods if m.name == "NGSolve P3")
-    outcome = third.run(ball_scene, 0.5)
+    outcome = third.run(ball_benchmark, 0.5)
     # Five runs: 0.0055 to 0.0065.
-    assert 0.002 < ball_scene.error_of(outcome.exitance) < 0.01
+    assert 0.002 < ball_benchmark.error_of(outcome.exitance) < 0.01
 
 
 @installed("redbirdpy")
-def test_redbirdpy_solves_the_same_system(ball_scene: Scene) -> None:
+def test_redbirdpy_solves_the_same_system(ball_benchmark: Benchmark) -> None:
     """Linear elements with consistent masses on one mesh are one answer, whoever finds it."""
-    case = ball_scene.case
+    case = ball_benchmark.case
     mesh = tetrahedralize(case.surface)
     ours = solve(case.surface, case.medium, case.lights, mesh=mesh, mass="consistent", subtract="nothing")
-    source, power = ball_scene.sources[0]
-    theirs = answer(
+    source, power = ball_benchmark.sources[0]
+    theirs = run_peer(
         "_peer_redbird.py",
         {
             "nodes": mesh.points,
@@ -366,7 +374,7 @@ def test_a_chart_that_cannot_be_written_leaves_the_old_one(
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(chart_module, "draw_chart", full)
+    monkeypatch.setattr(files, "draw_chart", full)
     assert main(["chart", "sphere", "--out", str(tmp_path)]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["chart.csv"]
     assert (tmp_path / "chart.csv").read_text() == "old"
@@ -380,10 +388,10 @@ def test_a_chart_that_cannot_be_written_leaves_the_old_one(
 def test_a_case_that_fails_does_not_take_the_others_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def failing(*_: object) -> Reference:
+    def failing(*_: object, **__: object) -> Reference:
         raise RunError("the mesher failed.")
 
-    monkeypatch.setattr(chart_scene, "_finer_run", failing)
+    monkeypatch.setattr(chart_benchmark, "finer_run_reference", failing)
     assert main(["chart", "torus", "sphere", "--out", str(tmp_path)]) == 1
     assert {row["case"] for row in table(tmp_path)} == {"sphere"}
     assert capsys.readouterr().err == "tetlux: torus failed: the mesher failed.\n"
@@ -403,7 +411,7 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
     [
         (
             ["ball"],
-            "ball is neither a file nor one of the cases that ship: "
+            'ball: did you mean "sphere"? it is neither a file nor one of the cases that ship: '
             "candle, hare, inclusion, laser, marble, slab, sphere, torus.",
         ),
         (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),
@@ -427,7 +435,7 @@ def test_a_wrong_request_is_one_sentence(
     assert [path.name for path in tmp_path.iterdir()] == ["sweep.yaml"]
 
 
-def test_nothing_is_remembered_from_run_to_run(ball_scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_remembered_from_run_to_run(ball_benchmark: Benchmark, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that found what an earlier one had prepared would be timed too short."""
     seen: list[tuple[set[str], object]] = []
 
@@ -435,14 +443,13 @@ def test_nothing_is_remembered_from_run_to_run(ball_scene: Scene, monkeypatch: p
         seen.append((set(vars(surface)), cache))
         raise RunError("seen")
 
-    monkeypatch.setattr(chart_methods, "tetrahedralize", stopped)
-    monkeypatch.setattr(chart_methods, "solve", stopped)
-    monkeypatch.setattr(chart_peers, "tetrahedralize", stopped)
+    monkeypatch.setattr(finite_elements, "tetrahedralize", stopped)
+    monkeypatch.setattr(finite_elements, "solve", stopped)
     redbird = next(m for peer in PEERS for m in peer.methods if m.name == "redbirdpy P1")
-    assert ball_scene.case.surface.diagonal > 0
+    assert ball_benchmark.case.surface.diagonal > 0
     for name in ("P1, uniform", "P1, adaptive", "free-space subtracted, adaptive", OURS):
         with pytest.raises(RunError, match="seen"):
-            BY_NAME[name].run(ball_scene, 0.0)
+            BY_NAME[name].run(ball_benchmark, 0.0)
     with pytest.raises(RunError, match="seen"):
-        redbird.run(ball_scene, 1.0)
+        redbird.run(ball_benchmark, 1.0)
     assert seen == [({field.name for field in fields(Surface)}, False)] * 5

@@ -3,16 +3,23 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.conftest import TISSUE
 from tetlux.cases.case import Case, load_cases
-from tetlux.cases.compare import compare, source_model
+from tetlux.cases.compare.comparison import NAMES, source_model
+from tetlux.cases.compare.differences import MEANINGS, compare
 from tetlux.cases.run import run_case
-from tetlux.fem import Medium, Solution, solve
-from tetlux.meshing import InputError, RunError
+from tetlux.cases.schema import ClosedForm
+from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
+from tetlux.fem.body import Body
+from tetlux.fem.exact import slab as exact_slab
+from tetlux.fem.exact.registry import closed_forms
+from tetlux.meshing import InputError, RunError, slab, sphere
 
 SLAB = """\
 surface: {slab: {width: 60, depth: 10}}
@@ -132,3 +139,42 @@ def test_where_no_light_arrives_there_is_nothing_to_compare(ball_solution: Solut
     with pytest.raises(RunError, match="has no light at the nodes"):
         compare(comparison, ball_solution)
     assert comparison.note == "All use the same sources, isotropic points."
+
+
+def test_names_of_closed_forms_are_those_of_the_case_file() -> None:
+    """A name that is known in one place only would be refused, or have no meaning in `compare.json`."""
+    for surface, place in ((slab(60.0, 10.0), (0.0, 0.0, -1.0)), (sphere(10.0), (0.0, 0.0, 9.0))):
+        deposit = PointSource(place).deposit_in(Body(surface, (TISSUE,)))
+        assert tuple(closed_forms(surface.shape, TISSUE, [deposit])) == NAMES[type(surface.shape)]
+    assert set(get_args(ClosedForm)) == set(MEANINGS) == {name for names in NAMES.values() for name in names}
+
+
+def test_closed_forms_of_the_registry_add_up() -> None:
+    """Two points and uniform diffuse light on a ball are the sum of each alone."""
+    ball = sphere(10.0, center=(1.0, 2.0, 3.0))
+    points: list[Light] = [PointSource((1.0, 2.0, 12.0), 2.0), PointSource((4.0, 2.0, 3.0))]
+    lights = [*points, DiffuseLight(0.5), Emission(0.1)]
+    deposits = [light.deposit_in(Body(ball, (TISSUE,))) for light in lights]
+    places = ball.points[::100]
+    each = [closed_forms(ball.shape, TISSUE, [one])["series"].exitance(places) for one in deposits]
+    together = closed_forms(ball.shape, TISSUE, deposits)["series"]
+    assert together.exitance(places) == pytest.approx(np.sum(each, axis=0), rel=1e-12)
+    assert np.ptp(each[2]) == np.ptp(each[3]) == 0
+    assert closed_forms(ball.shape, TISSUE, [CollimatedBeam((0.0, 0.0, -1.0)).deposit_in(Body(ball, (TISSUE,)))]) == {}
+    assert closed_forms(None, TISSUE, deposits) == {}
+
+
+def test_the_registry_has_both_faces_of_a_slab() -> None:
+    """Away from the rim, power that leaves a plate through each face is that of the closed form."""
+    plate = slab(60.0, 2.0)
+    deposit = PointSource((1.0, 2.0, -0.5)).deposit_in(Body(plate, (TISSUE,)))
+    form = closed_forms(plate.shape, TISSUE, [deposit])["robin"]
+    radius, weight = np.polynomial.legendre.leggauss(400)
+    rho, weight = 10.0 * (radius + 1.0), 10.0 * weight
+    sides: tuple[tuple[float, exact_slab.Face], ...] = ((0.0, "front"), (-2.0, "back"))
+    for z, face in sides:
+        places = np.column_stack([1.0 + rho, np.full(400, 2.0), np.full(400, z)])
+        total = 2.0 * np.pi * (weight * rho) @ form.exitance(places)
+        assert total == pytest.approx(exact_slab.point_total(TISSUE, thickness=2.0, depth=0.5, face=face), rel=1e-4)
+        assert form.holds_at(places[:200]).all()
+    assert not form.holds_at(np.array([[29.9, 0.0, 0.0]]))[0]

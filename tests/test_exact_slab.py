@@ -4,7 +4,7 @@ from scipy import integrate
 
 from tetlux.fem import Medium
 from tetlux.fem.exact import dipole, half_space, slab, slab_plane
-from tetlux.fem.exact.layer import Layer
+from tetlux.fem.exact.numerics.layer import Layer
 from tetlux.fem.exact.slab import Face
 from tetlux.meshing.errors import InputError
 

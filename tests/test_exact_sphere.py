@@ -4,7 +4,7 @@ import pytest
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, sphere, sphere_light
 from tetlux.fem.exact.beam import Source
-from tetlux.fem.exact.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
 from tetlux.meshing.errors import InputError
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)

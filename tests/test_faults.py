@@ -16,7 +16,8 @@ import meshio
 import pytest
 
 from tests.conftest import block
-from tetlux.cases import chart, picture, run
+from tetlux.cases import picture, run
+from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
 from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from tetlux.fem import Medium
-from tetlux.fem.exact import monte_carlo, photons
+from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate, Ledger
+from tetlux.fem.exact.transfer import photons
 from tetlux.fem.fresnel import reflectance
 from tetlux.meshing.errors import InputError
 
@@ -140,7 +141,7 @@ def test_scattering_has_the_mean_cosine_it_should(g: float) -> None:
     cosines = np.empty(20_000)
     for i in range(len(cosines)):
         cosine = photons.henyey_greenstein(rng, g)
-        way = photons.turned(start, cosine, 2.0 * math.pi * rng.random())
+        way = photons.rotate(start, cosine, 2.0 * math.pi * rng.random())
         assert math.hypot(*way) == pytest.approx(1.0, abs=1e-12)
         cosines[i] = np.dot(start, way)
     for moment, expected in ((cosines, g), (1.5 * cosines**2 - 0.5, g**2)):
@@ -149,15 +150,15 @@ def test_scattering_has_the_mean_cosine_it_should(g: float) -> None:
 
 def test_roulette_is_fair() -> None:
     rng = np.random.default_rng(12)
-    after = np.array([photons.spared(rng, 0.004) for _ in range(20_000)])
+    after = np.array([photons.roulette(rng, 0.004) for _ in range(20_000)])
     assert set(after) == {0.0, 0.04}
     assert abs(after.mean() - 0.004) < SIGMAS * after.std() / math.sqrt(len(after))
-    assert photons.spared(rng, 0.3) == 0.3
+    assert photons.roulette(rng, 0.3) == 0.3
 
 
 @pytest.mark.parametrize("pole", [1.0, -1.0])
 def test_a_turn_at_the_pole(pole: float) -> None:
-    way = photons.turned((0.0, 0.0, pole), 0.3, 1.0)
+    way = photons.rotate((0.0, 0.0, pole), 0.3, 1.0)
     assert way[2] == pytest.approx(0.3 * pole)
     assert math.hypot(*way) == pytest.approx(1.0)
 

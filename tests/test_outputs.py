@@ -152,8 +152,11 @@ def test_the_summary_repeats_the_case_as_it_ran(finished: Finished) -> None:
     }
     assert told["scene"]["lights"][1]["name"] == "point_1"
     assert told["scene"]["tolerance"] == 0.3
-    assert [(row["channel"], row["region"]) for row in told["media"]] == [(name, "body") for name in CHANNELS]
-    blue = told["media"][2]
+    channels = finished.summary["channels"]
+    assert [(each["name"], [row["name"] for row in each["media"]]) for each in channels] == [
+        (name, ["body"]) for name in CHANNELS
+    ]
+    (blue,) = channels[2]["media"]
     assert (blue["sigma_a"], blue["sigma_s_prime"], blue["eta"]) == (0.1, 1.2, 1.4)
     assert blue["albedo"] == pytest.approx(1.2 / 1.3)
     assert blue["mean_free_path"] == pytest.approx(1 / 1.3)

@@ -1,6 +1,7 @@
 """The package as it is installed."""
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -90,6 +91,26 @@ def test_dependencies_run_one_way() -> None:
         for path in (ROOT / folder).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             assert not any(f"import {name}" in text or f"from {name}" in text for name in forbidden), path
+
+
+def imports_of(*paths: Path) -> set[str]:
+    """Modules of the package that modules import."""
+    pattern = re.compile(r"^\s*(?:from|import) (tetlux[\w.]*)", re.MULTILINE)
+    return {name for path in paths for name in pattern.findall(path.read_text(encoding="utf-8"))}
+
+
+def test_rooms_that_measure_lead_nowhere_back() -> None:
+    """Comparisons know no case file, the stress map knows the chart's samples only, the solver no closed forms."""
+    compare, stress, chart = (
+        imports_of(*(ROOT / "cases" / room).rglob("*.py")) for room in ("compare", "stress", "chart")
+    )
+    assert {name for name in compare if name.startswith("tetlux.cases")} <= {
+        f"tetlux.cases.compare.{name}" for name in ("comparison", "differences", "picture")
+    }
+    assert {name for name in stress if name.startswith("tetlux.cases.chart")} == {"tetlux.cases.chart.samples"}
+    assert not any(name.startswith(("tetlux.cases.stress", "tetlux.cases.compare")) for name in chart)
+    solver = [path for path in (ROOT / "fem").rglob("*.py") if "exact" not in path.relative_to(ROOT).parts]
+    assert not any(name.startswith("tetlux.fem.exact") for name in imports_of(*solver))
 
 
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -13,19 +13,24 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import stress as stress_module
-from tetlux.cases import stress_scenes as scenes
 from tetlux.cases.cli import main
-from tetlux.cases.stress import COLUMNS, FILES, stress
-from tetlux.cases.stress_measure import CONSISTENT, DEFAULT, NOTHING, PLAIN, Figures, Method, measured
-from tetlux.cases.stress_meshes import ball_of_layers, spoiled
-from tetlux.cases.stress_panels import PANELS, Axis, Panel, Value
-from tetlux.cases.stress_rules import broken, violations
-from tetlux.cases.stress_runs import Run
-from tetlux.cases.stress_words import in_words
-from tetlux.fem import krylov, linear
+from tetlux.cases.stress import command as stress_module
+from tetlux.cases.stress import scenarios
+from tetlux.cases.stress.command import stress
+from tetlux.cases.stress.files import COLUMNS, FILES
+from tetlux.cases.stress.grid import PANELS
+from tetlux.cases.stress.measure import Diagnostics, measure
+from tetlux.cases.stress.meshes import ball_of_layers, degrade
+from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.report import as_markdown
+from tetlux.cases.stress.rules import broken_rules, violations
+from tetlux.cases.stress.trials import Trial
+from tetlux.cases.stress.variants import CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
+from tetlux.fem import direct, krylov, linear
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.notes import Note
 
-GOOD = Figures(
+GOOD = Diagnostics(
     lowest=0.1,
     overshoot=None,
     ledger=1e-15,
@@ -35,21 +40,21 @@ GOOD = Figures(
     error=0.01,
     scaling=None,
     finite=True,
-    dips=False,
+    may_be_negative=False,
     nodes=100,
     seconds=0.1,
     warnings=(),
 )
-OF_MODEL = "the reduced albedo is 0.5, below the 0.9 that diffusion is good for."
-NOT_MET = "the tolerance of 0.05 was not met: the estimated error is 0.2, on the mesh given."
+OF_MODEL = Note("low-albedo", "the reduced albedo is 0.5, below the 0.9 that diffusion is good for.")
+NOT_MET = Note("tolerance-missed", "the tolerance of 0.05 was not met: the estimated error is 0.2, on the mesh given.")
 
 
-def panel(make: Callable[..., Any], x: Value, y: Value, *methods: Method, name: str = "stub") -> Panel:
-    return Panel(name, "a stub", Axis("x", (x,)), Axis("y", (y,)), make, methods or (DEFAULT,))
+def panel(make: Callable[..., Any], x: Value, y: Value, *variants: Variant, name: str = "stub") -> Panel:
+    return Panel(name, "a stub", Axis("x", (x,)), Axis("y", (y,)), make, variants or (DEFAULT,))
 
 
-def run_of(figures: Figures, method: Method = DEFAULT) -> Run:
-    return Run(panel(max, 1.0, 2.0, method), 1.0, 2.0, method, "ran", "", figures)
+def run_of(diagnostics: Diagnostics, variant: Variant = DEFAULT) -> Trial:
+    return Trial(panel(max, 1.0, 2.0, variant), 1.0, 2.0, variant, "ran", "", diagnostics)
 
 
 def table(folder: Path) -> list[dict[str, str]]:
@@ -93,17 +98,17 @@ def test_bad_tetrahedra_and_hard_shapes_are_among_them() -> None:
     shapes = " ".join(map(str, quick["shapes"].x.values))
     for kind in ("needle", "plate", "touching", "cavity"):
         assert kind in shapes
-    methods = {method.name for panel in PANELS for method in panel.methods}
-    assert {DEFAULT.name, PLAIN.name, CONSISTENT.name, NOTHING.name} <= methods
+    variants = {variant.name for panel in PANELS for variant in panel.variants}
+    assert {DEFAULT.name, NOT_REFINED.name, CONSISTENT.name, NOTHING.name} <= variants
 
 
 def test_every_panel_makes_its_scenes() -> None:
     """The first of each; those that are refused are refused when they are solved."""
     for one in PANELS:
         x, y = one.quick().places()[0]
-        scene = one.make(x, y)
-        if scene.truth is not None:
-            samples, exitance = scene.truth
+        scenario = one.make(x, y)
+        if scenario.truth is not None:
+            samples, exitance = scenario.truth
             assert len(samples.points) == len(exitance)
             assert np.isfinite(exitance).all()
 
@@ -111,11 +116,11 @@ def test_every_panel_makes_its_scenes() -> None:
 def test_bad_tetrahedra_are_as_bad_as_asked_for_and_the_same_each_time() -> None:
     good = ball_of_layers(1.0, 2, 5)
     assert good.quality.min() > 0.3
-    mesh = spoiled(good, 1e-4)
+    mesh = degrade(good, 1e-4)
     assert mesh.quality.min() == pytest.approx(1e-4, rel=0.01)
     assert (mesh.quality < 2e-4).sum() > 20
     assert mesh.volume == pytest.approx(good.volume, rel=1e-12)
-    assert np.array_equal(mesh.points, spoiled(good, 1e-4).points)
+    assert np.array_equal(mesh.points, degrade(good, 1e-4).points)
 
 
 def test_a_core_of_layers_is_a_region_of_its_own() -> None:
@@ -129,14 +134,36 @@ def test_a_core_of_layers_is_a_region_of_its_own() -> None:
 
 
 def test_a_run_is_measured_against_the_closed_form() -> None:
-    figures = measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
-    assert figures.error is not None
+    diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert diagnostics.error is not None
     # Measured .03; twice as much absorption would be .4.
-    assert 0.001 < figures.error < 0.1
-    assert figures.overshoot is not None
-    assert figures.overshoot < 0
-    assert abs(figures.ledger) < 1e-12
-    assert 0 < figures.residual < 1e-10
+    assert 0.001 < diagnostics.error < 0.1
+    assert diagnostics.overshoot is not None
+    assert diagnostics.overshoot < 0
+    assert abs(diagnostics.ledger) < 1e-12
+    assert 0 < diagnostics.residual < 1e-10
+
+
+def test_residuals_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solver that believes in its answer and is off by a millionth is found out."""
+
+    def sloppy(product: krylov.Product) -> krylov.Method:
+        exact = direct.direct(product)
+
+        def solve_once(loads: FloatArray) -> tuple[FloatArray, int]:
+            # Loads come with a norm of 1; what is left of them to be mended is not.
+            off = np.zeros_like(loads)
+            off[:2] = 1e-6 * np.sqrt([[0.5], [0.5]]) * [[1.0], [-1.0]]
+            return exact(loads - off) if np.linalg.norm(loads) > 0.5 else (np.zeros_like(loads), 0)
+
+        return solve_once
+
+    for module in ("assembly", "system"):
+        monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", lambda matrix, *_: linear.Solver(matrix, [sloppy]))
+    monkeypatch.setattr(linear, "REFUSED", 1e-3)
+    diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert diagnostics.residual == pytest.approx(1e-6, rel=1e-3)
+    assert "residual" in broken_rules(run_of(diagnostics))
 
 
 def test_a_large_residual_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -144,9 +171,9 @@ def test_a_large_residual_is_a_violation(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(
         linear.Solver, "solve", lambda self, load: replace(solve_truly(self, load), residual=1e-6, iterations=7)
     )
-    figures = measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
-    assert (figures.residual, figures.iterations) == (1e-6, 7)
-    assert "residual" in broken(run_of(figures))
+    diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
+    assert (diagnostics.residual, diagnostics.iterations) == (1e-6, 7)
+    assert "residual" in broken_rules(run_of(diagnostics))
 
 
 def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -155,18 +182,18 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for module in ("assembly", "system"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)
-    assert 5 < measured(scenes.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
+    assert 5 < measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
 
 
-@pytest.mark.parametrize("kind", scenes.LENGTH_KINDS[:4])
+@pytest.mark.parametrize("kind", scenarios.LENGTH_KINDS[:4])
 def test_lengths_are_compared_with_scale_1(kind: str) -> None:
-    scene = scenes.by_length(1e3, kind)
-    figures = measured(scene, DEFAULT)
-    assert figures.scaling is not None
-    assert figures.scaling < 1e-8
-    assert scene.alike is not None
-    other = replace(scene, alike=replace(scene.alike, medium=scenes.turbid(0.98, free_path=0.1)))
-    assert (measured(other, DEFAULT).scaling or 0.0) > 1e-3
+    scenario = scenarios.by_length(1e3, kind)
+    diagnostics = measure(scenario, DEFAULT)
+    assert diagnostics.scaling is not None
+    assert diagnostics.scaling < 1e-8
+    assert scenario.unit_scale is not None
+    other = replace(scenario, unit_scale=replace(scenario.unit_scale, medium=scenarios.turbid(0.98, free_path=0.1)))
+    assert (measure(other, DEFAULT).scaling or 0.0) > 1e-3
 
 
 # What counts
@@ -190,10 +217,10 @@ def test_lengths_are_compared_with_scale_1(kind: str) -> None:
 def test_what_must_hold_is_named_where_it_does_not(changes: dict[str, Any], rule: str) -> None:
     bad = replace(GOOD, **changes)
     assert list(violations(run_of(bad))) == [rule]
-    # Methods that are there to be compared with may break it.
-    assert list(broken(run_of(bad, CONSISTENT))) == [rule]
+    # Variants that are there to be compared with may break it.
+    assert list(broken_rules(run_of(bad, CONSISTENT))) == [rule]
     assert violations(run_of(bad, CONSISTENT)) == {}
-    words = in_words([run_of(GOOD), run_of(bad)])
+    words = as_markdown([run_of(GOOD), run_of(bad)])
     assert f"* stub, default, at x 1, y 2: {rule}" in words
 
 
@@ -202,14 +229,14 @@ def test_what_must_hold_is_named_where_it_does_not(changes: dict[str, Any], rule
     [
         {},
         {"lowest": -1e-13},
-        {"lowest": -0.1, "dips": True},
+        {"lowest": -0.1, "may_be_negative": True},
         {"overshoot": 1e-12},
         {"error": None},
         {"error": 0.2, "warnings": (OF_MODEL, NOT_MET)},
     ],
 )
 def test_what_is_allowed_is_no_violation(changes: dict[str, Any]) -> None:
-    assert broken(run_of(replace(GOOD, **changes))) == {}
+    assert broken_rules(run_of(replace(GOOD, **changes))) == {}
 
 
 # What is written
@@ -218,8 +245,8 @@ def test_what_is_allowed_is_no_violation(changes: dict[str, Any]) -> None:
 def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "map"
     grid = [
-        panel(scenes.diffuse_by_decay_and_albedo, 1.0, 0.9, DEFAULT, CONSISTENT, name="fine"),
-        panel(scenes.by_radius_and_depth, 0.1, 0.01, name="small"),
+        panel(scenarios.diffuse_by_decay_and_albedo, 1.0, 0.9, DEFAULT, CONSISTENT, name="fine"),
+        panel(scenarios.by_radius_and_depth, 0.1, 0.01, name="small"),
     ]
     assert stress(out, panels=grid) == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
@@ -246,8 +273,8 @@ def test_violations_crashes_and_hangs_fail_the_command_and_end_nothing_else(tmp_
         panel(ctypes.string_at, 1, 8, name="segfault"),
         panel(wait, "", 1000.0, name="endless"),
         panel(divmod, 1.0, 0, name="exception"),
-        panel(scenes.diffuse_by_decay_and_albedo, 10.0, 0.5, replace(CONSISTENT, counts=True), name="negative"),
-        panel(scenes.diffuse_by_decay_and_albedo, 1.0, 0.9, name="fine"),
+        panel(scenarios.diffuse_by_decay_and_albedo, 10.0, 0.5, replace(CONSISTENT, counts=True), name="negative"),
+        panel(scenarios.diffuse_by_decay_and_albedo, 1.0, 0.9, name="fine"),
     ]
     assert stress(tmp_path, panels=grid, time_limit=10.0, report=lambda _: None) == 1
     found = {row["panel"]: row for row in table(tmp_path)}

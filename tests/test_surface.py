@@ -1,6 +1,7 @@
 """Reading, checking and mending surfaces."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from tetlux.meshing import (
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.proximity import cross_segments, overlapping_boxes
+from tetlux.meshing.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 
 
 @pytest.fixture
@@ -384,3 +386,41 @@ def test_pipes_and_devices_are_no_surfaces(tmp_path: Path) -> None:
             read_surface(tmp_path / name)
     with pytest.raises(InputError, match="does not exist"):
         read_surface(tmp_path / ("x" * 5000 + ".stl"))
+
+
+SHAPES = {
+    "sphere": (sphere(3.0, center=(1.0, 2.0, 3.0)), Sphere(3.0, (1.0, 2.0, 3.0))),
+    "box": (box((1.0, 2.0, 3.0), center=(5.0, 0.0, -5.0)), Box((1.0, 2.0, 3.0), (5.0, 0.0, -5.0))),
+    "slab": (slab(60.0, 10.0), Slab(60.0, 10.0)),
+    "cylinder": (cylinder(2.0, 5.0, center=(0.0, 0.0, 9.0)), Cylinder(2.0, 5.0, (0.0, 0.0, 9.0))),
+    "torus": (torus(3.0, 1.0, center=(0.0, 4.0, 0.0)), Torus(3.0, 1.0, (0.0, 4.0, 0.0))),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_built_in_surface_knows_its_shape(name: str) -> None:
+    surface, shape = SHAPES[name]
+    assert surface.name == name
+    assert surface.shape == shape
+    assert replace(surface, name="other", crease_angle=0.0).shape == shape
+    # Vertices that are moved, even by a millionth, are those of another body.
+    assert replace(surface, points=(1.0 + 1e-6) * surface.points).shape is None
+    assert replace(surface, points=surface.points + np.array([0.0, 0.0, 1e-6])).shape is None
+    assert surface_from_arrays(surface.points, surface.faces).shape is None
+
+
+@pytest.mark.parametrize(
+    ("shape", "inside", "outside"),
+    [
+        (Sphere(3.0), (0.0, 0.0, 1.0, 2.0), (0.0, 4.0, 3.0, 2.0)),
+        (Box((2.0, 4.0, 6.0)), (0.5, 0.0, 0.0, 0.5), (1.0 + 3.0, 2.0 + 4.0, 0.0, 5.0)),
+        (Slab(20.0, 4.0), (0.0, 0.0, -1.0, 1.0), (0.0, 0.0, 2.0, 2.0)),
+        (Cylinder(2.0, 10.0), (1.5, 0.0, 0.0, 0.5), (0.0, 5.0, 9.0, 5.0)),
+        (Torus(3.0, 1.0), (3.0, 0.0, 0.5, 0.5), (0.0, 0.0, 0.0, 2.0)),
+    ],
+)
+def test_distances_from_shapes(
+    shape: Shape, inside: tuple[float, float, float, float], outside: tuple[float, float, float, float]
+) -> None:
+    places = np.array([inside, outside])
+    assert shape.distance(places[:, :3]) == pytest.approx(places[:, 3], rel=1e-12)

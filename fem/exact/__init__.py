@@ -1,6 +1,6 @@
-"""Closed forms to hold the solver against, one module for each body.
+"""Closed forms to check the solver against, one module for each body; `registry` looks them up by shape and light.
 
-Every function takes a `Medium` and returns what unit power, or unit irradiance, gives. Exitance is
+Every function takes a `Medium` and returns the result for unit power, or unit irradiance. Exitance is
 ``M = phi/(2A)``, W/unit², unless the function says otherwise.
 """
 

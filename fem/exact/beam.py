@@ -1,4 +1,4 @@
-"""Where collimated light that has entered a medium hands its power to diffusion."""
+"""Sources of diffuse light along a collimated beam in a medium."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -33,7 +33,7 @@ class BeamSource:
 
     @property
     def volume(self) -> float:
-        """What is left of both densities as point sources after integrating df/ds by parts, 1/unit."""
+        """Density of point sources after integrating df/ds by parts; two sources at the ends remain, 1/unit."""
         return self.isotropic + self.forward * self.extinction
 
 

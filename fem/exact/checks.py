@@ -1,4 +1,4 @@
-"""What the closed forms ask of their arguments; a violation is an `InputError` in one sentence."""
+"""Checks of arguments of the closed forms; a violation is an `InputError` of one sentence, which names the argument."""
 
 import math
 
@@ -12,7 +12,7 @@ from tetlux.meshing.errors import InputError
 def positive(name: str, value: float) -> float:
     """Return `value` if it is finite and greater than 0."""
     if not (math.isfinite(value) and value > 0):
-        raise InputError(f"{name} is {value:g}; give a finite number greater than 0.")
+        raise InputError(f"{name} is {value:g}; give a finite number greater than 0.", field=name)
     return float(value)
 
 
@@ -20,7 +20,8 @@ def within(name: str, value: float, low: float, high: float, body: str) -> float
     """Return `value` if it lies strictly between `low` and `high`, which are the boundaries of `body`."""
     if not low < value < high:
         raise InputError(
-            f"{name} is {value:g}, which is not inside the {body}; give a value between {low:g} and {high:g}."
+            f"{name} is {value:g}, which is not inside the {body}; give a value between {low:g} and {high:g}.",
+            field=name,
         )
     return float(value)
 
@@ -29,10 +30,10 @@ def numbers(name: str, values: npt.ArrayLike, low: float = -math.inf, high: floa
     """Return `values` as an array if they all are numbers from `low` to `high`, both included."""
     array = np.asarray(values, dtype=float)
     if not np.all(np.isfinite(array)):
-        raise InputError(f"{name} holds a value that is not finite; remove it.")
+        raise InputError(f"{name} holds a value that is not finite; remove it.", field=name)
     if np.any((array < low) | (array > high)):
         worst = array[(array < low) | (array > high)].flat[0]
-        raise InputError(f"{name} holds {worst:g}; give values from {low:g} to {high:g}.")
+        raise InputError(f"{name} holds {worst:g}; give values from {low:g} to {high:g}.", field=name)
     return array
 
 
@@ -40,5 +41,5 @@ def points(values: npt.ArrayLike) -> FloatArray:
     """Return `values` as an (n, 3) array."""
     array = numbers("points", values)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"points has the shape {array.shape}; give an array of shape (n, 3).")
+        raise InputError(f"points has the shape {array.shape}; give an array of shape (n, 3).", field="points")
     return array

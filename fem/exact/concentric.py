@@ -1,8 +1,8 @@
 """A ball with a core of another medium around its centre: in diffuse light, or with a core that glows.
 
 In both parts the fluence depends on r alone, so that ``f = r phi`` obeys ``f'' = k² f``; phi and ``D dphi/dr`` are
-continuous at the core, and ``phi + zb dphi/dr`` is given at the surface. What is integrated outward grows and what
-is integrated inward does too, so that no digits are lost at any contrast.
+continuous at the core, and ``phi + zb dphi/dr`` is given at the surface. Each solution is integrated in the
+direction in which it grows, so that no digits are lost at any contrast.
 """
 
 import math
@@ -31,12 +31,20 @@ def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius:
     ------
     InputError
         If a radius is not positive, or the core not inside.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> core = Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4)
+    >>> round(diffuse_exitance(core, medium, core_radius=5.0, radius=10.0), 6)
+    0.748327
     """
     b = checks.positive("radius", radius)
     a = checks.within("core_radius", core_radius, 0.0, b, "ball")
     # At the core f = a, for a fluence of 1 there.
     growth = core.diffusion / shell.diffusion * _growth(core.sigma_tr, a)
-    value, slope = _carried(shell.sigma_tr, b - a, a, 1.0 + a * growth)
+    value, slope = _integrate(shell.sigma_tr, b - a, a, 1.0 + a * growth)
     growth = slope / value - 1.0 / b
     fluence = 4.0 / (1.0 - 2.0 * moments(shell.eta)[0]) / (1.0 + shell.extrapolation_length * growth)
     return 1.0 - shell.diffusion * growth * fluence
@@ -45,13 +53,28 @@ def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius:
 def glow_exitance(core: Medium, shell: Medium, *, core_radius: float, radius: float) -> float:
     """Exitance ``M = phi/(2A)`` of the ball if its core emits 1 W/unit³.
 
-    Parameters, result and errors are those of `diffuse_exitance`; the core may not absorb.
+    Parameters
+    ----------
+    core, shell : Medium
+        Of one refractive index; ``sigma_a = 0`` is allowed in both.
+    core_radius, radius : float
+        Unit.
+
+    Returns
+    -------
+    float
+        W/unit² for 1 W/unit³.
+
+    Raises
+    ------
+    InputError
+        If a radius is not positive, or the core not inside.
     """
     b = checks.positive("radius", radius)
     a = checks.within("core_radius", core_radius, 0.0, b, "ball")
     # From the surface, where the fluence is 1, inward: f = b, and -f' = b/zb - 1.
     k, zb = shell.sigma_tr, shell.extrapolation_length
-    value, slope = _carried(k, b - a, b, b / zb - 1.0)
+    value, slope = _integrate(k, b - a, b, b / zb - 1.0)
     decay = slope / value + 1.0 / a
     # What the core emits less what it absorbs passes its surface: phi = Q0/sigma_a (1 - c i_0(k r)).
     x = core.sigma_tr
@@ -70,8 +93,8 @@ def _growth(k: float, r: float) -> float:
     return k / math.tanh(x) - 1.0 / r
 
 
-def _carried(k: float, length: float, value: float, slope: float) -> tuple[float, float]:
-    """Carry f and f' a length on, by those at its start, both times ``e^{-k length}``."""
+def _integrate(k: float, length: float, value: float, slope: float) -> tuple[float, float]:
+    """Integrate f and f' over a length from their values at its start; both times ``e^{-k length}``."""
     x = k * length
     fall = math.exp(-2.0 * x)
     cosh, sinh = 0.5 * (1.0 + fall), 0.5 * (1.0 - fall)

@@ -1,6 +1,6 @@
 """An infinite cylinder along z in the diffusion approximation, with the exact (Robin) boundary.
 
-The axis is the z axis; sources lie at the angle 0. Every function returns what unit power gives, or unit
+The axis is the z axis; sources lie at the angle 0. All functions return values for unit power, or unit
 power for each unit of length of a line. Exitance is ``M = phi/(2A)``. With ``k = sigma_tr``, radius a,
 ``beta = zb/a``, ``rho_m(r) = I_m(kappa r)/I_m(kappa a)`` and the logarithmic derivatives u, v of
 `bessel.WallRates` at ``kappa a``, a point source at radius r0 gives
@@ -18,16 +18,15 @@ import numpy.typing as npt
 from scipy import special
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.bessel import inner_ratios, order_needed, wall_rates
-from tetlux.fem.exact.quadrature import CUTOFF, composite_rule
+from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.cylindrical import CHUNK, HALF, cosine_sum, multiplicity, reach, reflection
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-HALF = 0.0  # the order of I_m is m itself
 LINE_ORDERS = 400_000
 POINT_TERMS = 200_000_000
-CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
 
 
 def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta: npt.ArrayLike) -> FloatArray:
@@ -53,6 +52,13 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
     ------
     InputError
         If the radius is not positive, or the line not inside or less than 1e-4 of the radius below the surface.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> line_exitance(medium, radius=5.0, source_radius=4.0, theta=[0.0, 1.0]).round(6).tolist()
+    [0.131746, 0.021549]
     """
     a, t = _source(radius, source_radius)
     angle = checks.numbers("theta", theta)
@@ -60,14 +66,14 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
     order = _line_order(float(x[0]), t)
     growth = wall_rates(order, x, HALF).growth[:, 0]
     ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
-    series = _multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
-    return (_cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
+    series = multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
+    return (cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
 
 
 def line_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a cylinder of a line source of 1 W/unit at x = source_radius, y = 0.
 
-    The line's field without a boundary, ``K_0(k d)/(2 pi D)``, and the wall's answer as a series.
+    The free field of the line, ``K_0(k d)/(2 pi D)``, and the reflection by the surface as a series.
 
     Parameters
     ----------
@@ -86,13 +92,14 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     Raises
     ------
     InputError
-        As `line_exitance`, or if a point is outside.
+        If the radius is not positive, a point outside, or the line not inside or less than 1e-4 of the radius below the
+        surface.
     """
     a, t = _source(radius, source_radius)
     fraction, theta, distance, _ = _places(points, a, t)
     x = medium.sigma_tr * a
     order = _line_order(x, t)
-    weight = _wall_answer(medium.extrapolation_length / a, np.array([x]), order)
+    weight = reflection(medium.extrapolation_length / a, np.array([x]), order)
     if x == 0.0:
         # Order 0 has its logarithm in the free field: K_0(x d) + order 0 -> log(1/d) + beta.
         weight[0] = medium.extrapolation_length / a
@@ -103,15 +110,31 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     for start in range(0, fraction.size, chunk):
         part = slice(start, start + chunk)
         series = weight * inner_ratios(order, x, fraction[part], HALF)
-        field[part] += _cosine_sum(series, theta[part])
+        field[part] += cosine_sum(series, theta[part])
     return np.asarray(field / (2.0 * math.pi * medium.diffusion))
 
 
 def line_total(medium: Medium, *, radius: float, source_radius: float) -> float:
     """Power that leaves the cylinder, of 1 W from a point or from a unit of a line.
 
-    ``I_0(k r0)/[I_0(k a) + zb k I_1(k a)]``. The rest is absorbed. Parameters and errors are those of
-    `line_exitance`.
+    ``I_0(k r0)/[I_0(k a) + zb k I_1(k a)]``. The rest is absorbed.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the cylinder is made of.
+    radius, source_radius : float
+        Radius of the cylinder, distance of the source from the axis, unit.
+
+    Returns
+    -------
+    float
+        Between 0 and 1, W.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive or the source not inside.
     """
     a, t = _source(radius, source_radius)
     x = np.array([medium.sigma_tr * a])
@@ -126,7 +149,7 @@ def point_exitance(
     """Give the exitance of a cylinder that holds an isotropic point source of unit power at z = 0.
 
     The integral over q is a sum with equal steps: that is the field of a row of sources so far apart that
-    they do not see each other, and converges exponentially.
+    their fields do not overlap, and converges exponentially.
 
     Parameters
     ----------
@@ -150,6 +173,13 @@ def point_exitance(
     InputError
         If the radius is not positive, or the source not inside or so close below the surface, about 1/500
         of the radius, that the sum gets too long.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, radius=5.0, source_radius=4.0, theta=0.0, z=[0.0, 5.0]).round(6).tolist()
+    [0.042886, 0.001306]
     """
     a, t = _source(radius, source_radius)
     angle, height = np.broadcast_arrays(checks.numbers("theta", theta), checks.numbers("z", z))
@@ -160,13 +190,13 @@ def point_exitance(
     slowest = math.hypot(k, math.sqrt(4.0 / (1.0 + 2.0 * beta)) / a)
     period = 2.0 * float(np.max(np.abs(heights), initial=0.0)) + CUTOFF / slowest
     step = 2.0 * math.pi / period
-    count = int(_reach(k, a, t) / step) + 2
+    count = int(reach(k, a, t) / step) + 2
     if order * count > POINT_TERMS:
         raise InputError(
             f"source_radius is {source_radius:g} and z goes to {np.max(np.abs(heights)):g}, which needs too long "
             "a sum; use half_space for a source close below the surface, and a smaller z."
         )
-    waves = np.cos(np.outer(angles, np.arange(order + 1))) * _multiplicity(order)
+    waves = np.cos(np.outer(angles, np.arange(order + 1))) * multiplicity(order)
     total = np.zeros(angles.size)
     chunk = max(1, CHUNK // (order + 1))
     for start in range(0, count, chunk):
@@ -182,7 +212,7 @@ def point_exitance(
 def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a cylinder of an isotropic point source of unit power at (source_radius, 0, 0).
 
-    The source's field without a boundary, and the wall's answer as an integral and a series.
+    The free field of the source, and the reflection by the surface as an integral over a series.
 
     Parameters
     ----------
@@ -202,16 +232,17 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     Raises
     ------
     InputError
-        As `point_exitance`, or if a point is outside.
+        If the radius is not positive, a point outside, or the source not inside or too close below the surface for the
+        series.
     """
     a, t = _source(radius, source_radius)
     fraction, theta, distance, z = _places(points, a, t)
     x = medium.sigma_tr * a
     order = _line_order(x, t)
-    reach = _reach(medium.sigma_tr, a, t) * a
+    largest = reach(medium.sigma_tr, a, t) * a
     # Panels shrink towards q = 0, where order 0 is a logarithm, and resolve the oscillation along z.
-    panels = max(8, int(np.max(np.abs(z), initial=0.0) * reach / 8.0) + 1)
-    first = reach / panels
+    panels = max(8, int(np.max(np.abs(z), initial=0.0) * largest / 8.0) + 1)
+    first = largest / panels
     edges = np.concatenate([[0.0], first * 2.0 ** np.arange(-36, 0, dtype=float), first * np.arange(1, panels + 1)])
     q, weights = composite_rule(edges, 12)
     if order * q.size > CHUNK * 10:
@@ -220,7 +251,7 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
             "use half_space for a source as close as that."
         )
     wall = np.hypot(x, q)
-    answer = _wall_answer(medium.extrapolation_length / a, wall, order)
+    answer = reflection(medium.extrapolation_length / a, wall, order)
     answer *= inner_ratios(order, wall, np.full(wall.shape, t), HALF)
     with np.errstate(divide="ignore"):
         total = np.exp(-x * np.hypot(distance, z)) / np.hypot(distance, z)
@@ -232,13 +263,13 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
 
 
 def _source(radius: float, source_radius: float) -> tuple[float, float]:
-    """Check the source; return the radius, and the source's as a fraction of it."""
+    """Check the source; return the radius, and the source's distance from the axis as a fraction of it."""
     a = checks.positive("radius", radius)
     return a, checks.within("source_radius", source_radius, -1e-300, a, "cylinder") / a
 
 
 def _line_order(x: float, t: float) -> int:
-    """Order at which the series may end, if it ends."""
+    """Order at which the series is truncated; an error if that is too large."""
     order = order_needed(x, t, HALF, CUTOFF)
     if order > LINE_ORDERS:
         raise InputError(
@@ -248,38 +279,9 @@ def _line_order(x: float, t: float) -> int:
     return order
 
 
-def _reach(k: float, a: float, t: float) -> float:
-    """Largest q that counts, 1/unit: ``e^{-(kappa - k)(a - r0)}`` is the cutoff's there."""
-    rest = CUTOFF / (a * (1.0 - t))
-    return math.sqrt(rest * (rest + 2.0 * k))
-
-
 def _places(points: npt.ArrayLike, a: float, t: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Distance from the axis, angle, distance from the source's line, z; lengths in radii."""
     where = checks.points(points) / a
     fraction = checks.numbers("|(x, y)|/radius of points", np.hypot(where[:, 0], where[:, 1]), high=1.0 + 1e-12)
     theta = np.arctan2(where[:, 1], where[:, 0])
     return np.minimum(fraction, 1.0), theta, np.hypot(where[:, 0] - t, where[:, 1]), where[:, 2]
-
-
-def _multiplicity(order: int) -> FloatArray:
-    """``e_m``: 1 for order 0, else 2."""
-    return np.asarray(np.where(np.arange(order + 1) == 0, 1.0, 2.0))
-
-
-def _wall_answer(beta: float, x: FloatArray, order: int) -> FloatArray:
-    """``e_m (beta v - 1)/[(1 + beta u)(u + v)]``, of shape (order + 1, len(x))."""
-    rates = wall_rates(order, x, HALF)
-    u, v = rates.growth, rates.decay
-    with np.errstate(divide="ignore"):  # order 0 at x = 0
-        return np.asarray(_multiplicity(order)[:, None] * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v)))
-
-
-def _cosine_sum(series: FloatArray, theta: FloatArray) -> FloatArray:
-    """``sum_m c_m cos(m theta)``; coefficients (orders, 1) for all angles, or (orders, n)."""
-    total = np.zeros_like(theta)
-    chunk = max(1, CHUNK // max(theta.size, 1))
-    for start in range(0, len(series), chunk):
-        m = np.arange(start, min(start + chunk, len(series)))
-        total += np.sum(series[m] * np.cos(np.outer(m, theta)), axis=0)
-    return total

@@ -107,12 +107,30 @@ def reflectance(medium: Medium, *, rho: npt.ArrayLike) -> FloatArray:
     ------
     InputError
         If a distance is negative.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> reflectance(medium, rho=[1.0, 5.0]).round(6).tolist()
+    [0.029716, 0.001198]
     """
     return medium.albedo * flux(medium, depth=medium.mean_free_path, rho=rho)
 
 
 def total_reflectance(medium: Medium) -> float:
-    """`reflectance` over the whole surface: ``alpha'/2 (e^{-k z_1} + e^{-k z_2})``."""
+    """`reflectance` over the whole surface: ``alpha'/2 (e^{-k z_1} + e^{-k z_2})`` (Farrell 1992).
+
+    Parameters
+    ----------
+    medium : Medium
+        What fills the half-space.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered, between 0 and 1.
+    """
     k, z1 = medium.sigma_tr, medium.mean_free_path
     z2 = z1 + 2.0 * medium.extrapolation_length
     return float(0.5 * medium.albedo * (np.exp(-k * z1) + np.exp(-k * z2)))

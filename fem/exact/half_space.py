@@ -1,7 +1,7 @@
 """The half-space z >= 0 in the diffusion approximation, with the exact (Robin) boundary.
 
-The medium fills z >= 0, so z is depth and the surface's outward normal is -z. Every function returns what
-unit power, or unit irradiance, gives. Exitance is ``M = phi/(2A)`` in W/unit².
+The medium fills z >= 0, so z is depth and the surface's outward normal is -z. All functions return values for
+unit power, or unit irradiance. Exitance is ``M = phi/(2A)`` in W/unit².
 """
 
 import math
@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
-from tetlux.fem.exact.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
+from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
@@ -83,6 +84,13 @@ def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> Float
     ------
     InputError
         If the source is outside, or a distance negative.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, depth=1.0, rho=[0.0, 5.0]).round(6).tolist()
+    [0.041846, 0.001425]
     """
     z0 = checks.positive("depth", depth)
     distance = checks.numbers("rho", rho, low=0.0)
@@ -99,6 +107,11 @@ def point_total(medium: Medium, *, depth: float) -> float:
         What fills the half-space.
     depth : float
         Depth of the source, greater than 0, unit.
+
+    Returns
+    -------
+    float
+        Between 0 and 1, W.
 
     Raises
     ------
@@ -135,6 +148,13 @@ def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "del
     ------
     InputError
         If a distance is not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> pencil_exitance(medium, rho=[1.0, 5.0]).round(6).tolist()
+    [0.024604, 0.001297]
     """
     distance = checks.numbers("rho", rho, low=np.finfo(float).tiny)
     beam = beam_source(medium, source)
@@ -172,22 +192,3 @@ def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float
     k = medium.sigma_tr
     escape = (beam.isotropic - k * beam.forward) / (beam.extinction + k)
     return escape / (1.0 + k * medium.extrapolation_length)
-
-
-def sink_line(k: float, zb: float, rho: FloatArray, height: FloatArray) -> FloatArray:
-    """``∫0..inf e^{-l/zb} w (1 + k R) e^{-k R}/R³ dl`` with ``w = height + l``; 0 at ``zb = 0``."""
-    if zb == 0.0:
-        return np.zeros_like(rho)
-    nodes, weights = graded_rule()
-    l = CUTOFF * zb * nodes[:, None]  # noqa: E741
-
-    def integral(part: FloatArray, above: FloatArray) -> FloatArray:
-        return np.asarray((CUTOFF * zb * weights) @ (np.exp(-l / zb) * mirror_flux(k, part, above + l)))
-
-    return in_chunks(integral, rho, height)
-
-
-def mirror_flux(k: float, rho: FloatArray, w: FloatArray) -> FloatArray:
-    """``-d/dw e^{-k R}/R = w (1 + k R) e^{-k R}/R³``."""
-    distance = np.hypot(rho, w)
-    return np.asarray(w * (1.0 + k * distance) * np.exp(-k * distance) / distance**3)

@@ -20,9 +20,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.bessel import inner_ratios, order_needed, wall_rates
-from tetlux.fem.exact.legendre import legendre_sum
-from tetlux.fem.exact.quadrature import CUTOFF
+from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.legendre import legendre_sum
+from tetlux.fem.exact.numerics.quadrature import CUTOFF
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError

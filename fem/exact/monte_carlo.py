@@ -1,8 +1,8 @@
-"""Radiative transfer itself, by Monte Carlo: what diffusion approximates, in a ball and in a slab.
+"""Radiative transfer by Monte Carlo in a ball and in a slab: what diffusion approximates.
 
 Packets of light scatter by Henyey and Greenstein's phase function and obey Fresnel's and Snell's laws at every
-crossing of the surface, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). Absorption takes its
-share of a packet at each collision, with Russian roulette for the faint ones. Needs numba:
+crossing of the surface, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). A share of a packet is
+absorbed at each collision; faint packets play Russian roulette. Needs numba:
 ``pip install "tetlux[montecarlo]"``.
 
 A medium given by sigma_s' alone scatters isotropically. Every run is made of `BATCHES` independent ones with
@@ -11,30 +11,18 @@ those of the mean of the batches.
 """
 
 import math
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from types import ModuleType
-from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
+from tetlux.fem.exact.transfer.batches import BATCHES, Batches, Estimate, Light, estimate, mean_and_error
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-BATCHES = 128  # standard errors are themselves known to 1/sqrt(2 BATCHES) = 6 %
-
-Light = Literal["pencil", "beam", "point"]
-
-
-class Estimate(NamedTuple):
-    """A mean and its standard error."""
-
-    value: float
-    standard_error: float
+__all__ = ["BATCHES", "Estimate", "Ledger", "Light", "SlabResult", "SphereResult", "slab", "sphere"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -147,12 +135,12 @@ def sphere(
     """
     a = checks.positive("radius", radius)
     bounds = _edges(np.linspace(0.0, math.pi, 19) if edges is None else edges, high=math.pi)
-    walk = _Walk(medium, True, a, light, _depth(light, depth, 2.0 * a, "ball"), bounds, photons, seed)
-    shares = walk.shares()
+    depth_of_point = _depth(light, depth, 2.0 * a, "ball")
+    shares = Batches(medium, True, a, light, depth_of_point, bounds, photons, seed).run()
     # A wide beam of unit irradiance brings pi a².
     incident = math.pi * a**2 if light == "beam" else 1.0
     area = 2.0 * math.pi * a**2 * -np.diff(np.cos(bounds))
-    mean, error = _mean(incident * shares.front[:, :-1] / area)
+    mean, error = mean_and_error(incident * shares.front[:, :-1] / area)
     return SphereResult(**shares.ledger(), edges=bounds, exitance=mean, standard_error=error)
 
 
@@ -166,7 +154,7 @@ def slab(
     photons: int = 200_000,
     seed: int = 0,
 ) -> SlabResult:
-    """Give what an infinite slab 0 <= z <= L gives back and lets through, by radiative transfer.
+    """Give the reflectance and transmittance of an infinite slab 0 <= z <= L by radiative transfer.
 
     A half-space is a slab so thick that nothing comes through.
 
@@ -205,125 +193,20 @@ def slab(
     else:
         bounds = _edges(np.arange(11) * medium.mean_free_path if edges is None else edges, high=math.inf)
         area = math.pi * np.diff(bounds**2)
-    walk = _Walk(medium, False, length, light, _depth(light, depth, length, "slab"), bounds, photons, seed)
-    shares = walk.shares()
-    front, front_error = _mean(shares.front[:, :-1] / area)
-    back, back_error = _mean(shares.back[:, :-1] / area)
+    depth_of_point = _depth(light, depth, length, "slab")
+    shares = Batches(medium, False, length, light, depth_of_point, bounds, photons, seed).run()
+    front, front_error = mean_and_error(shares.front[:, :-1] / area)
+    back, back_error = mean_and_error(shares.back[:, :-1] / area)
     return SlabResult(
         **shares.ledger(),
-        reflectance=_estimate(shares.front.sum(axis=1)),
-        transmittance=_estimate(shares.back.sum(axis=1)),
+        reflectance=estimate(shares.front.sum(axis=1)),
+        transmittance=estimate(shares.back.sum(axis=1)),
         edges=bounds,
         front=front,
         back=back,
         front_error=front_error,
         back_error=back_error,
     )
-
-
-class _LedgerFields(TypedDict):
-    photons: int
-    specular: Estimate
-    absorbed: Estimate
-    exited: Estimate
-    ballistic: Estimate
-
-
-@dataclass(frozen=True, eq=False)
-class _Shares:
-    """What each batch counted, in shares of the light that came in: (batches,) and (batches, bins + 1)."""
-
-    photons: int
-    specular: FloatArray
-    absorbed: FloatArray
-    ballistic: FloatArray
-    front: FloatArray
-    back: FloatArray
-
-    def ledger(self) -> _LedgerFields:
-        return {
-            "photons": self.photons,
-            "specular": _estimate(self.specular),
-            "absorbed": _estimate(self.absorbed),
-            "exited": _estimate(self.front.sum(axis=1) + self.back.sum(axis=1)),
-            "ballistic": _estimate(self.ballistic),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class _Walk:
-    """One run: everything `photons.trace` needs."""
-
-    medium: Medium
-    ball: bool
-    size: float
-    light: Light
-    depth: float
-    edges: FloatArray
-    photons: int
-    seed: int
-
-    def shares(self) -> _Shares:
-        """Run all batches, as many at a time as there are cores."""
-        if self.photons < 1 or self.seed < 0:
-            raise InputError(f"photons is {self.photons} and seed {self.seed}; give at least 1, and at least 0.")
-        kernel = _kernel()
-        light = {"pencil": kernel.PENCIL, "beam": kernel.BEAM, "point": kernel.POINT}[self.light]
-        scattering, g = _scattering(self.medium)
-        extinction = self.medium.sigma_a + scattering
-        batch = -(-self.photons // BATCHES)
-
-        def one(seed: np.random.SeedSequence) -> FloatArray:
-            tally: FloatArray = kernel.trace(
-                np.random.Generator(np.random.PCG64(seed)),
-                batch,
-                self.ball,
-                self.size,
-                light,
-                self.depth,
-                float(extinction),
-                float(scattering / extinction),
-                float(g),
-                float(self.medium.eta),
-                self.edges,
-            )
-            return tally / batch
-
-        seeds = np.random.SeedSequence(self.seed).spawn(BATCHES)
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            rows = np.array(list(pool.map(one, seeds)))
-        bins = self.edges.size
-        return _Shares(
-            photons=batch * BATCHES,
-            specular=rows[:, kernel.SPECULAR],
-            absorbed=rows[:, kernel.ABSORBED],
-            ballistic=rows[:, kernel.BALLISTIC],
-            front=rows[:, kernel.LEDGER : kernel.LEDGER + bins],
-            back=rows[:, kernel.LEDGER + bins :],
-        )
-
-
-def _kernel() -> ModuleType:
-    """Import what needs numba, now that it is needed."""
-    try:
-        import numba  # noqa: F401, PLC0415
-    except ImportError as error:
-        raise InputError('Monte Carlo needs numba; install it with: pip install "tetlux[montecarlo]"') from error
-    from tetlux.fem.exact import photons  # noqa: PLC0415
-
-    return photons
-
-
-def _scattering(medium: Medium) -> tuple[float, float]:
-    """sigma_s and g; sigma_s' and 0 for a medium that does not tell.
-
-    Photons are scattered by Henyey and Greenstein's phase function.
-    """
-    if medium.phase is not None:
-        raise InputError("Monte Carlo knows no other phase function than Henyey-Greenstein; give the medium g instead.")
-    if medium.sigma_s is None or medium.g is None:
-        return medium.reduced_scattering, 0.0
-    return medium.sigma_s, medium.g
 
 
 def _depth(light: Light, depth: float | None, high: float, body: str) -> float:
@@ -339,13 +222,3 @@ def _edges(values: npt.ArrayLike, high: float) -> FloatArray:
     if array.ndim != 1 or array.size < 2 or np.any(np.diff(array) <= 0):
         raise InputError("edges do not ascend; give at least two numbers, each greater than the one before.")
     return np.ascontiguousarray(array)
-
-
-def _mean(batches: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean over the batches and its standard error."""
-    return batches.mean(axis=0), batches.std(axis=0, ddof=1) / math.sqrt(len(batches))
-
-
-def _estimate(batches: FloatArray) -> Estimate:
-    mean, error = _mean(batches)
-    return Estimate(float(mean), float(error))

@@ -1,8 +1,8 @@
 """The slab 0 <= z <= L in the diffusion approximation, with a point source.
 
 Two boundaries: the exact (Robin) one, and the extrapolated one, where fluence vanishes on the planes
-``z = -zb`` and ``z = L + zb``. They are different models, as `half_space` and `dipole` are. Every function returns
-what unit power gives; the source is at (0, 0, depth). What a wide beam does is in `slab_plane`.
+``z = -zb`` and ``z = L + zb``. They are different models, as `half_space` and `dipole` are. All functions return
+values for unit power; the source is at (0, 0, depth). A wide beam is in `slab_plane`.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.layer import Layer
+from tetlux.fem.exact.numerics.layer import Layer
 from tetlux.fem.exact.slab_plane import escape_front
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -78,6 +78,13 @@ def point_exitance(
     ------
     InputError
         If the thickness is not positive, the source outside, a distance negative, or the face unknown.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, thickness=10.0, depth=1.0, rho=[0.0, 5.0]).round(6).tolist()
+    [0.041833, 0.001413]
     """
     length, z0 = _source(thickness, depth)
     distance = checks.numbers("rho", rho, low=0.0)
@@ -90,7 +97,31 @@ def point_exitance(
 def point_total(medium: Medium, *, thickness: float, depth: float, face: Face = "front") -> float:
     """Power that leaves through a face, both faces Robin: `slab_plane.escape_front`.
 
-    Parameters and errors are those of `point_exitance`.
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness, depth : float
+        L, and the depth of the source, unit.
+    face : {"front", "back"}
+        The face z = 0, or z = L.
+
+    Returns
+    -------
+    float
+        W for unit power, between 0 and 1; what leaves through neither face is absorbed.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive, the source outside, or the face unknown.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(point_total(medium, thickness=10.0, depth=1.0, face="back"), 6)
+    0.102323
     """
     length, z0 = _source(thickness, depth)
     return float(escape_front(medium, length, np.array(length - z0 if _is_back(face) else z0)))
@@ -102,7 +133,19 @@ def extrapolated_fluence(medium: Medium, *, thickness: float, depth: float, poin
     The sum over all images of the source, sources at ``2m(L + 2zb) + z0`` and sinks at
     ``2m(L + 2zb) - 2zb - z0`` (Contini 1997): the nearest three one by one, the others in closed form.
 
-    Parameters and result are those of `point_fluence`, with points from -zb to L + zb.
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of; ``sigma_a = 0`` is allowed.
+    thickness, depth : float
+        L, and the depth of the source, between 0 and L, unit.
+    points : (n, 3) array_like
+        Where to evaluate, z from -zb to L + zb, unit.
+
+    Returns
+    -------
+    (n,) ndarray
+        Fluence, W/unit², to about 1e-10 of itself; infinite at the source.
 
     Raises
     ------
@@ -124,12 +167,28 @@ def extrapolated_flux(
     """Outward flux ``-D dphi/dn`` through a real face, z = 0 or z = L, of `extrapolated_fluence`.
 
     This is what Contini 1997 calls R(rho) and T(rho), and for a thick slab it is `dipole.flux`. It is not
-    phi/(2A), which is another number with this boundary. Parameters and errors are those of `point_exitance`.
+    phi/(2A), which is another number with this boundary.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness, depth : float
+        L, and the depth of the source, unit.
+    rho : (...) array_like
+        Distance on the face from the axis through the source, unit.
+    face : {"front", "back"}
+        The face z = 0, or z = L.
 
     Returns
     -------
     (...) ndarray
-        W/unit².
+        W/unit², to about 1e-10 of itself.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive, the source outside, a distance negative, or the face unknown.
     """
     length, z0 = _source(thickness, depth)
     distance = checks.numbers("rho", rho, low=0.0)

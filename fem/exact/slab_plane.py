@@ -1,10 +1,10 @@
-"""The slab 0 <= z <= L in one dimension: what a wide collimated beam along z gives back and lets through."""
+"""The slab 0 <= z <= L in one dimension: its reflectance and transmittance for a wide collimated beam along z."""
 
 import numpy as np
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
-from tetlux.fem.exact.quadrature import CUTOFF, composite_rule
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
@@ -52,26 +52,70 @@ def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delt
     Returns
     -------
     float
-        Share of the power that has entered. What of the beam reaches the far face leaves there, unreflected.
+        Share of the power that has entered. The part of the beam that reaches the far face leaves there, unreflected.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(beam_reflectance(medium, thickness=5.0), 6), round(beam_transmittance(medium, thickness=5.0), 6)
+    (0.577633, 0.249017)
+    """
+    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=False)
+
+
+def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
+    """Diffuse transmittance of a slab in a wide beam that enters at z = 0, both faces Robin.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness : float
+        L, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered, without the ballistic share: see `ballistic_transmittance`.
 
     Raises
     ------
     InputError
         If the thickness is not positive.
     """
-    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=False)
-
-
-def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
-    """Diffuse transmittance of a slab in a wide beam; the ballistic share is not part of it.
-
-    Parameters, result and errors are those of `beam_reflectance`; `ballistic_transmittance` is the rest.
-    """
     return _beam_exit(medium, checks.positive("thickness", thickness), source, far=True)
 
 
 def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
-    """Share of the beam that crosses the slab without scattering, in the sense of `source`: ``e^{-sigma L}``."""
+    """Share of a beam that crosses the slab without scattering, in the sense of `source`: ``e^{-sigma L}``.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the slab is made of.
+    thickness : float
+        L, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered.
+
+    Raises
+    ------
+    InputError
+        If the thickness is not positive.
+    """
     beam = beam_source(medium, source)
     return float(np.exp(-beam.extinction * checks.positive("thickness", thickness)))
 

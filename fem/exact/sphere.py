@@ -1,6 +1,6 @@
 """A ball in the diffusion approximation, with the exact (Robin) boundary.
 
-The ball is centred at the origin. Every function returns what unit power, or unit irradiance, gives.
+The ball is centred at the origin. All functions return values for unit power, or unit irradiance.
 Exitance is ``M = phi/(2A)`` in W/unit². With ``k = sigma_tr``, radius a, ``beta = zb/a``, and the
 logarithmic derivatives u and v of `bessel.WallRates` at k a, a point source at radius r0 gives
 
@@ -15,17 +15,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.bessel import inner_ratios, order_needed, wall_rates
-from tetlux.fem.exact.legendre import legendre_sum
-from tetlux.fem.exact.quadrature import CUTOFF, graded_rule
+from tetlux.fem.exact.numerics.ball import CHUNK, HALF, chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.legendre import legendre_sum
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-HALF = 0.5  # i_l is I_{l + 1/2} but for a power of its argument
 DIRECT_ORDERS = 20_000
 POINT_ORDERS = 400_000
-CHUNK = 4_000_000  # numbers in one table of ratios: 32 MB
 
 
 def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma: npt.ArrayLike) -> FloatArray:
@@ -53,6 +52,13 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
     ------
     InputError
         If the radius is not positive, the source not inside, or an angle not finite.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_exitance(medium, radius=10.0, source_radius=9.0, gamma=[0.0, 0.5]).round(6).tolist()
+    [0.042908, 0.001929]
     """
     a = checks.positive("radius", radius)
     angle = checks.numbers("gamma", gamma)
@@ -66,7 +72,7 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
 def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence inside a ball of an isotropic point source of unit power at (0, 0, source_radius).
 
-    The source's field without a boundary in closed form, and the wall's answer as a series,
+    The free field of the source in closed form, and the reflection by the surface as a series,
 
         4 pi D a phi = a e^{-k d}/d + sum_l (2l+1) P_l rho_l(r0) rho_l(r) (beta v_l - 1)/[(1 + beta u_l)(u_l + v_l)]
 
@@ -90,11 +96,18 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     ------
     InputError
         If the source or a point is outside, or the source is less than 1e-4 of the radius below the surface.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> point_fluence(medium, radius=10.0, source_radius=9.0, points=[[0.0, 0.0, 5.0]]).round(6).tolist()
+    [0.026082]
     """
     a = checks.positive("radius", radius)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
     where = checks.points(points) / a
-    # A point computed to lie on the surface may miss it by rounding.
+    # A point that was computed to lie on the surface may lie outside by rounding.
     fraction = np.minimum(checks.numbers("|points|/radius", np.linalg.norm(where, axis=1), high=1 + 1e-12), 1.0)
     x = medium.sigma_tr * a
     order = order_needed(x, t, HALF, CUTOFF)
@@ -140,6 +153,13 @@ def point_total(medium: Medium, *, radius: float, source_radius: float) -> float
     ------
     InputError
         If the radius is not positive or the source not inside.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(point_total(medium, radius=10.0, source_radius=9.0), 6)
+    0.790333
     """
     a = checks.positive("radius", radius)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
@@ -161,8 +181,8 @@ def _direct(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -
 def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
     """``4 pi a² M`` for a source close below the surface: singular part, and a series that converges.
 
-    The singular part is twice the source's field without a boundary, and the sum of the series at k = 0
-    without that; what is left falls like l^-3.
+    The singular part is twice the free field of the source, and the sum of the series at k = 0 without that; the
+    remaining coefficients fall like l^-3.
     """
     x = np.array([medium.sigma_tr * a])
     order = min(order, int(max(4000, 40.0 * x[0])))
@@ -176,21 +196,9 @@ def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) ->
     return image + (1.0 - 2.0 / beta) * _static_sum(t, beta, gamma) + legendre_sum(residual, gamma)
 
 
-def residual_weight(order: int, x: FloatArray, beta: float) -> FloatArray:
-    """``1/(1 + beta u) - (2/beta)/(u + v)`` without the cancellation."""
-    rates = wall_rates(order, x, HALF)
-    u, v = rates.growth[:, 0], rates.decay[:, 0]
-    return np.asarray((beta * (v - u) - 2.0) / (beta * (1.0 + beta * u) * (u + v)))
-
-
 def _static_sum(t: float, beta: float, gamma: FloatArray) -> FloatArray:
     """``sum_l t^l P_l(cos gamma)/(1 + beta l)``: as images, with ``1/(1 + beta l) = ∫ e^{-s} e^{-beta l s} ds``."""
     nodes, weights = graded_rule()
     s = CUTOFF * nodes[:, None]
     missing = -np.expm1(-beta * s) * t + (1.0 - t)
     return np.asarray((CUTOFF * weights) @ (np.exp(-s) / chord(missing, gamma)))
-
-
-def chord(missing: FloatArray, gamma: FloatArray) -> FloatArray:
-    """Distance from the surface of the unit ball to a point at the radius ``1 - missing``, at the angle gamma."""
-    return np.asarray(np.hypot(missing, 2.0 * np.sqrt(1.0 - missing) * np.sin(0.5 * gamma)))

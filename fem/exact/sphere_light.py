@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.beam import BeamSource, Source, beam_source
-from tetlux.fem.exact.bessel import inner_ratios, wall_rates
-from tetlux.fem.exact.legendre import legendre_sum
-from tetlux.fem.exact.quadrature import CUTOFF, composite_rule, graded_rule, two_decays
-from tetlux.fem.exact.sphere import CHUNK, HALF, chord, residual_weight
+from tetlux.fem.exact.beam import Source, beam_source
+from tetlux.fem.exact.numerics.ball import HALF, along_diameter, beam_series, chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.legendre import legendre_sum
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, two_decays
 from tetlux.fem.fresnel import moments
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -29,7 +29,7 @@ def pencil_exitance(
 
     `sphere.point_exitance` integrated along the diameter from the entry at gamma = 0. The derivative of the
     first moment goes to the ends of the path, and the singular parts there are split off as for a point:
-    twice the field without a boundary, and the series at k = 0. What is left falls like l^-3.
+    twice the free field, and the series at k = 0. The remaining coefficients fall like l^-3.
 
     Parameters
     ----------
@@ -53,6 +53,13 @@ def pencil_exitance(
     ------
     InputError
         If the radius is not positive, or an angle not between 0 and pi.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> pencil_exitance(medium, radius=10.0, gamma=[0.1, 1.0]).round(6).tolist()
+    [0.02648, 0.000308]
     """
     a = checks.positive("radius", radius)
     tiny = np.finfo(float).tiny
@@ -66,7 +73,7 @@ def pencil_exitance(
     static = 1.0 - 2.0 / beta
     weight = (2.0 * l + 1.0) * residual_weight(order, np.array([x]), beta)
 
-    along, singular = _along_diameter(x, extinction, flat, order)
+    along, singular = along_diameter(x, extinction, flat, order)
     # k = 0 and e^{-l s} for (1 - s)^l: ``sum_l P_l/[(1 + beta l)(l + extinction)]``
     nodes, weights = graded_rule()
     reach = CUTOFF * max(beta, 1.0 / extinction)
@@ -91,13 +98,32 @@ def pencil_exitance(
 def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
     """Power that leaves a ball which a pencil beam crosses, without the ballistic share ``e^{-2 sigma a}``.
 
-    Parameters, result and errors are those of `pencil_exitance`, summed over the surface.
+    `pencil_exitance` integrated over the surface.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius of the ball, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        Share of the power that has entered, between 0 and 1.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive.
     """
     a = checks.positive("radius", radius)
     beam = beam_source(medium, source)
     x = medium.sigma_tr * a
     extinction = beam.extinction * a
-    along, _ = _along_diameter(x, extinction, np.empty(0), 0)
+    along, _ = along_diameter(x, extinction, np.empty(0), 0)
     growth = wall_rates(0, np.array([x]), HALF).growth[0, 0]
     ends = beam.forward * math.expm1(-2.0 * extinction)
     return float((beam.volume * a * along[0] + ends) / (1.0 + medium.extrapolation_length / a * growth))
@@ -135,17 +161,36 @@ def beam_exitance(
     """
     angle = checks.numbers("gamma", gamma)
     a = checks.positive("radius", radius)
-    series = _beam_series(medium, a, beam_source(medium, source), BEAM_ORDERS)
+    series = _beam_series(medium, a, source, BEAM_ORDERS)
     return np.asarray(legendre_sum(series, angle.ravel()) / (4.0 * math.pi * a**2)).reshape(angle.shape)
 
 
 def beam_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
     """Power that leaves a ball in a beam, of the pi a² that meet it, without the ballistic share.
 
-    Parameters, result and errors are those of `beam_exitance`, summed over the surface.
+    `beam_exitance` integrated over the surface.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of; its index must be 1.
+    radius : float
+        Radius of the ball, unit.
+    source : {"delta-eddington", "similarity"}
+        How the beam scatters, see `beam.beam_source`.
+
+    Returns
+    -------
+    float
+        W for 1 W/unit².
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive, or the medium's index not 1.
     """
     a = checks.positive("radius", radius)
-    return float(_beam_series(medium, a, beam_source(medium, source), 0)[0])
+    return float(_beam_series(medium, a, source, 0)[0])
 
 
 def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -> FloatArray:
@@ -184,7 +229,29 @@ def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -
 def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     """Flux that leaves a ball in unit diffuse irradiance, ``M = 1 - D dphi/dr`` for each unit of surface.
 
-    Parameters and errors are those of `diffuse_fluence`. Without absorption it is 1.
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius of the ball, unit.
+
+    Returns
+    -------
+    float
+        W/unit² for 1 W/unit² that passes into the ball; 1 without absorption.
+
+    Raises
+    ------
+    InputError
+        If the radius is not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> round(diffuse_exitance(medium, radius=10.0), 6)
+    0.795337
     """
     a = checks.positive("radius", radius)
     growth = wall_rates(0, np.array(medium.sigma_tr * a), HALF).growth[0]
@@ -197,6 +264,18 @@ def glow_exitance(medium: Medium, *, radius: float) -> float:
 
     ``phi = (1 - C i_0(k r)/i_0(k a))/sigma_a`` with ``phi + zb dphi/dr = 0`` at the surface, so that
     ``2 A M = q/((1 + q) sigma_a)`` with ``q = zb (k coth(k a) - 1/a)``; without absorption ``M = a/3``.
+
+    Parameters
+    ----------
+    medium : Medium
+        What the ball is made of.
+    radius : float
+        Radius a of the ball, unit.
+
+    Returns
+    -------
+    float
+        W/unit² for 1 W/unit³.
 
     Raises
     ------
@@ -213,79 +292,8 @@ def glow_exitance(medium: Medium, *, radius: float) -> float:
     return q / ((1.0 + q) * medium.sigma_a * 2.0 * medium.boundary_factor)
 
 
-def _along_diameter(x: float, extinction: float, gamma: FloatArray, order: int) -> tuple[FloatArray, FloatArray]:
-    """Integrate ``e^{-extinction s}`` times rho_l, signed beyond the centre, and times ``e^{-x d}/d``.
-
-    Lengths are in radii; panels shrink towards both ends of the diameter.
-
-    Returns
-    -------
-    moments : (order + 1,) ndarray
-    singular : (n,) ndarray
-    """
-    nodes, weights = graded_rule(30, 12)
-    # Nothing is left of the beam beyond its cutoff.
-    reach = min(1.0, CUTOFF / extinction)
-    missing = np.concatenate([reach * nodes, nodes])
-    density = np.concatenate(
-        [
-            reach * weights * np.exp(-extinction * reach * nodes),
-            weights * np.exp(-extinction * (2.0 - nodes)),
-        ]
-    )
-    far = np.repeat([False, True], nodes.size)
-    result = np.zeros(order + 1)
-    odd = np.arange(order + 1) % 2 == 1
-    chunk = max(1, CHUNK // (order + 1))
-    for start in range(0, missing.size, chunk):
-        part = slice(start, start + chunk)
-        ratio = inner_ratios(order, x, 1.0 - missing[part], HALF)
-        near_side = ratio @ np.where(far[part], 0.0, density[part])
-        far_side = ratio @ np.where(far[part], density[part], 0.0)
-        result += near_side + np.where(odd, -far_side, far_side)
-    angle = np.where(far[:, None], math.pi - gamma, gamma)
-    distance = chord(missing[:, None], angle)
-    return result, density @ (np.exp(-x * distance) / distance)
-
-
-def _beam_series(medium: Medium, a: float, beam: BeamSource, order: int) -> FloatArray:
-    """Coefficients c_l of ``4 pi a² M = sum_l c_l P_l(cos gamma)`` in a uniform beam."""
+def _beam_series(medium: Medium, a: float, source: Source, order: int) -> FloatArray:
     if medium.eta != 1.0:
-        raise InputError(f"eta is {medium.eta:g}; the closed form for a ball in a beam needs eta 1.")
-    x, extinction = medium.sigma_tr * a, beam.extinction * a
-    # Chords by the angle from grazing at which they enter: fine towards grazing, then as fine as P_l needs.
-    # Along a chord rho_l P_l falls, and rises, within 1/l of the ends.
-    steps = np.linspace(0.0, 0.5 * math.pi, 25)
-    edges = np.concatenate([[0.0], steps[1] * 2.0 ** np.arange(-6, 0, dtype=float), steps[1:]])
-    elevation, weight = composite_rule(edges, 14)
-    mu, mu_weight = np.sin(elevation), weight * np.cos(elevation)
-    s, s_weight = composite_rule(0.5 - 0.5 * np.cos(np.linspace(0.0, math.pi, 25)), 12)
-    reach = np.minimum(2.0 * mu, CUTOFF / extinction)
-    depth = (reach[:, None] * s).ravel()
-    density = ((mu_weight * mu * reach)[:, None] * s_weight).ravel() * np.exp(-extinction * depth)
-    cosine = np.repeat(mu, s.size)
-    height = cosine - depth
-    r = np.sqrt(np.maximum(height**2 + 1.0 - cosine**2, 1e-300))
-    inside = _legendre_moments(density, height / r, r, x, order)
-    entry = _legendre_moments(mu_weight * mu, mu, np.ones_like(mu), x, order)
-    leaving = _legendre_moments(mu_weight * mu * np.exp(-2.0 * extinction * mu), -mu, np.ones_like(mu), x, order)
-    growth = wall_rates(order, np.array([x]), HALF).growth[:, 0]
-    beta = medium.extrapolation_length / a
-    power = beam.volume * a * inside + beam.forward * (leaving - entry)
-    return np.asarray(2.0 * math.pi * a**2 * (2.0 * np.arange(order + 1) + 1.0) * power / (1.0 + beta * growth))
-
-
-def _legendre_moments(
-    density: FloatArray, cosine: FloatArray, fraction: FloatArray, x: float, order: int
-) -> FloatArray:
-    """``sum_j density_j rho_l(r_j) P_l(cosine_j)`` for l = 0..order."""
-    result = np.zeros(order + 1)
-    chunk = max(1, CHUNK // (order + 1))
-    for start in range(0, density.size, chunk):
-        part = slice(start, start + chunk)
-        ratio = inner_ratios(order, x, fraction[part], HALF) * density[part]
-        previous, value = np.zeros_like(cosine[part]), np.ones_like(cosine[part])
-        for l in range(order + 1):  # noqa: E741
-            result[l] += ratio[l] @ value
-            previous, value = value, ((2 * l + 1) * cosine[part] * value - l * previous) / (l + 1)
-    return result
+        raise InputError(f"eta is {medium.eta:g}; the closed form for a ball in a beam needs eta 1.", field="eta")
+    beam = beam_source(medium, source)
+    return beam_series(medium, a, decay=beam.extinction, volume=beam.volume, forward=beam.forward, order=order)

@@ -55,7 +55,9 @@ class EnvironmentLight:
     def __post_init__(self) -> None:
         check_pixels(self.radiance)
         if np.linalg.norm(np.cross(unit_vector(self.up, "up"), unit_vector(self.front, "front"))) < 1e-6:
-            raise InputError(f"up and front of the environment are both along {as_text(self.up)}; give another front.")
+            raise InputError(
+                f"up and front of the environment are both along {as_text(self.up)}; give another front.", field="up"
+            )
 
     @cached_property
     def directions(self) -> tuple[FloatArray, FloatArray]:

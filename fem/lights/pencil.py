@@ -17,6 +17,7 @@ from tetlux.fem.paths import Rays, beyond, entered, follow
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
@@ -73,9 +74,9 @@ class PencilBeam:
         unit_vector(self.direction, "direction")
         check_positive(self.power, "power", "watts")
         if not math.isfinite(self.radius) or self.radius < 0:
-            raise InputError(f"radius is {self.radius:g}; give 0 or a length greater than 0.")
+            raise InputError(f"radius is {self.radius:g}; give 0 or a length greater than 0.", field="radius")
         if self.deposit not in ("point", "line"):
-            raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".')
+            raise InputError(f'deposit is "{self.deposit}"; it is "point" or "line".', field="deposit")
 
     def entry(self, surface: Surface) -> FloatArray:
         """Where the middle of the beam meets the surface, (3,).
@@ -129,7 +130,7 @@ class PencilBeam:
         return _Beams(count, points, inside, specular)
 
     def _warnings(self, beams: "_Beams", body: Body) -> list[str]:
-        warnings = []
+        warnings: list[str] = []
         if len(beams.entries) < beams.count:
             warnings.append(_partly_missed(1 - len(beams.entries) / beams.count))
         apart = self.radius * math.sqrt(math.pi / beams.count)
@@ -137,13 +138,20 @@ class PencilBeam:
             apart /= _unit_of_depth(beams.inside, body)
         if apart > 1.0:
             warnings.append(
-                f"the beam is so wide that the {beams.count} thin ones it is made of lie {apart:.2g} mean free paths "
-                "apart: its exitance is spotted close to where it enters."
+                Note(
+                    "beam-spotted",
+                    f"the beam is so wide that the {beams.count} thin ones it is made of lie {apart:.2g} mean free "
+                    "paths apart: its exitance is spotted close to where it enters.",
+                    value=apart,
+                )
             )
         if self.deposit == "line":
             warnings.append(
-                "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
-                "or read its exitance a mean free path away."
+                Note(
+                    "beam-singular",
+                    "a line deposit of a beam without width is singular where it enters; give the beam a radius, "
+                    "or read its exitance a mean free path away.",
+                )
             )
         return warnings
 
@@ -255,8 +263,11 @@ def _as_points(rays: Rays, body: Body) -> Deposit:
     warnings: tuple[str, ...] = ()
     if (paths.totals < 2.0).any():
         warnings = (
-            "the beam crosses less than two mean free paths of the body, too little for one point of deposit; "
-            'use deposit: "line".',
+            Note(
+                "too-thin-for-point",
+                "the beam crosses less than two mean free paths of the body, too little for one point of deposit; "
+                'use deposit: "line".',
+            ),
         )
     return Deposit(
         absorbed=float((1.0 - albedo) @ rays.powers),
@@ -321,5 +332,6 @@ def _as_line(rays: Rays, body: Body) -> Deposit:
     return replace(segment, on_mesh=rest_on)
 
 
-def _partly_missed(share: float) -> str:
-    return f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."
+def _partly_missed(share: float) -> Note:
+    text = f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."
+    return Note("beam-partly-missed", text, value=share)

@@ -22,9 +22,9 @@ def as_vector(value: Vector, name: str) -> FloatArray:
     try:
         vector = np.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} is {value!r}; give three finite coordinates.") from error
+        raise InputError(f"{name} is {value!r}; give three finite coordinates.", field=name) from error
     if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{name} is {vector.tolist()}; give three finite coordinates.")
+        raise InputError(f"{name} is {vector.tolist()}; give three finite coordinates.", field=name)
     return vector
 
 
@@ -33,7 +33,7 @@ def unit_vector(value: Vector, name: str) -> FloatArray:
     vector = as_vector(value, name)
     largest = np.abs(vector).max()
     if not largest > 0:
-        raise InputError(f"{name} is zero; give the {name} in which the light travels.")
+        raise InputError(f"{name} is zero; give the {name} in which the light travels.", field=name)
     vector = vector / largest  # its square may be out of range
     vector[np.abs(vector) < 1e-30] = 0.0  # and what is divided by it
     return np.asarray(vector / np.linalg.norm(vector))
@@ -42,9 +42,10 @@ def unit_vector(value: Vector, name: str) -> FloatArray:
 def check_positive(value: float, name: str, unit: str) -> None:
     """Refuse what is not a positive number."""
     if not math.isfinite(value) or value <= 0:
-        raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.")
+        raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.", field=name)
     if not FAINTEST <= value <= 1.0 / FAINTEST:
-        raise InputError(f"{name} is {value:g}; give a number of {unit} between {FAINTEST:g} and {1.0 / FAINTEST:g}.")
+        limits = f"between {FAINTEST:g} and {1.0 / FAINTEST:g}"
+        raise InputError(f"{name} is {value:g}; give a number of {unit} {limits}.", field=name)
 
 
 @dataclass(frozen=True)

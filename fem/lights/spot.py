@@ -96,7 +96,7 @@ def sunflower(count: int, radius: float, direction: FloatArray) -> FloatArray:
 
 def _check_length(value: float, name: str) -> None:
     if not 0 < value < math.inf:
-        raise InputError(f"{name} of the spot is {value:g}; give a length greater than 0.")
+        raise InputError(f"{name} of the spot is {value:g}; give a length greater than 0.", field=name)
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,9 @@ def _axes(direction: FloatArray, up: Vector) -> tuple[FloatArray, FloatArray]:
     raised = raised - (raised @ direction) * direction
     length = float(np.linalg.norm(raised))
     if not length > 1e-6 * float(np.linalg.norm(up)):
-        raise InputError(f"up of the spot is {as_text(up)}, along the beam; give another direction that is up.")
+        raise InputError(
+            f"up of the spot is {as_text(up)}, along the beam; give another direction that is up.", field="up"
+        )
     raised /= length
     return np.cross(direction, raised), raised
 

@@ -14,12 +14,12 @@ import numpy as np
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab_plane, sphere, sphere_light
 from tetlux.fem.exact.beam import Source
-from tetlux.fem.exact.bessel import inner_ratios, wall_rates
-from tetlux.fem.exact.legendre import legendre_sum
 from tetlux.fem.exact.monte_carlo import Estimate
-from tetlux.fem.exact.quadrature import composite_rule, graded_rule
+from tetlux.fem.exact.numerics.ball import HALF
+from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.legendre import legendre_sum
+from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
 from tetlux.fem.exact.slab_plane import escape_front
-from tetlux.fem.exact.sphere import HALF
 from tetlux.fem.fresnel import reflectance
 from tetlux.meshing.arrays import FloatArray
 

@@ -16,7 +16,7 @@ import numpy as np
 from tests.tables.diffusion_against_monte_carlo import entered, line_under_a_beam, medium_of
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab
-from tetlux.fem.exact.quadrature import composite_rule, graded_rule
+from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
 from tetlux.fem.validity_tables import (
     ALBEDOS,
     COSINES,

@@ -1,0 +1,1 @@
+"""`tetlux chart`: error and seconds of several methods on the same scenes."""

@@ -1,0 +1,125 @@
+"""What runs in NGSolve's own process: netgen meshes the exact shape, NGSolve solves the same equation on it.
+
+NGSolve (LGPL) is an optional peer on the chart (``pip install "tetlux[peers]"``); nothing else imports it.
+"""
+
+import os
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from tetlux.meshing.surface import Surface
+
+# Rounds of Newton's method that find a point of a curved facet; the facets are nearly flat.
+ROUNDS = 3
+# Relative residual of the linear solver.
+RESIDUAL = 1e-9
+
+
+def main(job_path: str, result_path: str) -> None:
+    """Solve the job in ``job_path`` (npz), and leave exitance, seconds and sizes in ``result_path`` (npz)."""
+    import ngsolve  # noqa: PLC0415
+
+    with np.load(job_path) as data:
+        job: dict[str, Any] = {key: data[key] for key in data.files}
+    ngsolve.SetNumThreads(os.cpu_count() or 1)
+    seconds: list[float] = []
+    while not seconds or (len(seconds) < job["repeats"] and sum(seconds) < job["repeat_seconds"]):
+        started = time.perf_counter()
+        mesh, fluence = _solve(job)
+        seconds.append(time.perf_counter() - started)
+    np.savez(
+        result_path,
+        exitance=float(job["robin"]) * _evaluate_on_surface(mesh, fluence, job["samples"]),
+        seconds=min(seconds),
+        unknowns=fluence.space.ndof,
+        tetrahedra=mesh.ne,
+    )
+
+
+def _solve(job: dict[str, Any]) -> tuple[Any, Any]:
+    """Make a mesh and the fluence on it."""
+    import ngsolve as ng  # noqa: PLC0415
+
+    order = int(job["order"])
+    mesh = _mesh(job)
+    with ng.TaskManager():
+        space = ng.H1(mesh, order=order)
+        u, v = space.TnT()
+        system = ng.BilinearForm(space, symmetric=True)
+        system += float(job["diffusion"]) * ng.grad(u) * ng.grad(v) * ng.dx + float(job["sigma_a"]) * u * v * ng.dx
+        system += float(job["robin"]) * u * v * ng.ds
+        # On one level "multigrid" is a direct solver, the quicker one for few unknowns; for high orders bddc is.
+        preconditioner = ng.Preconditioner(system, "multigrid" if order == 1 else "bddc")
+        load = ng.LinearForm(space)
+        for (x, y, z), power in zip(job["points"].tolist(), job["powers"].tolist(), strict=True):
+            load += (power * v)(x, y, z)
+        system.Assemble()
+        load.Assemble()
+        fluence = ng.GridFunction(space)
+        solver = ng.CGSolver(system.mat, preconditioner.mat, tol=RESIDUAL, maxiter=2000)
+        fluence.vec.data = solver * load.vec
+    return mesh, fluence
+
+
+def _mesh(job: dict[str, Any]) -> Any:
+    """Mesh the exact shape, as finely as ``resolution`` (netgen's grading) says; curved from the second order on."""
+    import ngsolve as ng  # noqa: PLC0415
+    from netgen.meshing import MeshingParameters  # noqa: PLC0415
+
+    order, grading = int(job["order"]), float(job["resolution"])
+    settings = MeshingParameters(maxh=float(job["longest"]), grading=grading)
+    for (x, y, z), length in zip(job["points"].tolist(), job["lengths_to_resolve"].tolist(), strict=True):
+        settings.RestrictH(x=x, y=y, z=z, h=grading / 3.0 * length)
+    mesh = ng.Mesh(_geometry(job).GenerateMesh(mp=settings))
+    if order > 1:
+        mesh.Curve(order)
+    return mesh
+
+
+def _geometry(job: dict[str, Any]) -> Any:
+    """The exact shape; a torus by OpenCASCADE, since netgen's own often cannot be meshed."""
+    from netgen import csg, occ  # noqa: PLC0415
+
+    sizes, center = job["sizes"].tolist(), job["center"].tolist()
+    if job["kind"] == "torus":
+        major, minor = sizes
+        ring = occ.Circle(occ.Pnt(center[0] + major, *center[1:]), occ.Dir(0.0, 1.0, 0.0), minor)
+        axis = occ.Axis(occ.Pnt(*center), occ.Z)
+        return occ.OCCGeometry(occ.Face(occ.Wire([ring])).Revolve(axis, 360.0))
+    geometry = csg.CSGeometry()
+    if job["kind"] == "sphere":
+        geometry.Add(csg.Sphere(csg.Pnt(*center), sizes[0]))
+    else:
+        width, depth = sizes
+        low, high = csg.Pnt(-0.5 * width, -0.5 * width, -depth), csg.Pnt(0.5 * width, 0.5 * width, 0.0)
+        geometry.Add(csg.OrthoBrick(low, high))
+    return geometry
+
+
+def _evaluate_on_surface(mesh: Any, fluence: Any, samples: Any) -> Any:
+    """Fluence on the curved facets where they are nearest to samples (n, 3), (n,)."""
+    import ngsolve as ng  # noqa: PLC0415
+
+    corners = np.asarray(mesh.ngmesh.Coordinates())
+    facets = np.array([[vertex.nr for vertex in element.vertices] for element in mesh.Elements(ng.BND)])
+    near, facet = Surface(corners, facets, "mm", "netgen").closest(samples)
+    last = corners[facets[facet, 2]]
+    # NGSolve's coordinates in a triangle are the weights of its first two corners.
+    slope = np.linalg.pinv(np.stack([corners[facets[facet, 0]] - last, corners[facets[facet, 1]] - last], axis=2))
+    place = np.einsum("nij,nj->ni", slope, near - last)
+    inside = np.mean([corners[vertex.nr] for vertex in mesh[ng.ElementId(ng.VOL, 0)].vertices], axis=0)
+    where = np.repeat(mesh(*inside[:, None]), len(samples))
+    where["VorB"], where["nr"] = 1, facet
+    position = ng.CF((ng.x, ng.y, ng.z))
+    for _ in range(ROUNDS):
+        where["x"], where["y"] = place.T
+        place += np.einsum("nij,nj->ni", slope, samples - position(where))
+    where["x"], where["y"] = place.T
+    return fluence(where).ravel()
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

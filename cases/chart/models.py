@@ -1,0 +1,115 @@
+"""Methods of the chart without a mesh: the dipole, the half-space, and Monte Carlo."""
+
+import importlib.util
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from tetlux.cases.chart.benchmark import Benchmark
+from tetlux.cases.chart.methods import Method, Outcome, fastest_run
+from tetlux.fem.exact import dipole, half_space, monte_carlo
+from tetlux.fem.exact.registry import polar_angle
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.solids import Slab, Sphere
+
+# Monte Carlo counts in this many rings round the light, the first one this share of the source's depth wide.
+RINGS, FIRST_RING = 60, 0.1
+
+
+def _of_half_space(
+    exitance: Callable[[Medium, float, FloatArray], FloatArray],
+) -> Callable[[Benchmark, float], Outcome]:
+    """Take the surface for its tangent plane nearest to each source, and distances from there for distances on it."""
+
+    def once(benchmark: Benchmark) -> Outcome:
+        surface, medium, points = benchmark.case.surface, benchmark.case.medium, benchmark.samples.points
+        started = time.perf_counter()
+        total = np.zeros(len(points))
+        for source, power in benchmark.sources:
+            foot = surface.project(source[None])[0][0]
+            depth, rho = float(np.linalg.norm(foot - source)), np.linalg.norm(points - foot, axis=1)
+            total += power * exitance(medium, depth, rho)
+        return Outcome(total, time.perf_counter() - started)
+
+    return lambda benchmark, _: fastest_run(benchmark, lambda: once(benchmark))
+
+
+def _monte_carlo(benchmark: Benchmark, photons: float) -> Outcome:
+    """Radiative transfer from the same sources: isotropic points."""
+    started, shape = time.perf_counter(), benchmark.shape
+    total = np.zeros(len(benchmark.samples.points))
+    for source, power in benchmark.sources:
+        if isinstance(shape, Sphere):
+            total += power * _monte_carlo_in_sphere(benchmark, shape, source, int(photons))
+        else:
+            assert isinstance(shape, Slab)
+            total += power * _monte_carlo_in_slab(benchmark, shape, source, int(photons))
+    return Outcome(total, time.perf_counter() - started)
+
+
+def _monte_carlo_in_sphere(benchmark: Benchmark, shape: Sphere, source: FloatArray, photons: int) -> FloatArray:
+    center = np.asarray(shape.center)
+    depth = shape.radius - float(np.linalg.norm(source - center))
+    angle = polar_angle(benchmark.samples.points, source, center)
+    edges = np.append(0.0, np.geomspace(FIRST_RING * depth / shape.radius, math.pi, RINGS))
+    result = monte_carlo.sphere(
+        benchmark.case.medium, radius=shape.radius, light="point", depth=depth, edges=edges, photons=photons
+    )
+    return np.asarray(np.interp(angle, 0.5 * (edges[1:] + edges[:-1]), result.exitance))
+
+
+def _monte_carlo_in_slab(benchmark: Benchmark, shape: Slab, source: FloatArray, photons: int) -> FloatArray:
+    depth = -float(source[2])
+    rho = np.hypot(*(benchmark.samples.points - source)[:, :2].T)
+    edges = np.append(0.0, np.geomspace(FIRST_RING * depth, float(rho.max()), RINGS))
+    result = monte_carlo.slab(
+        benchmark.case.medium, thickness=shape.depth, light="point", depth=depth, edges=edges, photons=photons
+    )
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    front = benchmark.samples.normals[:, 2] > 0
+    return np.where(front, np.interp(rho, middles, result.front), np.interp(rho, middles, result.back))
+
+
+def _monte_carlo_fits(benchmark: Benchmark) -> bool:
+    known = benchmark.reference.kind == "closed form" and isinstance(benchmark.shape, Sphere | Slab)
+    return known and benchmark.in_points
+
+
+def _compile_monte_carlo(benchmark: Benchmark) -> Outcome:
+    """Have numba compile it, with one photon."""
+    return _monte_carlo(benchmark, 1.0)
+
+
+def monte_carlo_installed() -> bool:
+    """Whether numba is."""
+    return importlib.util.find_spec("numba") is not None
+
+
+MODELS = (
+    Method(
+        "dipole alone",
+        "",
+        (0.0,),
+        _of_half_space(lambda medium, depth, rho: dipole.flux(medium, depth=depth, rho=rho)),
+        lambda benchmark: benchmark.in_points,
+    ),
+    Method(
+        "half-space alone",
+        "",
+        (0.0,),
+        _of_half_space(lambda medium, depth, rho: half_space.point_exitance(medium, depth=depth, rho=rho)),
+        lambda benchmark: benchmark.in_points,
+    ),
+)
+MONTE_CARLO = Method(
+    "Monte Carlo (radiative transfer)",
+    "photons",
+    (10_000.0, 100_000.0, 1_000_000.0),
+    _monte_carlo,
+    _monte_carlo_fits,
+    comparable=False,
+    warm_up=_compile_monte_carlo,
+)

@@ -1,0 +1,158 @@
+"""Other people's solvers on the chart, where they are installed: each run is a process of its own."""
+
+import importlib.util
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tetlux.cases.chart.benchmark import Benchmark
+from tetlux.cases.chart.finite_elements import GRADINGS, graded_mesh
+from tetlux.cases.chart.methods import REPEAT_SECONDS, Method, Outcome
+from tetlux.fem.exitance_field import LinearFluence
+from tetlux.meshing.errors import RunError
+from tetlux.meshing.scratch import run_child, scratch
+from tetlux.meshing.solids import Slab, Sphere, Torus
+
+# Seconds until a peer is stopped.
+TIME_LIMIT = 300.0
+# Netgen's longest edge, as a share of the body's mean thickness 2 V/A.
+LONGEST = 0.75
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another solver.
+
+    Attributes
+    ----------
+    name : str
+    package : str
+        What has to be installed.
+    methods : tuple of Method
+    """
+
+    name: str
+    package: str
+    methods: tuple[Method, ...]
+
+    @property
+    def installed(self) -> bool:
+        """Whether its package can be imported here; it is not imported to find out."""
+        return importlib.util.find_spec(self.package) is not None
+
+
+def _problem(benchmark: Benchmark) -> dict[str, Any]:
+    """The equation and its sources, as any solver needs them."""
+    medium = benchmark.case.medium
+    return {
+        "diffusion": medium.diffusion,
+        "sigma_a": medium.sigma_a,
+        "robin": 1.0 / (2.0 * medium.boundary_factor),
+        "eta": medium.eta,
+        "points": np.array([point for point, _ in benchmark.sources]),
+        "powers": np.array([power for _, power in benchmark.sources]),
+        "lengths_to_resolve": benchmark.lit[1],
+        "repeats": benchmark.repeats,
+        "repeat_seconds": REPEAT_SECONDS,
+    }
+
+
+def run_peer(script: str, job: dict[str, Any]) -> dict[str, Any]:
+    """Run a script of this folder on a job in a process of its own, and return what it leaves.
+
+    Raises
+    ------
+    RunError
+        If it fails, crashes, or takes too long.
+    """
+    with scratch("peer") as folder:
+        job_path, result_path = folder / "job.npz", folder / "result.npz"
+        np.savez(job_path, **job)
+        # -P: modules of this folder must not be imported in place of others of the same name.
+        command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
+        try:
+            done = run_child(command, folder, TIME_LIMIT)
+        except subprocess.TimeoutExpired as error:
+            raise RunError(f"stopped after {TIME_LIMIT:g} s") from error
+        if done.returncode != 0 or not result_path.exists():
+            said = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            raise RunError(f"signal {-done.returncode}" if done.returncode < 0 else said)
+        with np.load(result_path) as data:
+            return {key: data[key] for key in data.files}
+
+
+def _exact_shape(benchmark: Benchmark) -> dict[str, Any]:
+    """The shape of the body, as ``_peer_ngsolve.py`` makes it."""
+    shape = benchmark.shape
+    if isinstance(shape, Sphere):
+        return {"kind": "sphere", "sizes": [shape.radius], "center": shape.center}
+    if isinstance(shape, Torus):
+        return {"kind": "torus", "sizes": [shape.major, shape.minor], "center": shape.center}
+    assert isinstance(shape, Slab)
+    return {"kind": "slab", "sizes": [shape.width, shape.depth], "center": (0.0, 0.0, 0.0)}
+
+
+def _ngsolve(order: int) -> Callable[[Benchmark, float], Outcome]:
+    """Netgen on the exact shape, graded towards the source; curved elements from the second order on."""
+
+    def run(benchmark: Benchmark, grading: float) -> Outcome:
+        surface = benchmark.case.surface
+        job = {
+            "order": order,
+            "resolution": grading,
+            "longest": LONGEST * 2.0 * surface.volume / surface.area,
+            "samples": benchmark.samples.points,
+        }
+        result = run_peer("_peer_ngsolve.py", _problem(benchmark) | _exact_shape(benchmark) | job)
+        return Outcome(result["exitance"], float(result["seconds"]), int(result["unknowns"]), int(result["tetrahedra"]))
+
+    return run
+
+
+def _redbird(benchmark: Benchmark, longest: float) -> Outcome:
+    """Its solver on this project's graded mesh, whose seconds count."""
+    surface = replace(benchmark.case.surface)
+    started = time.perf_counter()
+    mesh = graded_mesh(benchmark, surface, longest)
+    meshing = time.perf_counter() - started
+    job = {"nodes": mesh.points, "tetrahedra": mesh.tetrahedra}
+    result = run_peer("_peer_redbird.py", _problem(benchmark) | job)
+    field = LinearFluence(mesh, surface, benchmark.case.medium, result["fluence"])
+    return Outcome(
+        field.exitance_on(surface.project(benchmark.samples.points)[0]),
+        meshing + float(result["seconds"]),
+        len(mesh.points),
+        len(mesh.tetrahedra),
+    )
+
+
+def _in_points(benchmark: Benchmark) -> bool:
+    return benchmark.in_points
+
+
+def _has_exact_shape(benchmark: Benchmark) -> bool:
+    return benchmark.in_points and isinstance(benchmark.shape, Sphere | Slab | Torus)
+
+
+PEERS = (
+    Peer(
+        "NGSolve",
+        "ngsolve",
+        (
+            Method("NGSolve P1", "grading", (0.3, 0.2, 0.15, 0.1, 0.07), _ngsolve(1), _has_exact_shape),
+            Method("NGSolve P2", "grading", (0.5, 0.3, 0.2, 0.15, 0.1), _ngsolve(2), _has_exact_shape, quick=0),
+            Method("NGSolve P3", "grading", (0.5, 0.3, 0.2, 0.15), _ngsolve(3), _has_exact_shape),
+        ),
+    ),
+    Peer(
+        "redbirdpy",
+        "redbirdpy",
+        (Method("redbirdpy P1", "longest edge over distance", GRADINGS[:-1], _redbird, _in_points),),
+    ),
+)

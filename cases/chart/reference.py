@@ -1,0 +1,96 @@
+"""The true exitance of a case: a closed form, or else a far finer run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.cases.case import Case
+from tetlux.cases.chart.samples import Samples, project_to_sphere
+from tetlux.fem.exact.registry import closed_forms
+from tetlux.fem.lights import Deposit
+from tetlux.fem.medium import Medium
+from tetlux.fem.solution import Solution
+from tetlux.fem.solve import solve
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.solids import Shape, Slab, Sphere
+
+# The far finer run that is the reference where there is no closed form: the first of these tolerances that is met,
+# or else the run that came closest.
+REFERENCE_TOLERANCES, REFERENCE_TETRAHEDRA = (0.001, 0.002, 0.005), 500_000
+QUICK_TOLERANCES = (0.01,)
+# Closed forms of a whole body, as people read them. That of a cylinder is of its side alone.
+DESCRIPTIONS: dict[type, str] = {
+    Sphere: "the same equation and boundary on the true sphere, solved in closed form",
+    Slab: "the same equation and boundary on the endless slab, solved in closed form; both faces, away from the rim",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """The true exitance at the samples.
+
+    Attributes
+    ----------
+    kind : {"closed form", "finer run"}
+    description : str
+        What it is, for people.
+    exitance : (n,) ndarray
+        At the samples, W/unit².
+    error : float
+        What is known of its own relative L2 error; 0 for a closed form.
+    """
+
+    kind: str
+    description: str
+    exitance: FloatArray
+    error: float = 0.0
+
+
+def closed_form_reference(
+    shape: Shape | None, medium: Medium, deposits: Sequence[Deposit], samples: Samples
+) -> tuple[Samples, Reference] | None:
+    """The solver's own model in closed form.
+
+    Returns
+    -------
+    tuple of Samples and Reference, or None
+        The samples where it holds, on the true shape. None if it is not known for this shape or light, or a source lies
+        too near to where it does not hold.
+    """
+    if type(shape) not in DESCRIPTIONS:
+        return None
+    if isinstance(shape, Sphere):
+        samples = project_to_sphere(samples, shape)
+    try:
+        form = next((f for f in closed_forms(shape, medium, deposits).values() if f.same_model), None)
+        if form is None:
+            return None
+        samples = samples.where(form.holds_at(samples.points))
+        return samples, Reference("closed form", DESCRIPTIONS[type(shape)], form.exitance(samples.points))
+    except InputError:
+        return None
+
+
+def finer_run_reference(case: Case, samples: Samples, *, quick: bool) -> Reference:
+    """A run of tetlux itself at the finest tolerance that it meets, or the best of its runs."""
+    best: Solution | None = None
+    for tolerance in QUICK_TOLERANCES if quick else REFERENCE_TOLERANCES:
+        solution = solve(
+            case.surface,
+            case.medium,
+            case.lights,
+            tolerance=tolerance,
+            most_tetrahedra=REFERENCE_TETRAHEDRA,
+            cache=False,
+        )
+        if best is None or solution.error_estimate < best.error_estimate:
+            best = solution
+        if best.error_estimate <= tolerance:
+            break
+    assert best is not None
+    size = f"{len(best.mesh.tetrahedra):,} tetrahedra"
+    description = f"tetlux itself on {size}, estimated error {best.error_estimate:.2%}"
+    exitance = np.asarray(best.exitance_at(samples.points))
+    return Reference("finer run", description, exitance, best.error_estimate)

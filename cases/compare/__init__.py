@@ -1,0 +1,1 @@
+"""Comparison of a run with closed forms, which `compare:` in a case file asks for."""

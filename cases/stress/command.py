@@ -1,0 +1,80 @@
+"""`tetlux stress`: scenarios to the edges and beyond, and a map of what breaks there."""
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from tetlux.cases.publish import check_writable
+from tetlux.cases.stress.files import FILES, write_map
+from tetlux.cases.stress.grid import PANELS
+from tetlux.cases.stress.panels import Panel
+from tetlux.cases.stress.report import as_markdown
+from tetlux.cases.stress.rules import violations
+from tetlux.cases.stress.trials import TIME_LIMIT, Trial, run_trials
+
+# Trials between two lines that say how far it is.
+PROGRESS = 50
+
+
+def stress(
+    out: Path,
+    *,
+    quick: bool = False,
+    panels: Sequence[Panel] = PANELS,
+    time_limit: float = TIME_LIMIT,
+    report: Callable[[str], None] = print,
+) -> int:
+    """Run the grid of scenarios; write ``stress.csv``, ``stress.md`` and ``stress.png``.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the three files.
+    quick : bool
+        Few values on each axis.
+    panels : sequence of Panel
+    time_limit : float
+        Seconds after which a trial counts as hung.
+    report : callable
+        Called with lines of text on the way, and with the map in words.
+
+    Returns
+    -------
+    int
+        0 if no rule is broken by a variant that may not, else 1.
+
+    Raises
+    ------
+    InputError
+        If `out` cannot be written to.
+    RunError
+        If the files cannot be written.
+    """
+    check_writable(out)
+    panels = [panel.quick() for panel in panels] if quick else panels
+    total = sum(len(panel.places()) * len(panel.variants) for panel in panels)
+    report(f"{total} runs on {len(panels)} pairs of axes")
+    trials: list[Trial] = []
+    # An empty folder, so that no mesh is that of an earlier version of the mesher.
+    with tempfile.TemporaryDirectory(prefix="tetlux-stress-") as meshes:
+        for trial in run_trials(panels, meshes=Path(meshes), time_limit=time_limit):
+            trials.append(trial)
+            if len(trials) % PROGRESS == 0:
+                report(f"{len(trials)} of {total}, {sum(map(bool, map(violations, trials)))} of them violations")
+    trials = _sort(trials, panels)
+    words = as_markdown(trials)
+    write_map(trials, words, out)
+    report(words)
+    report(f"written to {out}: {', '.join(FILES)}")
+    return 1 if any(map(violations, trials)) else 0
+
+
+def _sort(trials: list[Trial], panels: Sequence[Panel]) -> list[Trial]:
+    """Sort trials by their places on the map."""
+    names = [panel.name for panel in panels]
+
+    def key(trial: Trial) -> tuple[int, int, int]:
+        panel = trial.panel
+        return names.index(panel.name), panel.variants.index(trial.variant), panel.places().index((trial.x, trial.y))
+
+    return sorted(trials, key=key)

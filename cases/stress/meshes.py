@@ -1,0 +1,134 @@
+"""Meshes of a ball that are the same on every machine: layers of tetrahedra, good ones or with bad ones among them."""
+
+import numpy as np
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.shapes import sphere
+from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+
+# Nodes that are moved, at most. None is next to another, so that each makes a bad tetrahedron of its own.
+MOST_DEGRADED = 60
+HALVINGS = 40
+
+
+def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0) -> TetMesh:
+    """A ball of nested icospheres, the prisms between which are cut into three tetrahedra each.
+
+    Parameters
+    ----------
+    radius : float
+        Unit.
+    subdivisions : int
+        Of the icospheres: 2 gives 320 triangles.
+    layers : int
+        How many, evenly spaced; inside the last one all tetrahedra meet at the centre.
+    core : int
+        So many of them, the inner ones, are region 1.
+
+    Returns
+    -------
+    TetMesh
+    """
+    shell = sphere(1.0, subdivisions=subdivisions)
+    count = len(shell.points)
+    outward = shell.points / np.linalg.norm(shell.points, axis=1)[:, None]
+    shares = np.arange(layers, 0, -1) / layers
+    points = np.vstack([*(radius * share * outward for share in shares), np.zeros(3)])
+    # Prisms are cut by the order of their nodes, so that neighbours agree on the diagonals between them.
+    a, b, c = np.sort(shell.faces, axis=1).T
+    prism = np.concatenate(
+        [
+            np.column_stack([a, b, c, c + count]),
+            np.column_stack([a, b, b + count, c + count]),
+            np.column_stack([a, a + count, b + count, c + count]),
+        ]
+    )
+    middle = np.column_stack([shell.faces + (layers - 1) * count, np.full(len(shell.faces), layers * count)])
+    tetrahedra = np.vstack([*(prism + layer * count for layer in range(layers - 1)), middle])
+    regions = np.repeat(np.arange(layers), [len(prism)] * (layers - 1) + [len(middle)]) >= layers - core
+    return TetMesh(points, orient(points, tetrahedra), regions=regions.astype(np.int64))
+
+
+def orient(points: FloatArray, tetrahedra: IntArray) -> IntArray:
+    """Reorder corners so that all volumes are positive."""
+    turned = tetrahedra.copy()
+    inverted = tetrahedron_volumes(points, tetrahedra) < 0
+    turned[inverted, :2] = tetrahedra[inverted][:, [1, 0]]
+    return turned
+
+
+def degrade(mesh: TetMesh, quality: float) -> TetMesh:
+    """Make some tetrahedra of a mesh bad: slivers and needles, in turn.
+
+    An inner node is moved towards the opposite face of one of its tetrahedra (a sliver), or along one of its edges (a
+    needle), as far as it takes to make that tetrahedron as bad as is asked for and leave no other worse.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    quality : float
+        That of the worst tetrahedra, see `TetMesh.quality`.
+
+    Returns
+    -------
+    TetMesh
+    """
+    points, fixed = mesh.points.copy(), _fixed_nodes(mesh)
+    moved = np.zeros(len(points), dtype=bool)
+    done = 0
+    for node, cells in enumerate(_cells_of_nodes(mesh)):
+        if done == MOST_DEGRADED:
+            break
+        near = mesh.tetrahedra[cells]
+        if fixed[node] or moved[near].any():
+            continue
+        place = _bad_place(points, near, node, quality, sliver=done % 2 == 0)
+        if place is not None:
+            points[node], moved[node] = place, True
+            done += 1
+    return TetMesh(points, mesh.tetrahedra, mesh.unit, mesh.regions)
+
+
+def _cells_of_nodes(mesh: TetMesh) -> list[list[int]]:
+    around: list[list[int]] = [[] for _ in mesh.points]
+    for cell, corners in enumerate(mesh.tetrahedra.tolist()):
+        for corner in corners:
+            around[corner].append(cell)
+    return around
+
+
+def _fixed_nodes(mesh: TetMesh) -> BoolArray:
+    """Nodes on the boundary and between regions, (n,)."""
+    fixed = np.zeros(len(mesh.points), dtype=bool)
+    fixed[mesh.boundary_nodes] = True
+    fixed[mesh.interfaces[0]] = True
+    return fixed
+
+
+def _bad_place(points: FloatArray, near: IntArray, node: int, quality: float, *, sliver: bool) -> FloatArray | None:
+    """Where to move a node of tetrahedra `near` it for one of them to be a sliver, or a needle; None if nowhere."""
+    for cell in near:
+        others = points[cell[cell != node]]
+        place = _place(points, near, node, others.mean(axis=0) if sliver else others[0], quality)
+        if place is not None:
+            return place
+    return None
+
+
+def _place(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quality: float) -> FloatArray | None:
+    """Move a node towards `aim` until the worst tetrahedron has the quality wanted; None if that is never so."""
+    local = np.unique(near)
+    cells = np.searchsorted(local, near)
+    own = int(np.searchsorted(local, node))
+
+    def worst(share: float) -> float:
+        trial = points[local].copy()
+        trial[own] += share * (aim - trial[own])
+        return float(TetMesh(trial, cells).quality.min()) if (tetrahedron_volumes(trial, cells) > 0).all() else 0.0
+
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if worst(middle) > quality else (low, middle)
+    # A tetrahedron may be turned inside out before any is bad.
+    return np.asarray(points[node] + low * (aim - points[node])) if worst(low) < 2.0 * quality else None

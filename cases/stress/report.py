@@ -1,0 +1,116 @@
+"""The stress map in words: the worst figures by panel and variant, what breaks where, and what is refused."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+
+from tetlux.cases.stress.measure import Diagnostics
+from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.rules import broken_rules, is_warned, violations
+from tetlux.cases.stress.trials import Trial
+
+HEADS = (
+    "panel",
+    "method",
+    "ran",
+    "refused",
+    "failed",
+    "warned",
+    "lowest fluence",
+    "overshoot",
+    "ledger",
+    "residual",
+    "iterations",
+    "largest error",
+    "seconds",
+    "violations",
+)
+
+
+NOTE = (
+    "Lowest fluence is by the largest, where the source has no first moment; overshoot is over the bound of the "
+    "maximum principle; the ledger is by the incident power; largest error is the relative L2 error of the exitance "
+    "against a closed form; iterations of 0 are direct solutions."
+)
+
+
+def as_markdown(trials: Sequence[Trial]) -> str:
+    """The table and what is to be read with it, as Markdown."""
+    groups = list(_groups(trials))
+    lines = [f"| {' | '.join(HEADS)} |", "|---|---|" + "---:|" * (len(HEADS) - 2)]
+    lines += [f"| {' | '.join(_row(group))} |" for group in groups]
+    lines += ["", NOTE, "", "## Violations", ""]
+    found = [f"* {_place(one)}: {rule}, {figure}." for one in trials for rule, figure in violations(one).items()]
+    lines += found or ["None."]
+    lines += ["", "## What breaks where", ""]
+    breaking = [line for group in groups for line in _ranges(group)]
+    lines += breaking or ["Nothing."]
+    lines += ["", "## Refused", ""]
+    refused = Counter((trial.panel.name, trial.message) for trial in trials if trial.outcome == "refused")
+    lines += [f"* {panel}, {_times(count)}: {message}" for (panel, message), count in refused.items()] or ["Nothing."]
+    return "\n".join(lines) + "\n"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
+
+
+def _groups(trials: Sequence[Trial]) -> Iterator[list[Trial]]:
+    """Trials of one panel and one variant."""
+    for name in dict.fromkeys(trial.panel.name for trial in trials):
+        here = [trial for trial in trials if trial.panel.name == name]
+        for variant in dict.fromkeys(trial.variant.name for trial in here):
+            yield [trial for trial in here if trial.variant.name == variant]
+
+
+def _row(group: list[Trial]) -> list[str]:
+    outcomes = Counter(trial.outcome for trial in group)
+    found = [trial.diagnostics for trial in group if trial.diagnostics is not None]
+
+    def most(value: Callable[[Diagnostics], float | None], form: str = ".1e") -> str:
+        values = [each for one in found if (each := value(one)) is not None]
+        return format(max(values), form) if values else ""
+
+    lowest = [one.lowest for one in found if not one.may_be_negative]
+    errors = [one.error for one in found if one.error is not None]
+    return [
+        group[0].panel.name,
+        group[0].variant.name,
+        *(str(outcomes[outcome]) for outcome in ("ran", "refused", "failed")),
+        str(sum(map(is_warned, found))),
+        f"{min(lowest):.1e}" if lowest else "",
+        most(lambda one: one.overshoot),
+        most(lambda one: abs(one.ledger)),
+        most(lambda one: one.residual),
+        most(lambda one: one.iterations, "d"),
+        f"{max(errors):.2g}" if errors else "",
+        most(lambda one: one.seconds, ".1f"),
+        str(sum(bool(violations(trial)) for trial in group)) if group[0].variant.counts else "not counted",
+    ]
+
+
+def _ranges(group: list[Trial]) -> Iterator[str]:
+    """By rule: how many trials break it, and between which values of the axes."""
+    rules = dict.fromkeys(rule for trial in group for rule in broken_rules(trial))
+    for rule in rules:
+        here = [trial for trial in group if rule in broken_rules(trial)]
+        panel: Panel = group[0].panel
+        where = " and ".join(
+            _range(axis, values)
+            for axis, values in ((panel.x, [trial.x for trial in here]), (panel.y, [trial.y for trial in here]))
+        )
+        yield f"* {panel.name}, {group[0].variant.name}: {rule} in {len(here)} of {len(group)}, at {where}."
+
+
+def _range(axis: Axis, values: list[Value]) -> str:
+    numbers = [value for value in values if not isinstance(value, str)]
+    if not numbers:
+        return ", ".join(dict.fromkeys(map(str, values)))
+    low, high = min(numbers), max(numbers)
+    return f"{axis.name} {low:g}" if low == high else f"{axis.name} {low:g} to {high:g}"
+
+
+def _place(trial: Trial) -> str:
+    """The place of a trial on the map."""
+    values = ((trial.panel.x, trial.x), (trial.panel.y, trial.y))
+    where = ", ".join(_range(axis, [value]) for axis, value in values)
+    return f"{trial.panel.name}, {trial.variant.name}, at {where}"

@@ -1,0 +1,58 @@
+"""What must hold of every trial on the stress map."""
+
+import math
+from collections.abc import Iterator
+
+from tetlux.cases.stress.measure import Diagnostics
+from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.trials import Trial
+from tetlux.meshing.notes import codes_of
+
+# As shares: of the largest fluence; of the incident power; of a linear system's load; of the bound; of the largest
+# exitance.
+DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8
+# Codes of warnings that name a reason for an error of the discretisation, not of the model or the surface.
+REASONS = {
+    "tolerance-missed",
+    "fluence-negative",
+    "power-moved",
+    "exitance-negative",
+    "power-negative",
+    "source-depth-off",
+    "no-light-leaves",
+}
+
+
+def broken_rules(trial: Trial) -> dict[str, str]:
+    """The rules that a trial breaks, and by how much."""
+    if trial.diagnostics is None:
+        return {"failure": trial.message} if trial.outcome == "failed" else {}
+    found = trial.diagnostics
+    if not found.finite or not all(map(math.isfinite, (found.lowest, found.ledger, found.residual, found.estimate))):
+        return {"not a number": "in fluence, exitance or their sums"}
+    return dict(_broken_by(found))
+
+
+def _broken_by(found: Diagnostics) -> Iterator[tuple[str, str]]:
+    if found.lowest < -DIP and not found.may_be_negative:
+        yield "negative fluence", f"{found.lowest:.1e} of its maximum"
+    if found.overshoot is not None and found.overshoot > OVERSHOOT:
+        yield "maximum principle", f"fluence {found.overshoot:.1e} above its bound"
+    if abs(found.ledger) > LEDGER:
+        yield "ledger", f"{found.ledger:.1e} of the power is missing"
+    if found.residual > RESIDUAL:
+        yield "residual", f"{found.residual:.1e} of the load"
+    if found.scaling is not None and found.scaling > SCALING:
+        yield "scaling", f"{found.scaling:.1e} from the figures at scale 1"
+    if found.error is not None and not found.error <= TOLERANCE and not is_warned(found):
+        yield "silent error", f"{found.error:.2g} without a warning"
+
+
+def violations(trial: Trial) -> dict[str, str]:
+    """The rules that a trial breaks, if it is of a variant that may not."""
+    return broken_rules(trial) if trial.variant.counts else {}
+
+
+def is_warned(found: Diagnostics) -> bool:
+    """Whether a warning names a reason for an error of the solution."""
+    return not REASONS.isdisjoint(codes_of(found.warnings))

@@ -1,0 +1,36 @@
+"""Variants of the solver that the stress map compares."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Settings of the solver.
+
+    Attributes
+    ----------
+    name : str
+    options : dict
+        Keywords of `tetlux.fem.solve`.
+    adaptive : bool
+        Whether the mesh is refined until the estimated error is within the tolerance, where no mesh is given.
+    counts : bool
+        Whether a rule that it breaks is a violation; else it is there to be compared with.
+    """
+
+    name: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    adaptive: bool = True
+    counts: bool = False
+
+
+DEFAULT = Variant("default", counts=True)
+NOT_REFINED = Variant("default, not refined", adaptive=False, counts=True)
+NO_LIMITER = Variant("no limiter", {"limit": False})
+CONSISTENT = Variant("consistent mass, no limiter", {"mass": "consistent", "limit": False})
+FREE_SPACE = Variant("free space subtracted", {"subtract": "free-space"})
+NOTHING = Variant("nothing subtracted", {"subtract": "nothing"})
+# What bears on the sign of the fluence.
+OF_SIGN = (DEFAULT, NO_LIMITER, CONSISTENT)

@@ -1,0 +1,1 @@
+"""Radiative transfer by Monte Carlo: the walk of a photon packet, and batches of walks."""

@@ -1,0 +1,67 @@
+"""Exitance as a field over a surface, however it was found: what detectors, radiance and charts need of a solution."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from tetlux.fem.medium import Medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface import Surface
+from tetlux.meshing.tetmesh import TetMesh
+
+
+class ExitanceField(Protocol):
+    """Anything that knows the exitance of a surface; `tetlux.fem.Solution` is one."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface that light leaves through."""
+        ...
+
+    @property
+    def medium(self) -> Medium:
+        """The medium below it, whose refractive index light leaves."""
+        ...
+
+    def exitance_on(self, queries: FloatArray) -> FloatArray:
+        """Exitance (q,) at points (q, 3) that lie on the surface, W/unit²."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Dark:
+    """No light at all: what is read there shows whether a detector can be placed."""
+
+    surface: Surface
+    medium: Medium
+
+    def exitance_on(self, queries: FloatArray) -> FloatArray:
+        """Zeros (q,)."""
+        return np.zeros(len(queries))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFluence:
+    """Fluence by its values at the nodes of a mesh, linear between them, as another solver returns it.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+    surface : Surface
+        What the mesh stands for.
+    medium : Medium
+    fluence : (n,) ndarray
+        At the nodes, W/unit².
+    """
+
+    mesh: TetMesh
+    surface: Surface
+    medium: Medium
+    fluence: FloatArray
+
+    def exitance_on(self, queries: FloatArray) -> FloatArray:
+        """Exitance ``M = phi/(2A)`` (q,) on the facets nearest to points (q, 3), W/unit²."""
+        _, face, weights = self.mesh.closest_boundary(queries)
+        fluence = (weights * self.fluence[self.mesh.boundary_faces[face]]).sum(axis=1)
+        return np.asarray(fluence / (2.0 * self.medium.boundary_factor))

@@ -1,0 +1,71 @@
+"""`Note`: a sentence for the user that programs can tell apart by its code."""
+
+from collections.abc import Iterable
+
+
+class Note(str):
+    """A warning: a plain sentence, with a code that stays the same however the sentence is worded.
+
+    It is a `str`, so that it prints, compares and is written to JSON as the sentence.
+
+    Parameters
+    ----------
+    code : str
+        What it is about, such as ``"tolerance-missed"``.
+    text : str
+        The sentence.
+    region : str, optional
+        The region that it is about; the sentence then begins with it.
+    value : float, optional
+        The figure that it is about.
+
+    Examples
+    --------
+    >>> note = Note("low-albedo", "the reduced albedo is 0.5.", region="core", value=0.5)
+    >>> note
+    'core: the reduced albedo is 0.5.'
+    >>> note.code, note.region, note.value
+    ('low-albedo', 'core', 0.5)
+    >>> note.with_prefix("in red: ").code
+    'low-albedo'
+    """
+
+    code: str
+    text: str
+    region: str | None
+    value: float | None
+    prefix: str
+
+    def __new__(
+        cls, code: str, text: str, region: str | None = None, value: float | None = None, prefix: str = ""
+    ) -> "Note":
+        """See the class."""
+        note = super().__new__(cls, prefix + (text if region is None else f"{region}: {text}"))
+        note.code, note.text, note.region, note.value, note.prefix = code, text, region, value, prefix
+        return note
+
+    def __getnewargs__(self) -> tuple[str, str, str | None, float | None, str]:  # type: ignore[override]
+        return self.code, self.text, self.region, self.value, self.prefix
+
+    def in_region(self, name: str) -> "Note":
+        """The same note of a region of this name."""
+        return Note(self.code, self.text, name, self.value, self.prefix)
+
+    def with_prefix(self, prefix: str) -> "Note":
+        """The same note, its sentence after some words more."""
+        return Note(self.code, self.text, self.region, self.value, prefix + self.prefix)
+
+
+def codes_of(warnings: Iterable[str]) -> set[str]:
+    """Codes of those warnings that are notes."""
+    return {warning.code for warning in warnings if isinstance(warning, Note)}
+
+
+def prefixed(warning: str, prefix: str) -> str:
+    """A warning after some words more; a note stays one."""
+    return warning.with_prefix(prefix) if isinstance(warning, Note) else prefix + warning
+
+
+def in_region(warning: str, name: str) -> str:
+    """A warning of a region of this name; a note stays one."""
+    return warning.in_region(name) if isinstance(warning, Note) else f"{name}: {warning}"
