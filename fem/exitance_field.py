@@ -29,6 +29,15 @@ class ExitanceField(Protocol):
         ...
 
 
+class ResolvedField(ExitanceField, Protocol):
+    """An exitance that also knows how fine it is."""
+
+    @property
+    def resolution(self) -> tuple[FloatArray, FloatArray]:
+        """Points of the surface (n, 3), and how much space the exitance needs to change there, (n,), unit."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Dark:
     """No light at all: what is read there shows whether a detector can be placed."""

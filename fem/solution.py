@@ -13,7 +13,7 @@ from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface import Surface, longest_sides
 from tetlux.meshing.tetmesh import TetMesh
 
 
@@ -145,6 +145,12 @@ class Solution:
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
         return self._exitance_of(self._interpolated(queries, cells, corners, weights), transmitted)
+
+    @property
+    def resolution(self) -> tuple[FloatArray, FloatArray]:
+        """Middles of boundary facets (f, 3), and the longest sides of these, (f,), unit."""
+        facets = self.mesh.points[self.mesh.boundary_faces]
+        return np.asarray(facets.mean(axis=1)), longest_sides(facets)
 
     def valid_at(self, points: FloatArray) -> FloatArray:
         """How far the diffusion approximation is to be trusted at the points of the surface nearest to given points.

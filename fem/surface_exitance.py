@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.solution import ChargeSolution
-from tetlux.fem.solution import Solution
+from tetlux.fem.exitance_field import ResolvedField
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface import Surface, longest_sides
+from tetlux.meshing.surface import Surface
 
 # An edge is split if the exitance in its middle is off the mean of its ends by more than a share of the largest
 # exitance, or by a share of itself where it is not too dark to see; and while it is so much longer than the mesh's own
@@ -21,7 +20,7 @@ COARSER, FINER = 2.0, 0.05
 MOST_ADDED = 200_000
 
 
-def surface_exitance(solution: Solution | ChargeSolution) -> tuple[Surface, FloatArray]:
+def surface_exitance(solution: ResolvedField) -> tuple[Surface, FloatArray]:
     """Exitance at the vertices of the surface that was solved for.
 
     Triangles too large to show how the exitance changes are split: the given vertices come first, in their order.
@@ -39,7 +38,8 @@ def surface_exitance(solution: Solution | ChargeSolution) -> tuple[Surface, Floa
     given = solution.surface
     flat, faces, parents = given.points, given.faces, np.arange(len(given.faces))
     points, exitance = given.points, solution.exitance_on(given.points)
-    tree, size = _resolved(solution)
+    places, size = solution.resolution
+    tree = cKDTree(places)
     # Edges that were looked at and found short enough stay so.
     known = np.zeros((0, 2), dtype=np.int64)
     while len(flat) < len(given.points) + MOST_ADDED:
@@ -66,12 +66,3 @@ def surface_exitance(solution: Solution | ChargeSolution) -> tuple[Surface, Floa
         parents = parents[origin]
         points, exitance = np.vstack([points, added]), np.concatenate([exitance, solution.exitance_on(added)])
     return replace(given, points=points, faces=faces, repairs=(), warnings=()), exitance
-
-
-def _resolved(solution: Solution | ChargeSolution) -> tuple[cKDTree, FloatArray]:
-    """Points of the surface, and how much space the exitance needs to change there, (n,), unit."""
-    if isinstance(solution, ChargeSolution):
-        points, spacing = solution.resolution
-        return cKDTree(points), spacing
-    facets = solution.mesh.points[solution.mesh.boundary_faces]
-    return cKDTree(facets.mean(axis=1)), longest_sides(facets)
