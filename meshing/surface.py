@@ -13,7 +13,8 @@ from tetlux.meshing.rays import RayCaster
 
 # Triangles beyond which a surface is taken to be fine enough.
 MOST_BULGING = 20_000
-UNITS = ("nm", "um", "mm", "cm", "m", "in")
+MILLIMETRES = {"nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNITS = tuple(MILLIMETRES)
 
 
 def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
