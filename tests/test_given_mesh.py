@@ -92,6 +92,17 @@ def test_a_small_crack_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+def test_of_copies_with_several_labels_the_rarer_counts() -> None:
+    """Gmsh 2.2 writes a tetrahedron for each physical group that it is in: all, and a part of it."""
+    part = TETRAHEDRA[UPPER]
+    labels = np.r_[np.full(len(TETRAHEDRA), 1), np.full(len(part), 2)]
+    names = {1: "all", 2: "part", 3: "of triangles"}
+    mesh = mesh_from_arrays(POINTS, np.vstack([TETRAHEDRA, part[:, [1, 0, 2, 3]]]), labels=labels, names=names)
+    assert mesh.region_volumes == pytest.approx({1: 4000.0, 2: 4000.0})
+    assert mesh.labels == {1: "all", 2: "part"}
+    assert "given more than once were counted once, with the rarer label." in mesh.repairs[-1]
+
+
 @pytest.mark.parametrize("copies", [2, 3])
 def test_tetrahedra_given_several_times_count_once(copies: int) -> None:
     many = np.vstack([TETRAHEDRA] * copies)
