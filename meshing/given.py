@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.topology import distinct_rows
 from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.topology import distinct_rows
 
 # The largest coordinate, in whatever unit.
 LONGEST = 1e30
@@ -137,7 +137,7 @@ def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
         warnings=given.warnings,
         **({} if regions is None else {"regions": regions[mended.cells]}),
     )
-    found = check_facets(mesh)
+    found = check_facets(mesh, joined=True)
     if found:
         mesh = replace(mesh, warnings=(*given.warnings, *found))
     # So that it is not checked again when it is solved on.
@@ -251,7 +251,8 @@ def _without_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra
     kept = np.zeros(len(given.corners), dtype=bool)
     kept[order[chosen]] = True
     copies = int((~kept).sum())
-    which = "as the first of each" if (labels[order] == labels[order[chosen]][of_kind]).all() else "with the rarer label"
+    alike = (labels[order] == labels[order[chosen]][of_kind]).all()
+    which = "as the first of each" if alike else "with the rarer label"
     found = given.only(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
     check_overlap(found.corners, len(found.points))
     return found

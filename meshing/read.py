@@ -91,8 +91,8 @@ def _other_unit(path: Path, unit: str) -> tuple[str, ...]:
     if abs(factor - 1.0) < UNIT_ROUNDING:
         return ()
     return (
-        f"the file says that its unit is the {of_file}, and its numbers are taken as {unit}; give scale: {factor:g} for "
-        "its true size.",
+        f"the file says that its unit is the {of_file}, and its numbers are taken as {unit}; give scale: {factor:g} "
+        "for its true size.",
     )
 
 

@@ -56,9 +56,7 @@ def join_nested_rims(
     return result, overlapping
 
 
-def _around(
-    points: FloatArray, loops: Sequence[IntArray], vectors: FloatArray, parts: list[int], i: int
-) -> list[int]:
+def _around(points: FloatArray, loops: Sequence[IntArray], vectors: FloatArray, parts: list[int], i: int) -> list[int]:
     """The rims that lie round a rim, in its plane."""
     rim = points[loops[i]]
     low, high = rim.min(axis=0), rim.max(axis=0)

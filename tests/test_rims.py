@@ -41,9 +41,10 @@ def test_a_thick_pipe_gets_a_ring_at_each_end(count: int, slope: float) -> None:
 
 
 def test_several_bores_and_a_rod_in_one_of_them() -> None:
-    (low, faces), (other, _), rod = wall(3.0, 40), wall(5.0, 40), wall(2.0, 40)
-    points, triangles = joined(wall(20.0, 40), (low + [-8.0, 0.0, 0.0], faces), (other + [6.0, 0.0, 0.0], faces))
-    scene = np.vstack([points, rod[0] + [6.0, 0.0, 0.0]]), np.vstack([triangles, rod[1] + len(points)])
+    (narrow, faces), (wide, _), rod = wall(3.0, 40), wall(5.0, 40), wall(2.0, 40)
+    left, right = np.array([-8.0, 0.0, 0.0]), np.array([6.0, 0.0, 0.0])
+    points, triangles = joined(wall(20.0, 40), (narrow + left, faces), (wide + right, faces))
+    scene = np.vstack([points, rod[0] + right]), np.vstack([triangles, rod[1] + len(points)])
     closed = surface_from_arrays(*scene, holes="close")
     expected = 30.0 * (disc(20.0, 40) - disc(3.0, 40) - disc(5.0, 40) + disc(2.0, 40))
     assert closed.volume == pytest.approx(expected, rel=1e-6)
