@@ -139,6 +139,7 @@ def _environment(spec: EnvironmentSpec, brightest: float, channel: int, count: i
 def _region(spec: EmissionSpec, regions: Mapping[str, int | None]) -> int | None:
     if spec.region is None:
         return None
-    if spec.region not in regions:
-        raise InputError(f'there is no region "{spec.region}"; the regions here are {", ".join(regions)}.')
-    return regions[spec.region]
+    name = str(spec.region)
+    if name not in regions:
+        raise InputError(f'there is no region "{name}"; the regions here are {", ".join(regions)}.')
+    return regions[name]

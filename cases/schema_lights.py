@@ -101,7 +101,9 @@ class EmissionSpec(Section):
     """Light that the volume emits, as `tetlux.fem.Emission`."""
 
     density: Each = Field(description="W/unit³")
-    region: str | None = Field(None, description="name of a region, or body for what is outside all of them")
+    region: str | int | None = Field(
+        None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
+    )
 
 
 class LightSpec(Choice):

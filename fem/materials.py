@@ -4,7 +4,7 @@ import difflib
 
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import UNITS
+from tetlux.meshing.surface import MILLIMETRES
 
 Colours = tuple[float, float, float]
 
@@ -24,7 +24,6 @@ MATERIALS: dict[str, tuple[Colours, Colours]] = {
     "wholemilk": ((2.55, 3.21, 3.77), (0.0011, 0.0024, 0.014)),
 }
 ETA, ETA_OF_MARBLE = 1.3, 1.5
-MILLIMETRES = dict(zip(UNITS, (1e-6, 1e-3, 1.0, 10.0, 1000.0, 25.4), strict=True))
 
 
 def material(name: str, *, unit: str = "mm") -> tuple[Medium, Medium, Medium]:

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.merge import without_collapsed
 from tetlux.meshing.topology import Edges
 
 # Longer rims are triangulated over every second, third, ... vertex first: time goes with the cube (.3 s).
@@ -43,12 +44,23 @@ def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, Int
     faces : (f, 3) ndarray
         Turned as the triangles along the rim.
     """
-    rim = points[loop]
-    faces = triangulate_polygon(rim)[:, ::-1]
-    inner, faces = _refined(rim, faces) if len(loop) > 4 else (rim[:0], faces)
+    faces = triangulate_polygon(points[loop])[:, ::-1]
+    # A loop that joins rims names the ends of its bridge twice: these are one vertex, and the bridge is an inner edge.
+    names, place = np.unique(loop, return_inverse=True)
+    faces, rim = without_collapsed(place.reshape(-1)[faces])[0], points[names]
+    inner, faces = _refined(rim, _spacing(points, loop, names), faces) if len(loop) > 4 else (rim[:0], faces)
     inner = _membrane(rim, inner, faces)
-    names = np.concatenate([loop, first + np.arange(len(inner))])
-    return inner, names[faces]
+    return inner, np.concatenate([names, first + np.arange(len(inner))])[faces]
+
+
+def _spacing(points: FloatArray, loop: IntArray, names: IntArray) -> FloatArray:
+    """How long the edges of the rims are about each of the vertices `names` (r,), bridges left out."""
+    following = np.roll(loop, -1)
+    bridge = np.isin(loop * len(points) + following, following * len(points) + loop)
+    start, end = np.searchsorted(names, loop[~bridge]), np.searchsorted(names, following[~bridge])
+    length = np.linalg.norm(points[loop[~bridge]] - points[following[~bridge]], axis=1)
+    ends, lengths = np.concatenate([start, end]), np.concatenate([length, length])
+    return np.asarray(np.bincount(ends, lengths, len(names)) / np.bincount(ends, minlength=len(names)))
 
 
 def triangulate_polygon(corners: FloatArray) -> IntArray:
@@ -101,10 +113,8 @@ def _least_area(corners: FloatArray) -> IntArray:
     return np.array(faces, dtype=np.int64)
 
 
-def _refined(rim: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+def _refined(rim: FloatArray, size: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """New vertices within, as dense as those of the rim beside them, and the triangles of rim and new ones."""
-    step = np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1)
-    size = 0.5 * (step + np.roll(step, -1))
     points = rim
     for _ in range(ROUNDS):
         corners, wanted = points[faces], size[faces]

@@ -80,8 +80,8 @@ def conformity_of(mesh: TetMesh) -> tuple[str, ...]:
     return mesh.remembered(check_conformity, lambda: check_conformity(mesh))
 
 
-def check_facets(mesh: TetMesh) -> tuple[str, ...]:
-    """The part of `check_conformity` that looks at the boundary."""
+def check_facets(mesh: TetMesh, joined: bool = False) -> tuple[str, ...]:
+    """The part of `check_conformity` that looks at the boundary; `joined` if no two nodes are at one place."""
     against, inside = _covered_facets(mesh)
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:
@@ -102,7 +102,8 @@ def check_facets(mesh: TetMesh) -> tuple[str, ...]:
     raise InputError(
         f"parts touch without having their nodes in common: {figure} of the boundary face each other inside, and no "
         "light would pass there; mesh the parts together, so that they share the nodes between them (in gmsh with "
-        "BooleanFragments or Coherence), or give doubled nodes to mesh_from_arrays, which joins them."
+        "BooleanFragments or Coherence)"
+        + ("." if joined else ", or give doubled nodes to mesh_from_arrays, which joins them.")
     )
 
 

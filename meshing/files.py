@@ -157,7 +157,9 @@ def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":
         package = error.name or "another package"
         raise InputError(f"{path} needs {package}, which is not installed; save it as .vtu or .msh.") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
-        raise InputError(f"{path} is not a readable {path.suffix[1:].upper()} mesh; export it again.") from error
+        raise InputError(
+            f"{path} is not a readable {path.suffix[1:].upper()} mesh; export it again, or as .msh or .vtu."
+        ) from error
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:

@@ -13,6 +13,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.topology import distinct_rows
 
 # The largest coordinate, in whatever unit.
 LONGEST = 1e30
@@ -125,17 +126,18 @@ def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
     regions = None if given.labels is None else whole_numbers(given.labels, len(numbered.corners))
     if given.labels is not None and regions is None:
         raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
-    mended = _without_copies(_turned(_without_flat(_joined(numbered))))
+    mended = _without_copies(_turned(_without_flat(_joined(numbered))), regions)
+    present = {} if regions is None else dict.fromkeys(np.unique(regions[mended.cells]).tolist())
     mesh = TetMesh(
         mended.points,
         mended.corners,
         unit,
-        labels=dict(given.names),
+        labels={label: name for label, name in given.names.items() if label in present},
         repairs=(*given.repairs, *mended.repairs),
         warnings=given.warnings,
         **({} if regions is None else {"regions": regions[mended.cells]}),
     )
-    found = check_facets(mesh)
+    found = check_facets(mesh, joined=True)
     if found:
         mesh = replace(mesh, warnings=(*given.warnings, *found))
     # So that it is not checked again when it is solved on.
@@ -238,15 +240,20 @@ def _turned(given: _Tetrahedra) -> _Tetrahedra:
     )
 
 
-def _without_copies(given: _Tetrahedra) -> _Tetrahedra:
-    """Each tetrahedron once."""
+def _without_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
+    """Each tetrahedron once: of copies the one with the label that the fewest have, as parts of a whole have it."""
     if not doubly_covered_faces(given.corners, len(given.points)):
         return given
-    first = np.zeros(len(given.corners), dtype=bool)
-    first[np.unique(np.sort(given.corners, axis=1), axis=0, return_index=True)[1]] = True
-    found = given.only(
-        first, f"{(~first).sum():,} tetrahedra that are given more than once were counted once, as the first of each."
-    )
+    labels = np.zeros(len(given.corners), dtype=np.int64) if regions is None else regions[given.cells]
+    _, kind, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(sizes[kind.reshape(-1)], kind="stable")
+    chosen, of_kind = distinct_rows(np.sort(given.corners[order], axis=1))
+    kept = np.zeros(len(given.corners), dtype=bool)
+    kept[order[chosen]] = True
+    copies = int((~kept).sum())
+    alike = (labels[order] == labels[order[chosen]][of_kind]).all()
+    which = "as the first of each" if alike else "with the rarer label"
+    found = given.only(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
     check_overlap(found.corners, len(found.points))
     return found
 

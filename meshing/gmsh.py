@@ -3,6 +3,7 @@
 Unlike meshio this reads files in which only some entities have a physical group.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,7 +74,8 @@ def read_gmsh(path: Path) -> RawMesh:
     several = sum(len(found) > 1 for (dimension, _), found in groups.items() if dimension == 3)
     notes: tuple[str, ...] = ()
     if several:
-        sentence = f"{several} volumes are in several physical groups; the first of each is its label."
+        which = "a volume is" if several == 1 else f"{several} volumes are"
+        sentence = f"{which} in several physical groups; the smallest group is the label."
         notes = (Note("labels-overlap", sentence, value=several),)
     solid = [i for i, block in enumerate(elements) if block.kind == "tetra"]
     grouped = any(physical[i].any() for i in solid)
@@ -158,13 +160,21 @@ def _nodes_4(words: Numbers, section: bytes) -> tuple[IntArray, FloatArray]:
 
 def _elements_4(words: Numbers, section: bytes, groups: dict[tuple[int, int], list[int]]) -> list[_Elements]:
     words.start(section)
-    found = []
+    blocks = []
+    sizes: Counter[tuple[int, int]] = Counter()
     for _ in range(int(words.take(4, "u")[0])):
         dimension, entity, kind = words.take(3, "i").tolist()
         count = int(words.take(1, "u")[0])
         name, nodes = _kind(kind)
         rows = words.take((1 + nodes) * count, "u").reshape(count, 1 + nodes)
-        group = next(iter(groups.get((dimension, entity), [])), 0)
+        blocks.append((dimension, entity, name, rows))
+        sizes.update({(dimension, group): count for group in groups.get((dimension, entity), [])})
+    found = []
+    for dimension, entity, name, rows in blocks:
+        # Of groups that overlap, such as a whole and its part, the part says more.
+        of_entity = groups.get((dimension, entity), [])
+        _, group = min(((sizes[dimension, each], each) for each in of_entity), default=(0, 0))
+        count = len(rows)
         found.append(_Elements(name, rows[:, 0], np.full(count, entity), np.full(count, group), rows[:, 1:]))
     return found
 

@@ -7,6 +7,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.caps import cap
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.rims import join_nested_rims
 from tetlux.meshing.surface import place_words, triangle_areas
 from tetlux.meshing.topology import Edges, boundary_loops
 
@@ -17,12 +18,20 @@ LARGEST_HOLE = 0.05
 SLIT = 1e-4
 # Triangles do not join if more edges than both of these belong to one triangle only: in all, and per triangle.
 MOST_RIMS = (300, 0.25)
+# Unless they form rims of this many edges on average, as those of a tube of long triangles do.
+LONG_RIM = 12
 # Caps that are described one by one.
 DESCRIBED = 5
 
 
 def close_holes(
-    points: FloatArray, faces: IntArray, name: str, unit: str, holes: Holes, repairs: list[str]
+    points: FloatArray,
+    faces: IntArray,
+    name: str,
+    unit: str,
+    holes: Holes,
+    repairs: list[str],
+    warnings: list[str],
 ) -> tuple[FloatArray, IntArray]:
     """Cap holes, small ones or all, and say so.
 
@@ -34,8 +43,8 @@ def close_holes(
         Used in messages.
     holes : "small", "close" or "refuse"
         Which holes are capped: those that leave no choice (narrow ones, slits, those of three edges), all, or none.
-    repairs : list of str
-        Sentences are added to it.
+    repairs, warnings : list of str
+        Sentences are added to them.
 
     Returns
     -------
@@ -47,8 +56,8 @@ def close_holes(
         If a hole is left open.
     """
     edges = Edges(faces)
-    _check_joined(edges, len(faces), name)
     loops = boundary_loops(edges)
+    _check_joined(edges, loops, len(faces), name)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     small = [_is_small(points[loop], diagonal) for loop in loops]
     if holes == "refuse" and loops:
@@ -61,6 +70,15 @@ def close_holes(
             f'{_largest(name, points, wide)}; cap it with surface.holes: close (in Python holes="close"), or close '
             "it in a mesh editor."
         )
+    loops, overlapping = join_nested_rims(points, faces, loops)
+    if overlapping:
+        places = ", ".join(_middle(points, loop) for loop in overlapping[:DESCRIBED])
+        warnings.append(
+            f"holes lie within holes around {places}, and each has a cap of its own; if they are the two sides of a "
+            "wall, make the winding of its triangles consistent in a mesh editor, and a ring closes it."
+        )
+    small = [_is_small(points[loop], diagonal) for loop in loops]
+    wide = [loop for loop, is_small in zip(loops, small, strict=True) if not is_small]
     new_points, new_faces, count = [points], [faces], len(points)
     for loop in loops:
         inner, added = cap(points, loop, count)
@@ -93,9 +111,9 @@ def check_closed(faces: IntArray, name: str) -> None:
         )
 
 
-def _check_joined(edges: Edges, count: int, name: str) -> None:
+def _check_joined(edges: Edges, loops: list[IntArray], count: int, name: str) -> None:
     rims = int((edges.triangles == 1).sum())
-    if rims > max(MOST_RIMS[0], MOST_RIMS[1] * count):
+    if rims > max(MOST_RIMS[0], MOST_RIMS[1] * count) and rims < LONG_RIM * len(loops):
         raise InputError(
             f"{name}: the surface is open: {rims:,} of {len(edges.triangles):,} edges belong to one triangle only, as "
             "if its triangles did not join; merge its vertices by distance in a mesh editor."

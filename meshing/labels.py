@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.given import whole_numbers
 from tetlux.meshing.gmsh import ENTITY, PHYSICAL
@@ -135,7 +135,11 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
     """Labels by named sets of cells, numbered from 1 in their order; of several the smallest set counts."""
     sizes = [len(raw.blocks[i][1]) for i in raw.tetrahedra]
     members = {name: _members(parts, raw.tetrahedra, sizes) for name, parts in raw.sets.items()}
-    solid = {name: inside for name, inside in members.items() if inside.any()}
+    solid: dict[str, BoolArray] = {}
+    for name, inside in sorted(members.items(), key=lambda item: _made_up(item[0])):
+        # A set by another name is no other set.
+        if inside.any() and not any((inside == other).all() for other in solid.values()):
+            solid[name] = inside
     if not solid:
         return Labels()
     values = np.zeros(sum(sizes), dtype=np.int64)
@@ -154,7 +158,12 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
     return Labels(values, names, tuple(notes))
 
 
-def _members(parts: object, blocks: list[int], sizes: list[int]) -> "np.ndarray[tuple[int], np.dtype[np.bool_]]":
+def _made_up(name: str) -> bool:
+    """Whether gmsh called a set so by itself; of two names for one set it is the worse."""
+    return name.startswith("Volume") and name[len("Volume") :].isdecimal()
+
+
+def _members(parts: object, blocks: list[int], sizes: list[int]) -> BoolArray:
     """Which tetrahedra are in a set, given as meshio does: the numbers of its cells in each block."""
     inside = []
     for block, size in zip(blocks, sizes, strict=True):

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # A line closer to a triangle's plane than this, by the sine of the angle, runs along it.
 PARALLEL = 1e-9
@@ -40,6 +40,20 @@ class ClosestPoint:
             nearest[i] = point
             faces[i] = int(face)
         return nearest, faces
+
+    def within(self, queries: FloatArray, distance: float) -> BoolArray:
+        """Whether each of the queries (q, 3) is no farther from the soup than a distance; quick where that is short."""
+        from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
+        from vtkmodules.vtkCommonDataModel import vtkGenericCell  # noqa: PLC0415
+
+        point, cell = [0.0, 0.0, 0.0], vtkGenericCell()
+        face: Any = reference(0)
+        sub: Any = reference(0)
+        distance2: Any = reference(0.0)
+        find = self._locator.FindClosestPointWithinRadius
+        return np.array(
+            [find(query, distance, point, cell, face, sub, distance2) > 0 for query in queries.tolist()], dtype=bool
+        )
 
 
 def cell_locator(points: FloatArray, faces: IntArray, per_bucket: int = 10) -> Any:

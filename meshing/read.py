@@ -1,6 +1,7 @@
 """Surface files: STL, OBJ, PLY, OFF, GLB, GLTF and 3MF."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +11,13 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.formats.obj import read_obj
 from tetlux.meshing.formats.off import read_off
 from tetlux.meshing.formats.ply import read_ply
-from tetlux.meshing.formats.scene import read_scene
+from tetlux.meshing.formats.scene import read_scene, unit_of_3mf
 from tetlux.meshing.formats.stl import read_stl
 from tetlux.meshing.holes import Holes
 from tetlux.meshing.paths import exists, is_file, is_folder
 from tetlux.meshing.quiet import quiet
 from tetlux.meshing.repair import surface_from_arrays
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface import MILLIMETRES, Surface
 
 READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
     ".stl": read_stl,
@@ -24,6 +25,8 @@ READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
     ".ply": read_ply,
     ".off": read_off,
 }
+# Units whose ratio differs from 1 by less than this are one unit.
+UNIT_ROUNDING = 1e-9
 SUFFIXES = (*READERS, ".glb", ".gltf", ".3mf")
 
 
@@ -76,7 +79,21 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
         raise InputError(
             f"{path} is not a readable {path.suffix.lstrip('.').upper()} mesh{beside}; export it again."
         ) from error
-    return surface_from_arrays(points * scale, faces, unit=unit, name=path.name, holes=holes)
+    surface = surface_from_arrays(points * scale, faces, unit=unit, name=path.name, holes=holes)
+    said = _other_unit(path, unit) if path.suffix.lower() == ".3mf" and scale == 1.0 else ()
+    return replace(surface, warnings=(*surface.warnings, *said)) if said else surface
+
+
+def _other_unit(path: Path, unit: str) -> tuple[str, ...]:
+    """A sentence if a 3MF file says that it is in another unit than the one that it is read in."""
+    of_file, millimetres = unit_of_3mf(path)
+    factor = millimetres / MILLIMETRES[unit]
+    if abs(factor - 1.0) < UNIT_ROUNDING:
+        return ()
+    return (
+        f"the file says that its unit is the {of_file}, and its numbers are taken as {unit}; give scale: {factor:g} "
+        "for its true size.",
+    )
 
 
 def _load(path: Path) -> tuple[FloatArray, IntArray]:

@@ -225,7 +225,7 @@ def _on(points: FloatArray, surface: Surface, near: float) -> BoolArray:
     """Whether each of the points (q, 3) lies on the surface."""
     low, high = _box(surface)
     on = np.asarray(((points >= low - near) & (points <= high + near)).all(axis=1))
-    on[on] = np.linalg.norm(surface.closest(points[on])[0] - points[on], axis=1) <= near
+    on[on] = surface.near(points[on], near)
     return on
 
 

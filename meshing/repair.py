@@ -76,7 +76,7 @@ def surface_from_arrays(
     warnings: list[str] = []
     rounding = _rounding(points)
     points, faces = _joined(points, faces, name, rounding, repairs)
-    points, faces = close_holes(points, faces, name, unit, holes, repairs)
+    points, faces = close_holes(points, faces, name, unit, holes, repairs, warnings)
     # A triangle that hangs loose was closed by itself turned over.
     points, faces = compact(points, without_pairs(faces))
     _check_solid(points, faces, name, rounding, least=4)

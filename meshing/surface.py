@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.proximity import ClosestPoint, cross_segments, winding_number
@@ -14,7 +14,8 @@ from tetlux.meshing.solids import Shape, lies_on
 
 # Triangles beyond which a surface is taken to be fine enough.
 MOST_BULGING = 20_000
-UNITS = ("nm", "um", "mm", "cm", "m", "in")
+MILLIMETRES = {"nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNITS = tuple(MILLIMETRES)
 
 
 def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -126,6 +127,10 @@ class Surface:
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         """Nearest points of the surface (q, 3) and the faces they lie on (q,), for queries (q, 3)."""
         return self._closest(queries)
+
+    def near(self, queries: FloatArray, distance: float) -> BoolArray:
+        """Whether each of the queries (q, 3) is no farther from the surface than a distance."""
+        return self._closest.within(queries, distance)
 
     @cached_property
     def _patches(self) -> CurvedPatches:

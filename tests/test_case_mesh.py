@@ -85,7 +85,7 @@ def test_check_describes_the_mesh(path: Path, capsys: pytest.CaptureFixture[str]
 def test_channels_sweeps_and_emission(path: Path) -> None:
     path.write_text(
         LABELLED.replace("sigma_a: 0.01", "sigma_a: [0.01, 0.02]")
-        + "lights: [{emission: {density: 1, region: bone}}, {emission: {density: 1, region: '3'}}]\n"
+        + "lights: [{emission: {density: 1, region: bone}}, {emission: {density: 1, region: 3}}]\n"
         + "sweep: {mesh.labels.skin.sigma_a: [0.1, 0.2], mesh.labels.7.sigma_s_prime: [1.5, 2.5], mesh.scale: [1, 2]}\n"
     )
     cases = load_cases(path)

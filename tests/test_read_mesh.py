@@ -89,7 +89,7 @@ def test_gmsh_files_bring_their_groups_and_names(name: str, tmp_path: Path) -> N
     assert halves(mesh)
     assert mesh.labels == NAMES
     assert mesh.unit == "cm"
-    several = ("1 volumes are in several physical groups; the first of each is its label.",)
+    several = ("a volume is in several physical groups; the smallest group is the label.",)
     assert mesh.warnings == (several if name == "new.msh" else ())
     assert read_mesh(path, scale=2.0).volume == pytest.approx(64.0)
 
@@ -106,6 +106,13 @@ def test_gmsh_files_without_groups(tmp_path: Path) -> None:
     assert mesh.warnings == ("24 tetrahedra are in no physical group; their label is 0.",)
     gmsh_22(path, binary=False, labels=0 * LABELS)
     assert read_mesh(path).warnings == ("it has no physical groups of volumes; all tetrahedra are of label 0.",)
+
+
+def test_gmsh_groups_that_overlap(tmp_path: Path) -> None:
+    """A group of all and one of a part of it: the part is not lost."""
+    path = tmp_path / "a.msh"
+    gmsh_41(path, physical={1: [3, 7], 2: [3]})
+    assert halves(read_mesh(path))
 
 
 def test_gmsh_files_that_cannot_be_read(tmp_path: Path) -> None:
@@ -175,6 +182,13 @@ def test_medit_and_abaqus(tmp_path: Path) -> None:
     mesh = read_mesh(tmp_path / "a.inp")
     assert mesh.labels == {1: "Bone", 2: "Muscle"}
     assert mesh.region_volumes == pytest.approx({1: 4.0, 2: 4.0})
+    # Gmsh writes each physical group beside the volume that it is of.
+    volumes = "\n".join(lines).replace("Bone", "Volume1").replace("Muscle", "Volume2")
+    numbers = ", ".join(str(i + 1) for i in np.flatnonzero(np.equal(LABELS, 7)))
+    (tmp_path / "a.inp").write_text(f"{volumes}\n*ELSET, ELSET=Bone\n{numbers}\n*END STEP\n")
+    mesh = read_mesh(tmp_path / "a.inp")
+    assert mesh.labels == {1: "Bone", 2: "Volume2"}
+    assert mesh.warnings == ()
 
 
 def nirfast(folder: Path, regions: Sequence[float] | None, first: int = 1, stem: str = "head.v2") -> Path:

@@ -424,3 +424,15 @@ def test_distances_from_shapes(
 ) -> None:
     places = np.array([inside, outside])
     assert shape.distance(places[:, :3]) == pytest.approx(places[:, 3], rel=1e-12)
+
+
+@pytest.mark.parametrize("distance", [1e-5, 0.1, 5.0])
+def test_what_is_near_is_what_the_nearest_point_says(distance: float) -> None:
+    surface = box((20.0, 20.0, 1.0))
+    random = np.random.default_rng(0)
+    weights = random.dirichlet([1.0, 1.0, 1.0], 200)
+    corners = surface.points[surface.faces[random.integers(len(surface.faces), size=200)]]
+    queries = np.einsum("qi,qij->qj", weights, corners) + random.normal(size=(200, 3)) * distance
+    near = surface.near(queries, distance)
+    assert 0 < near.sum() < 200
+    assert (near == (np.linalg.norm(surface.closest(queries)[0] - queries, axis=1) <= distance)).all()

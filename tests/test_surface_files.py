@@ -4,6 +4,7 @@ import json
 import logging
 import struct
 import warnings
+import zipfile
 from pathlib import Path
 
 import meshio
@@ -132,11 +133,32 @@ def binary_stl(extra: bytes = b"", head: bytes = b"", claimed: int | None = None
         pytest.param(exported("stl_ascii"), id="text"),
         pytest.param(exported("stl_ascii").replace(b"\n", b"\r\n"), id="text with CRLF"),
         pytest.param(b"\n " + exported("stl_ascii").upper(), id="capitals"),
+        pytest.param(b" ".join(exported("stl_ascii").split()), id="one line"),
         pytest.param(b"solid a vertex of a facet\nendsolid\n" + exported("stl_ascii"), id="several solids, named"),
     ],
 )
 def test_stl_in_every_spelling(data: bytes) -> None:
     assert volume(read_stl(data)) == pytest.approx(BALL.volume, rel=1e-6)
+
+
+def test_stl_that_claims_nothing_says_so() -> None:
+    with pytest.raises(InputError, match="claims no triangles and holds 16,000 bytes of them"):
+        read_stl(binary_stl(claimed=0))
+
+
+def test_3mf_in_another_unit_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "ball.3mf"
+    path.write_bytes(exported("3mf"))
+    assert read_surface(path).warnings == ()
+    with zipfile.ZipFile(path) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in parts.items():
+            archive.writestr(name, content.replace(b'unit="millimeter"', b'unit="inch"'))
+    assert read_surface(path).warnings == (
+        "the file says that its unit is the inch, and its numbers are taken as mm; give scale: 25.4 for its true size.",
+    )
+    assert read_surface(path, unit="in").warnings == read_surface(path, scale=25.4).warnings == ()
 
 
 def test_stl_that_was_cut_says_how_much_is_there(tmp_path: Path) -> None:
@@ -185,6 +207,13 @@ def test_text_ply_of_polygons() -> None:
         read_ply(ply_head("ascii", lines) + "\n".join(rows[:-1]).encode())
 
 
+def test_ply_whose_comment_names_the_last_line_of_the_head() -> None:
+    data = ply_head("binary_little_endian", PLACES + "element tristrips 1\nproperty list int int vertex_indices\n")
+    data += CORNERS.astype("<f8").tobytes() + struct.pack("<5i", 4, 0, 1, 2, 3)
+    for head in (b"ply\ncomment no end_header yet\n", b"ply\nobj_info\nend_header_of mine\n"):
+        assert len(read_ply(data.replace(b"ply\n", head, 1).replace(b"end_header\n\0", b"end_header \n\0", 1))[1]) == 2
+
+
 @pytest.mark.parametrize("lists", [1, 3])
 def test_ply_of_triangle_strips(lists: int) -> None:
     """A cube: a strip ends by -1 or with its list; corners named twice make no triangle."""
@@ -210,6 +239,8 @@ def test_ply_of_triangle_strips(lists: int) -> None:
         b"COFF\n8 6 0\n",
         b"NOFF\n8 6 0\n",
         b"STCNOFF\n8 6 0\n",
+        b"off\n8 6 0\n",
+        b"OFF8 6 0\n",
     ],
 )
 def test_off_in_every_spelling(head: bytes) -> None:

@@ -9,7 +9,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.formats.polygons import flatten, triangulate
 
 # ST: texture; C: colour; N: normal; 4: homogeneous; n: of n dimensions.
-KIND = re.compile(rb"^(ST)?C?N?(4?n?)OFF$")
+KIND = re.compile(rb"^(ST)?C?N?(4?n?)OFF(\d*)$", re.IGNORECASE)
 
 
 def read_off(data: bytes) -> tuple[FloatArray, IntArray]:
@@ -33,11 +33,14 @@ def read_off(data: bytes) -> tuple[FloatArray, IntArray]:
             raise InputError("is an OFF file of more than three dimensions; export it with three.")
         if rows[0][1:2] == [b"BINARY"]:
             raise InputError("is a binary OFF file; export it as text.")
-        rows[0] = rows[0][1:]
+        # ModelNet's files have no blank between the word and the first count.
+        rows[0] = [head[3], *rows[0][1:]] if head[3] else rows[0][1:]
         rows = rows if rows[0] else rows[1:]
     vertices, polygons = int(rows[0][0]), int(rows[0][1])
     if vertices < 0 or polygons < 0:
         raise ValueError("negative counts")
+    if len(rows) == 1 and vertices > 0:
+        raise InputError("is an OFF file of one line only; export it with a line for each vertex and face.")
     if len(rows) < 1 + vertices + polygons:
         raise InputError(
             f"was cut short: it claims {vertices:,} vertices and {polygons:,} faces and holds {len(rows) - 1:,} lines; "

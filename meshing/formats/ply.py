@@ -1,5 +1,7 @@
 """PLY of Stanford: text or binary of either byte order, with polygons or triangle strips."""
 
+import re
+
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -70,11 +72,12 @@ def _of_strips(_: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
 
 def _head(data: bytes) -> tuple[str, list[Element], int]:
     """Byte order (nothing for text), elements, and where the rows start."""
-    end = data.find(b"end_header")
-    if data[:3] != b"ply" or end < 0:
+    first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
+    # A comment may name the last line's word; the first binary number may begin as a line's end does.
+    last = re.search(rb"[\r\n][ \t]*end_header[ \t]*" + (first[1] if first else b"\n"), data)
+    if first is None or last is None:
         raise ValueError("no head")
-    start = end + len(b"end_header")
-    start += 2 if data[start : start + 2] == b"\r\n" else 1
+    end, start = last.start(), last.end()
     order: str | None = None
     elements: list[Element] = []
     for line in data[:end].decode("latin-1").splitlines():

@@ -1,6 +1,8 @@
 """GLB, GLTF and 3MF: scenes of several meshes, through trimesh."""
 
 import json
+import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,9 @@ COMPRESSED = {
 # What a file may require and be read rightly all the same: looks only, or whole numbers that a node scales.
 HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_", "KHR_mesh_quantization")
 FAN = 6
+UNITS_OF_3MF = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1e3}
+# The bytes of a model in which its first word is looked for.
+HEAD = 1 << 16
 
 
 def read_scene(path: Path) -> tuple[FloatArray, IntArray]:
@@ -42,6 +47,17 @@ def read_scene(path: Path) -> tuple[FloatArray, IntArray]:
     points = np.vstack([m.vertices for m in meshes])
     faces = np.vstack([np.asarray(m.faces) + o for m, o in zip(meshes, offsets, strict=False)])
     return np.asarray(points, dtype=np.float64), np.asarray(faces, dtype=np.int64)
+
+
+def unit_of_3mf(path: Path) -> tuple[str, float]:
+    """The unit that a 3MF file is in, and how many millimetres it is (3MF Core Specification, section 3.4)."""
+    with zipfile.ZipFile(path) as archive:
+        part = next(name for name in archive.namelist() if name.lower().endswith(".model"))
+        with archive.open(part) as model:
+            head = re.search(rb"<(?:\w+:)?model\b[^>]*", model.read(HEAD))
+    found = re.search(rb"\bunit\s*=\s*[\"'](\w+)", head[0]) if head else None
+    unit = found[1].decode() if found else "millimeter"
+    return unit, UNITS_OF_3MF.get(unit, 1.0)
 
 
 def _gltf_head(path: Path) -> dict[str, Any]:

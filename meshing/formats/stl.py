@@ -9,8 +9,9 @@ from tetlux.meshing.errors import InputError
 
 HEAD = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.IGNORECASE | re.MULTILINE)
-FACET = re.compile(rb"^[ \t]*facet\b", re.IGNORECASE | re.MULTILINE)
+# Words may stand in one line; a name may be "vertex" or "facet" too, but no numbers or normal follow.
+VERTEX = re.compile(rb"(?<!\S)vertex\s+([-+.\dni]\S*)\s+([-+.\dni]\S*)\s+([-+.\dni]\S*)", re.IGNORECASE)
+FACET = re.compile(rb"(?<!\S)facet\s+normal(?!\S)", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> tuple[FloatArray, IntArray]:
@@ -35,6 +36,8 @@ def read_stl(data: bytes) -> tuple[FloatArray, IntArray]:
     elif len(data) < whole:
         held = (len(data) - HEAD) // TRIANGLE.itemsize
         raise InputError(f"was cut short: it claims {count:,} triangles and holds {held:,}; export it again.")
+    elif count == 0 and len(data) >= HEAD + TRIANGLE.itemsize:
+        raise InputError(f"claims no triangles and holds {len(data) - HEAD:,} bytes of them; export it again.")
     else:
         corners = np.frombuffer(data, TRIANGLE, count, HEAD)["corners"].reshape(-1, 3).astype(np.float64)
     return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
@@ -45,8 +48,6 @@ def _is_text(data: bytes) -> bool:
 
 
 def _of_text(data: bytes) -> FloatArray:
-    if b"\r" in data:
-        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     found = VERTEX.findall(data)
     if len(found) != 3 * len(FACET.findall(data)):
         raise InputError("was cut short, or has facets that are no triangles; export it again.")
