@@ -7,6 +7,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.caps import cap
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.rims import join_nested_rims
 from tetlux.meshing.surface import place_words, triangle_areas
 from tetlux.meshing.topology import Edges, boundary_loops
@@ -74,8 +75,12 @@ def close_holes(
     if overlapping:
         places = ", ".join(_middle(points, loop) for loop in overlapping[:DESCRIBED])
         warnings.append(
-            f"holes lie within holes around {places}, and each has a cap of its own; if they are the two sides of a "
-            "wall, make the winding of its triangles consistent in a mesh editor, and a ring closes it."
+            Note(
+                "holes-nested",
+                f"holes lie within holes around {places}, and each has a cap of its own; if they are the two sides of "
+                "a wall, make the winding of its triangles consistent in a mesh editor, and a ring closes it.",
+                value=len(overlapping),
+            )
         )
     small = [_is_small(points[loop], diagonal) for loop in loops]
     wide = [loop for loop, is_small in zip(loops, small, strict=True) if not is_small]
