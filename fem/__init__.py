@@ -1,5 +1,6 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
+from tetlux.fem.body import Body
 from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
 from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.lights import (
@@ -27,6 +28,7 @@ from tetlux.fem.system import System
 from tetlux.fem.varying import VaryingMedium
 
 __all__ = [
+    "Body",
     "CollimatedBeam",
     "Deposit",
     "DiffuseLight",

@@ -209,7 +209,7 @@ def test_check_says_what_is_right_and_what_is_not(tmp_path: Path, capsys: pytest
     good.write_text(GOOD)
     bad.write_text(GOOD.replace("eta: 1.4", "eta: -1"))
     assert main(["check", str(good)]) == 0
-    assert "good.yaml: right; 12 triangles, 6 x 6 x 1 cm" in capsys.readouterr().out
+    assert "good.yaml: ok: 12 triangles, 6 x 6 x 1 cm" in capsys.readouterr().out
     assert main(["check", str(bad), str(good)]) == 2
     printed = capsys.readouterr()
     assert "medium.eta: eta is -1" in printed.err
