@@ -52,9 +52,9 @@ class PencilBeam:
         refracted beam, the dipole's own source (Farrell 1992; Jensen 2001, sec. 2.1) and the better choice
         for a thin beam at high albedo. Where the beam passes several media, that is where the integral of sigma_t'
         along it is 1, and the albedo is the mean over where its light is lost: `OpticalPaths.albedo`. A beam that
-        runs along the border of two media is in one of them, the same however the body is written: give it a place
-        beside the border. "line" lets it
-        fade along its refracted path by delta-Eddington: ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with
+        runs exactly along the border of two media is taken to lie in one of them, the same one whichever of the two
+        is the region. "line" lets it fade along its refracted path by delta-Eddington: ``Q0 = sigma_s* E``,
+        ``Q1 = g* sigma_s* E s`` with
         ``E = E0 exp(-sigma_t* l)``.
 
     Raises
