@@ -57,7 +57,8 @@ def test_whatever_holds_arrays_is_one_line(ball_solution: Solution) -> None:
     for thing in (
         ball_solution, *ball_solution.patches, ball_solution.patches[0].charges, ball_solution.validity, mesh, surface,
         system, system.coefficients, system.plain, Region(surface, TISSUE), VaryingMedium(base=TISSUE, sigma_a=field),
-        EnvironmentLight(np.ones((64, 128))), beam.deposit_in(Body(surface, (TISSUE,))), table(angles, [0.25 / np.pi] * 181),
+        EnvironmentLight(np.ones((64, 128))), beam.deposit_in(Body(surface, (TISSUE,))),
+        table(angles, [0.25 / np.pi] * 181),
     ):  # fmt: skip
         text = repr(thing)
         assert len(text) <= LONGEST_LINE, text
