@@ -40,7 +40,7 @@ def load_all(requests: Sequence[str]) -> list[Case]:
 
 
 def check_all(requests: Sequence[str]) -> int:
-    """Say of each case file whether it is right; 0 if all are, else 2."""
+    """Print for each case file whether it can run; 0 if all are, else 2."""
     wrong = 0
     for request in requests:
         try:
@@ -54,7 +54,7 @@ def check_all(requests: Sequence[str]) -> int:
         if len(first.channels) > 1:
             runs += f"channels {', '.join(first.channel_names)}; "
         size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
-        print(f"{request}: right; {runs}{_size(first)}, {size} {surface.unit}")
+        print(f"{request}: ok: {runs}{_size(first)}, {size} {surface.unit}")
         for note in (*_labels(first), *first.repairs, *surface.warnings, *first.region_warnings):
             print(f"  {note}")
     return 2 if wrong else 0

@@ -1,5 +1,6 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
+from tetlux.fem.body import Body
 from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
 from tetlux.fem.fields import grid_field, mesh_field
@@ -28,6 +29,7 @@ from tetlux.fem.system import System
 from tetlux.fem.varying import VaryingMedium
 
 __all__ = [
+    "Body",
     "ChargeSolution",
     "CollimatedBeam",
     "Deposit",

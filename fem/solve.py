@@ -48,7 +48,7 @@ WORTH_A_MESH = 1.05
 MOST_TETRAHEDRA = 1_000_000
 # A source whose depth the mesh's facets change by more than this share of it is worth a sentence.
 SHALLOW = 0.1
-# Seconds after which a word is said of the mesher.
+# After this many seconds in the mesher a progress line appears.
 SLOW = 8.0
 
 

@@ -1,6 +1,8 @@
-"""Bodies and meshes that several tests share."""
+"""Bodies and meshes that several tests share, and which of them need a library that may be missing."""
 
+import os
 from collections.abc import Iterator
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -10,6 +12,13 @@ from tetlux.fem import Medium, PointSource, Solution, solve
 from tetlux.meshing import Surface, TetMesh, sphere, tetrahedralize
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+
+
+def needs(*packages: str) -> pytest.MarkDecorator:
+    """Skip a test where a library is missing that pip leaves out on some platforms; in CI it runs, and fails."""
+    missing = [package for package in packages if find_spec(package) is None]
+    skipped = bool(missing) and not os.environ.get("CI")
+    return pytest.mark.skipif(skipped, reason=f"{' and '.join(missing)} not installed")
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -204,19 +204,19 @@ def test_two_cases_of_one_name_are_refused(tmp_path: Path, capsys: pytest.Captur
     assert 'both make a case named "plate"' in capsys.readouterr().err
 
 
-def test_check_says_what_is_right_and_what_is_not(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_check_says_which_case_files_can_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     good, bad = tmp_path / "good.yaml", tmp_path / "bad.yaml"
     good.write_text(GOOD)
     bad.write_text(GOOD.replace("eta: 1.4", "eta: -1"))
     assert main(["check", str(good)]) == 0
-    assert "good.yaml: right; 12 triangles, 6 x 6 x 1 cm" in capsys.readouterr().out
+    assert "good.yaml: ok: 12 triangles, 6 x 6 x 1 cm" in capsys.readouterr().out
     assert main(["check", str(bad), str(good)]) == 2
     printed = capsys.readouterr()
     assert "medium.eta: eta is -1" in printed.err
-    assert "good.yaml: right" in printed.out
+    assert "good.yaml: ok: 12 triangles" in printed.out
 
 
-def test_every_case_that_ships_is_right() -> None:
+def test_every_case_that_ships_can_run() -> None:
     names = sorted(p.stem for p in library_folder().glob("*.yaml"))
     assert names == ["candle", "hare", "inclusion", "laser", "marble", "slab", "sphere", "torus"]
     assert main(["check", *names]) == 0

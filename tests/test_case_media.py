@@ -269,7 +269,7 @@ def test_repairs_of_a_region_bear_its_name(load: Load, tmp_path: Path, capsys: p
     assert all(note.startswith("stone: ") for note in case.repairs)
     assert main(["check", str(tmp_path / "cube.yaml")]) == 0
     printed = capsys.readouterr().out
-    assert "right; channels red, green, blue; 12 triangles, 8 x 8 x 8 mm" in printed
+    assert "ok: channels red, green, blue; 12 triangles, 8 x 8 x 8 mm" in printed
     assert f"  {case.repairs[0]}" in printed
 
 

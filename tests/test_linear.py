@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
-from tests.conftest import TISSUE, block
+from tests.conftest import TISSUE, block, needs
 from tetlux.fem import Medium, PointSource, krylov, linear, solve
 from tetlux.fem import multigrid as multigrid_module
 from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
@@ -21,6 +21,7 @@ from tetlux.fem.multigrid import multigrid
 from tetlux.meshing import RunError, TetMesh, blocks, refine
 
 METHODS: list[Callable[[Product], Method]] = [jacobi, multigrid, direct]
+PARAMETERS = [jacobi, pytest.param(multigrid, marks=needs("pyamg")), direct]
 # Nearly singular; strongly absorbing.
 CLEAR = Medium(sigma_a=1e-4, sigma_s_prime=0.9999, eta=1.5)
 CLEAREST = Medium(sigma_a=1e-6, sigma_s_prime=1.0, eta=2.0)
@@ -46,7 +47,7 @@ def loads_on(mesh: TetMesh, count: int = 3) -> np.ndarray:
 
 
 @pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", PARAMETERS)
 def test_every_method_solves(method: Callable[[Product], Method], medium: Medium, wide: TetMesh) -> None:
     matrix, loads = system_matrix(wide, medium), loads_on(wide)
     found = Solver(matrix, [method]).solve(loads).x
@@ -71,6 +72,7 @@ def test_the_ledger_closes_wherever_the_iteration_stops(
     assert out + medium.sigma_a * (wide.node_volumes @ fluence) == pytest.approx(1.0, abs=1e-12)
 
 
+@needs("pyamg")
 @pytest.mark.parametrize("cores", [1, 3])
 @pytest.mark.parametrize("count", [3, 11, 50])
 @pytest.mark.parametrize("large", [False, True])
@@ -95,6 +97,7 @@ def test_many_loads_are_solved_as_one_by_one(
         assert np.linalg.norm(alone - together[:, column]) <= 1e-9 * np.linalg.norm(alone)
 
 
+@needs("pyamg")
 def test_multigrid_does_not_slow_down_as_the_mesh_grows(monkeypatch: pytest.MonkeyPatch) -> None:
     """Iterations of Jacobi grow with the number of nodes along an edge, those of multigrid hardly."""
     iterations: dict[str, list[int]] = {"jacobi": [], "multigrid": []}
@@ -117,6 +120,7 @@ def test_multigrid_does_not_slow_down_as_the_mesh_grows(monkeypatch: pytest.Monk
     assert iterations["multigrid"][1] < 1.6 * iterations["multigrid"][0]
 
 
+@needs("pyamg")
 @pytest.mark.parametrize("count", [None, 1, 3, 50])
 def test_a_result_says_what_it_took(count: int | None, wide: TetMesh) -> None:
     matrix, load = system_matrix(wide, TISSUE), loads_on(wide, count or 1)
@@ -187,6 +191,7 @@ def test_products_on_several_threads(monkeypatch: pytest.MonkeyPatch, wide: TetM
     assert (product(x[:, :1]) == matrix @ x[:, :1]).all()
 
 
+@needs("pyamg")
 def test_nodes_without_neighbours_are_no_obstacle() -> None:
     """Where absorption outweighs everything there is nothing to aggregate."""
     matrix = csr_array(diags_array(np.linspace(1.0, 2.0, 1000)))
@@ -194,7 +199,13 @@ def test_nodes_without_neighbours_are_no_obstacle() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cells", "loads", "expected"), [(5, 1, jacobi), (5, 100, direct), (30, 1, multigrid), (30, 100, multigrid)]
+    ("cells", "loads", "expected"),
+    [
+        (5, 1, jacobi),
+        (5, 100, direct),
+        pytest.param(30, 1, multigrid, marks=needs("pyamg")),
+        pytest.param(30, 100, multigrid, marks=needs("pyamg")),
+    ],
 )
 def test_the_solver_goes_by_size(cells: int, loads: int, expected: Callable[[Product], Method]) -> None:
     mesh = block((cells,) * 3, (20.0,) * 3)
@@ -241,7 +252,7 @@ def test_without_pyamg_residuals_are_as_small(
 
 
 @pytest.mark.parametrize("medium", [TISSUE, CLEAR, DARK], ids=["tissue", "clear", "dark"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", PARAMETERS)
 def test_a_rough_solution_is_good_to_a_few_digits(
     method: Callable[[Product], Method], medium: Medium, wide: TetMesh
 ) -> None:
@@ -274,6 +285,7 @@ def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest
     assert abs(solution.power.balance_error) < 1e-12
 
 
+@needs("pyamg")
 def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, prepared, level = block((16, 16, 16), (20.0, 20.0, 20.0)), [], multigrid_module._level
 

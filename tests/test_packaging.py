@@ -174,4 +174,4 @@ def test_the_module_is_the_command() -> None:
         [sys.executable, "-m", "tetlux.cases", "check", "sphere"], capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("sphere: right; 5,120 triangles, 20 x 20 x 20 mm")
+    assert done.stdout.startswith("sphere: ok: 5,120 triangles, 20 x 20 x 20 mm")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.conftest import TISSUE
+from tests.conftest import TISSUE, needs
 from tetlux.fem import CollimatedBeam, EnvironmentLight, PencilBeam, Solution, System
 from tetlux.fem.lights import Light
 from tetlux.meshing import Surface, TetMesh, box, rays, sphere, tetrahedralize, torus
@@ -20,7 +20,7 @@ ENGINES = [Embree, RayLocator]
 RING = torus(10.0, 3.0)
 
 
-@pytest.fixture(params=ENGINES, ids=["embree", "vtk"])
+@pytest.fixture(params=[pytest.param(Embree, marks=needs("embreex"), id="embree"), pytest.param(RayLocator, id="vtk")])
 def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setattr(rays, "ENGINE", request.param)
     return str(request.param.__name__)
@@ -160,6 +160,7 @@ def ring() -> TetMesh:
     return tetrahedralize(RING, edge_length=1.5)
 
 
+@needs("embreex")
 @pytest.mark.parametrize(
     "light",
     [
@@ -182,7 +183,9 @@ def test_solutions_are_the_same(light: Light, ring: TetMesh, monkeypatch: pytest
     assert abs(vtk.power.balance_error) < 1e-9
 
 
-@pytest.mark.parametrize(("missing", "engine"), [([], "Embree"), (["embreex"], "RayLocator")])
+@pytest.mark.parametrize(
+    ("missing", "engine"), [pytest.param([], "Embree", marks=needs("embreex")), (["embreex"], "RayLocator")]
+)
 def test_the_engine_is_the_one_that_is_installed(missing: list[str], engine: str) -> None:
     code = (
         f"import sys; sys.modules.update(dict.fromkeys({missing}))\nfrom tetlux.meshing import rays; print(rays.ENGINE)"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from packaging.requirements import Requirement
 
-from tests.conftest import TISSUE, block
+from tests.conftest import TISSUE, block, needs
 from tetlux.cases.cli import main
 from tetlux.fem import CollimatedBeam, PencilBeam, PointSource, solve
 from tetlux.fem.lights import Light
@@ -52,6 +52,7 @@ def figures() -> dict[str, Any]:
     }
 
 
+@needs("embreex", "pyamg")
 def test_a_given_mesh_is_solved_without_them() -> None:
     hide = "import sys; sys.modules.update(dict.fromkeys(['embreex', 'pyamg', 'pytetwild']))"
     code = f"{hide}; import json; from tests.test_wheels import figures; print(json.dumps(figures()))"
@@ -82,3 +83,12 @@ def test_without_pytetwild_a_surface_is_not_meshed(
 def test_versions_are_told_of_what_is_installed() -> None:
     found = installed_versions(("numpy", "a-library-that-nobody-has"))
     assert list(found) == ["numpy"]
+
+
+@pytest.mark.parametrize(("in_ci", "skipped"), [("", True), ("true", False)])
+def test_tests_of_a_missing_library_are_skipped_but_in_ci(
+    in_ci: str, skipped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CI", in_ci)
+    assert needs("numpy", "a_library_that_nobody_has").args == (skipped,)
+    assert needs("numpy").args == (False,)

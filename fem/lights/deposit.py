@@ -136,8 +136,31 @@ def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:
 
 
 class Light(Protocol):
-    """Anything that can say what it leaves in a body."""
+    """A light: any object with this method can stand in the list of lights that is solved for.
+
+    Examples
+    --------
+    A glowing wire, as points along it:
+
+    >>> class Wire:
+    ...     def deposit_in(self, body):
+    ...         points = np.column_stack([np.zeros((9, 2)), np.linspace(-4.0, 4.0, 9)])
+    ...         finest = float(body.mean_free_paths(points).min())
+    ...         return Deposit(incident=1.0, points=points, powers=np.full(9, 1.0 / 9.0), resolution=finest)
+    """
 
     def deposit_in(self, body: Body) -> Deposit:
-        """What this light leaves in a body."""
+        """Say what this light leaves in a body.
+
+        Parameters
+        ----------
+        body : Body
+            Its surface, and the medium of each place: `Body.mean_free_paths`, `Body.region_at`, `Body.paths`.
+
+        Returns
+        -------
+        Deposit
+            Its ledger must close: ``incident`` is the sum of ``specular``, ``absorbed``, ``ballistic`` and the power of
+            all that is deposited, W.
+        """
         ...

@@ -52,8 +52,10 @@ class PencilBeam:
         "point" puts the power times the reduced albedo at one mean free path ``1/sigma_t'`` along the
         refracted beam, the dipole's own source (Farrell 1992; Jensen 2001, sec. 2.1) and the better choice
         for a thin beam at high albedo. Where the beam passes several media, that is where the integral of sigma_t'
-        along it is 1, and the albedo is the mean over where its light is lost: `OpticalPaths.albedo`. "line" lets it
-        fade along its refracted path by delta-Eddington: ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with
+        along it is 1, and the albedo is the mean over where its light is lost: `OpticalPaths.albedo`. A beam that
+        runs exactly along the border of two media is taken to lie in one of them, the same one whichever of the two
+        is the region. "line" lets it fade along its refracted path by delta-Eddington: ``Q0 = sigma_s* E``,
+        ``Q1 = g* sigma_s* E s`` with
         ``E = E0 exp(-sigma_t* l)``.
 
     Raises
