@@ -11,7 +11,7 @@ import yaml
 from yaml.constructor import ConstructorError
 
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.paths import exists, is_file
+from tetlux.meshing.host.filesystem import exists, is_file
 
 Key = tuple[str | int, ...]
 LARGEST_FILE = 1_000_000

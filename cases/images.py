@@ -9,7 +9,7 @@ from tetlux.cases.colours import LUMINANCE, to_linear
 from tetlux.cases.schema_parts import Encoding
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.paths import is_file
+from tetlux.meshing.host.filesystem import is_file
 
 # White of Pillow's grey images of more than 8 bits.
 DEEP = {"I;16": 65535.0, "I;16B": 65535.0, "I": 65535.0}

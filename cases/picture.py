@@ -14,8 +14,8 @@ from tetlux.cases.picture_plain import draw_plain
 from tetlux.cases.picture_stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
 from tetlux.cases.picture_view import PANEL, UPRIGHT, Ray
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.meshing.host.scratch import run_child, scratch
 from tetlux.meshing.notes import Note
-from tetlux.meshing.scratch import run_child, scratch
 
 __all__ = ["Ray", "Scene", "Shape", "draw"]
 

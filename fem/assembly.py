@@ -23,8 +23,8 @@ from tetlux.fem.krylov import Preconditioner
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
-from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.host.corners import cross, dot, over_corners
 from tetlux.meshing.tetmesh import EDGES, TetMesh
 
 Mass = Literal["lumped", "consistent"]

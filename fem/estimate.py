@@ -45,8 +45,8 @@ from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.blocks import at_once
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.host.blocks import at_once
 from tetlux.meshing.regions import owners
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.blocks import THREADS
+from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.refine import refine
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh

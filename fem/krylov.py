@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.blocks import THREADS, at_once
+from tetlux.meshing.host.blocks import THREADS, at_once
 
 # Relative residual at which the iteration stops.
 AIM = 1e-11

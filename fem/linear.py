@@ -11,8 +11,8 @@ from tetlux.fem.direct import direct
 from tetlux.fem.krylov import TOGETHER, Method, Preconditioner, Product, dots, jacobi
 from tetlux.fem.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import RunError
+from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.notes import Note
 
 # A solution whose true relative residual is above this is refused.

@@ -29,8 +29,8 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
-from tetlux.meshing.blocks import in_blocks
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.host.blocks import in_blocks
 from tetlux.meshing.march import march
 from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.subdivide import quartered

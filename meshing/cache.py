@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.meshing.scratch import abandoned
+from tetlux.meshing.host.scratch import abandoned
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 

@@ -7,8 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.corners import cross, dot, over_corners
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.host.corners import cross, dot, over_corners
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9

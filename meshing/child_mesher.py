@@ -11,7 +11,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.scratch import run_child, scratch
+from tetlux.meshing.host.scratch import run_child, scratch
 
 # The command that fills input.npz of its working directory; -S, since it is told where modules are.
 MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))

@@ -5,8 +5,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, IntArray
-from tetlux.meshing.blocks import grouped
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.host.blocks import grouped
 from tetlux.meshing.notes import Note
 from tetlux.meshing.tetmesh import FACES, TetMesh
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.cell_tree import SLACK, Stretches
-from tetlux.meshing.corners import cross, dot
+from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.marched import Marched, keys_of
 from tetlux.meshing.tetmesh import TetMesh
 

@@ -23,7 +23,7 @@ from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES
 from tetlux.meshing import RunError, child_mesher, mesher, sphere, tetrahedralize
 from tetlux.meshing.cache import remember_mesh, remembered_mesh
-from tetlux.meshing.scratch import scratch
+from tetlux.meshing.host.scratch import scratch
 
 CASE = """\
 name: ball

@@ -18,7 +18,8 @@ from tetlux.fem.direct import direct
 from tetlux.fem.krylov import Method, Product, jacobi
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.multigrid import multigrid
-from tetlux.meshing import RunError, TetMesh, blocks, refine
+from tetlux.meshing import RunError, TetMesh, refine
+from tetlux.meshing.host import blocks
 
 METHODS: list[Callable[[Product], Method]] = [jacobi, multigrid, direct]
 PARAMETERS = [jacobi, pytest.param(multigrid, marks=needs("pyamg")), direct]

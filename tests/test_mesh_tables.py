@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from tests.test_assembly import random_mesh
-from tetlux.meshing import TetMesh, blocks, refine
-from tetlux.meshing.blocks import grouped, in_blocks, once
+from tetlux.meshing import TetMesh, refine
+from tetlux.meshing.host import blocks
+from tetlux.meshing.host.blocks import grouped, in_blocks, once
 from tetlux.meshing.tetmesh import EDGES
 
 

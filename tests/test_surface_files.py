@@ -19,7 +19,7 @@ from tetlux.meshing.formats.off import read_off
 from tetlux.meshing.formats.ply import read_ply
 from tetlux.meshing.formats.scene import check_gltf
 from tetlux.meshing.formats.stl import read_stl
-from tetlux.meshing.quiet import quiet
+from tetlux.meshing.host.quiet import quiet
 from tetlux.meshing.surface import signed_volume
 
 BALL = sphere(10.0, subdivisions=2)

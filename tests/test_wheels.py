@@ -15,7 +15,7 @@ from tetlux.cases.cli import main
 from tetlux.fem import CollimatedBeam, PencilBeam, PointSource, solve
 from tetlux.fem.lights import Light
 from tetlux.meshing import RunError, sphere, tetrahedralize
-from tetlux.meshing.libraries import installed_versions
+from tetlux.meshing.host.libraries import installed_versions
 
 LIGHTS: list[Light] = [
     PencilBeam((0.3, 0.2, 5.0), (0.1, 0.0, -1.0), deposit="line"),

@@ -14,7 +14,7 @@ from tetlux.cases.chart.picture import draw_chart
 from tetlux.cases.chart.runs import Charted, Measurement, exponents
 from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.summary import LIBRARIES
-from tetlux.meshing.libraries import installed_versions
+from tetlux.meshing.host.libraries import installed_versions
 
 FILES = ("chart.csv", "chart.png", "chart.json")
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from tetlux.cases.stress.measure import Diagnostics, measure
 from tetlux.cases.stress.panels import Panel, Value
 from tetlux.cases.stress.variants import Variant
-from tetlux.meshing.blocks import THREADS
 from tetlux.meshing.errors import TetluxError
+from tetlux.meshing.host.blocks import THREADS
 
 # Seconds that a trial may take.
 TIME_LIMIT = 120.0

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.host.blocks import in_blocks
 
 # Pairs of a point and a charge worked on at once, so that they stay in the processor's cache.
 PAIRS = 50_000

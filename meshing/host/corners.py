@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.blocks import in_blocks
+from tetlux.meshing.host.blocks import in_blocks
 
 
 def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray, tetrahedra: IntArray) -> None:
