@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.cases.schema_lights import CameraSpec
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.proximity import cross_segments
+from tetlux.meshing.search.proximity import cross_segments
 from tetlux.meshing.surface import Surface
 
 # Pixels of the panel that shows the body.

@@ -8,8 +8,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.march import march
-from tetlux.meshing.rays import OFFSET
 from tetlux.meshing.regions import by_volume, region_at
+from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 

@@ -11,10 +11,10 @@ from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.cell_tree import Stretches
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.march import march
-from tetlux.meshing.rays import OFFSET
+from tetlux.meshing.search.cell_tree import Stretches
+from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface import triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 

@@ -32,7 +32,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import in_blocks
 from tetlux.meshing.march import march
-from tetlux.meshing.rays import OFFSET
+from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.subdivide import quartered
 from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import FACES, TetMesh

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.proximity import cross_segments, overlapping_boxes
+from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 
 # An edge whose end is this share of its length from a triangle touches it and does not pierce it.
 TOUCH = 1e-6

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.cell_tree import SLACK, Stretches
 from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.marched import Marched, keys_of
+from tetlux.meshing.search.cell_tree import SLACK, Stretches
 from tetlux.meshing.tetmesh import TetMesh
 
 # How far outside a tetrahedron, in barycentric coordinates, a stretch in it may begin. Where a path passes an edge

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.cell_tree import Stretches
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.search.cell_tree import Stretches
 
 # Stretches that are kept of one mesh: two hundred megabytes.
 MOST_KEPT = 1 << 21

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.proximity import winding_number
+from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.topology import Edges, compact, components, distinct_rows
 
 # Vertices nearer than this share of the diagonal are one: text formats round at about 1e-7.

@@ -5,7 +5,7 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.proximity import winding_number
+from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface import signed_volume
 from tetlux.meshing.topology import Edges, bodies, components
 

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.proximity import winding_number
+from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
 from tetlux.meshing.surface import signed_volume
 

@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped
-from tetlux.meshing.proximity import cross_segments, overlapping_boxes
+from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface import Surface
 from tetlux.meshing.tetmesh import FACES, TetMesh, tetrahedron_volumes
 

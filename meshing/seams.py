@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.merge import near_pairs, without_collapsed
-from tetlux.meshing.proximity import overlapping_boxes
+from tetlux.meshing.search.proximity import overlapping_boxes
 from tetlux.meshing.topology import Edges, compact, components
 
 # A vertex of a rim nearer to an edge of a rim than this share of the diagonal lies on it: text of six digits rounds

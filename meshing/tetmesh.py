@@ -10,14 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
-from tetlux.meshing.cell_tree import CellTree
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped, in_blocks, once
 from tetlux.meshing.host.corners import cross, dot, over_corners
 from tetlux.meshing.marched import Kept
-from tetlux.meshing.proximity import ClosestPoint
-from tetlux.meshing.rays import RayCaster
+from tetlux.meshing.search.cell_tree import CellTree
+from tetlux.meshing.search.proximity import ClosestPoint
+from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.

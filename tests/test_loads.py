@@ -11,8 +11,9 @@ from tetlux.fem import Deposit, Medium, PencilBeam
 from tetlux.fem.body import Body
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.loads import load_vector
-from tetlux.meshing import Surface, TetMesh, cell_tree
+from tetlux.meshing import Surface, TetMesh
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.search import cell_tree
 
 FORWARD = Medium(sigma_a=0.05, sigma_s=3.0, g=0.8, eta=1.4)
 # Paths may run this far outside a tetrahedron; slopes on its two sides differ by some times more.

@@ -17,9 +17,9 @@ from tetlux.fem.paths import Rays, follow
 from tetlux.meshing import Surface, TetMesh, marched, refine
 from tetlux.meshing import march as marching
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.cell_tree import CellTree, Stretches
 from tetlux.meshing.march import march
 from tetlux.meshing.marched import Marched
+from tetlux.meshing.search.cell_tree import CellTree, Stretches
 
 
 class NoTree:

@@ -10,11 +10,12 @@ import pytest
 from tests.conftest import TISSUE, needs
 from tetlux.fem import CollimatedBeam, EnvironmentLight, PencilBeam, Solution, System
 from tetlux.fem.lights import Light
-from tetlux.meshing import Surface, TetMesh, box, rays, sphere, tetrahedralize, torus
+from tetlux.meshing import Surface, TetMesh, box, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.embree import Embree
-from tetlux.meshing.ray_locator import RayLocator
-from tetlux.meshing.rays import OFFSET, RayCaster
+from tetlux.meshing.search import rays
+from tetlux.meshing.search.embree import Embree
+from tetlux.meshing.search.rays import OFFSET, RayCaster
+from tetlux.meshing.search.vtk_rays import RayLocator
 
 ENGINES = [Embree, RayLocator]
 RING = torus(10.0, 3.0)

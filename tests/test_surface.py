@@ -14,7 +14,6 @@ from tetlux.meshing import (
     box,
     crossings,
     cylinder,
-    proximity,
     read_surface,
     slab,
     sphere,
@@ -23,7 +22,8 @@ from tetlux.meshing import (
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
-from tetlux.meshing.proximity import cross_segments, overlapping_boxes
+from tetlux.meshing.search import proximity
+from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 
 

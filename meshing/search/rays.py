@@ -6,8 +6,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.embree import Embree
-from tetlux.meshing.ray_locator import RayLocator
+from tetlux.meshing.search.embree import Embree
+from tetlux.meshing.search.vtk_rays import RayLocator
 
 # Embree has no wheel for Linux on ARM.
 ENGINE: type[Embree] | type[RayLocator] = RayLocator if find_spec("embreex") is None else Embree

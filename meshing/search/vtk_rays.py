@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.proximity import cell_locator
+from tetlux.meshing.search.proximity import cell_locator
 
 # A ray that passes a triangle by less than this still meets it. With 0, one ray in fifty that is aimed at an edge or a
 # vertex of a sphere passes between its triangles.
