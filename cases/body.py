@@ -20,7 +20,7 @@ from tetlux.fem.validity import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import check_thickness
 from tetlux.meshing.regions import check_regions
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

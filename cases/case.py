@@ -24,7 +24,7 @@ from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note, in_region
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

@@ -6,7 +6,7 @@ from tetlux.cases.picture_view import Ray
 from tetlux.fem.lights import CollimatedBeam, Light, PencilBeam, PointSource
 from tetlux.fem.lights.point import unit_vector
 from tetlux.meshing.arrays import FloatArray, Vector
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # Of an arrow, as a share of the body's diagonal.
 LENGTH = 0.3

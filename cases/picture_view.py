@@ -9,7 +9,7 @@ from tetlux.cases.schema_lights import CameraSpec
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # Pixels of the panel that shows the body.
 PANEL = (1150, 880)

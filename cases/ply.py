@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # What PLY calls the types that values may have.
 TYPES = {"f8": "double", "u1": "uchar"}

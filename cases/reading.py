@@ -15,7 +15,7 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.files import read_mesh
 from tetlux.meshing.read import read_surface
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

@@ -14,7 +14,7 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)

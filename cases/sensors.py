@@ -11,7 +11,7 @@ from tetlux.fem.detectors import Detector, DiscDetector, FibreDetector, PointDet
 from tetlux.fem.exitance_field import Dark
 from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Solution
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # What VTK calls the types that values may have.
 TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}

@@ -11,7 +11,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.optical_paths import OpticalPaths, paths_of
 from tetlux.fem.partition import Partition, SurfacePartition
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # What is just inside the surface is looked at this share of the body's diagonal below it.
 BELOW = 1e-6

@@ -48,7 +48,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import at_once
 from tetlux.meshing.regions import owners
-from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
 # Facets of a round body err to one side, and partly against the gradients: with half of their sum the estimate is 0.6

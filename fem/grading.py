@@ -9,7 +9,7 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.refine import refine
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # Edges on the first mesh are no longer than this times the distance from the light, or times what resolves it

@@ -4,7 +4,7 @@ import difflib
 
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import MILLIMETRES
+from tetlux.meshing.surface.surface import MILLIMETRES
 
 Colours = tuple[float, float, float]
 

@@ -10,7 +10,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.march import march
 from tetlux.meshing.regions import by_volume, region_at
 from tetlux.meshing.search.rays import OFFSET
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # A path crosses the surface of one region no more often than this.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from tetlux.fem.coefficients import AnyMedium
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)

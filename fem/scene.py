@@ -16,7 +16,7 @@ from tetlux.meshing.conformity import conformity_of
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.regions import check_regions
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

@@ -13,7 +13,7 @@ from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface, longest_sides
 from tetlux.meshing.tetmesh import TetMesh
 
 

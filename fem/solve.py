@@ -29,7 +29,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.notes import Note
 from tetlux.meshing.refine import refine
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # A fluence below zero by less than this share of its maximum is not worth a sentence.

@@ -13,7 +13,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 Subtract = Literal["half-space", "free-space", "nothing"]
 

@@ -33,8 +33,8 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import in_blocks
 from tetlux.meshing.march import march
 from tetlux.meshing.search.rays import OFFSET
-from tetlux.meshing.subdivide import quartered
-from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.surface.subdivide import quartered
+from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import FACES, TetMesh
 
 # The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,

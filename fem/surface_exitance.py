@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.exitance_field import ResolvedField
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.surface import Surface
 
 # An edge is split if the exitance in its middle is off the mean of its ends by more than a share of the largest
 # exitance, or by a share of itself where it is not too dark to see; and while it is so much longer than the mesh's own

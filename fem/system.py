@@ -25,7 +25,7 @@ from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, pat
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import count, one_line
 from tetlux.meshing.regions import own_volumes
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # A light needs its own, once more where its patch shrinks, and two to estimate the error.

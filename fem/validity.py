@@ -10,7 +10,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # Bodies of fewer or more mean free paths than these are a mistaken unit, not a scene.
 SMALLEST_BODY = 0.5

@@ -9,7 +9,7 @@ from tetlux.meshing.refine import refine
 from tetlux.meshing.regions import check_regions
 from tetlux.meshing.repair import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 __all__ = [

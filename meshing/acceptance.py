@@ -6,7 +6,7 @@ from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.pinches import parts_of
 from tetlux.meshing.shells import Shell
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 from tetlux.meshing.topology import bodies, compact
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.meshing.host.scratch import abandoned
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # To be raised whenever the code makes other meshes of the same settings, or writes them otherwise.

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # Places of a surface at which the distance to another is measured, at 4 µs each. Surfaces that have more

@@ -9,7 +9,7 @@ from tetlux.meshing.caps import cap
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.rims import join_nested_rims
-from tetlux.meshing.surface import place_words, triangle_areas
+from tetlux.meshing.surface.surface import place_words, triangle_areas
 from tetlux.meshing.topology import Edges, boundary_loops
 
 Holes = Literal["small", "close", "refuse"]

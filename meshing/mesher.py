@@ -20,7 +20,7 @@ from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.regions import tagged
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.shells import shells_of
-from tetlux.meshing.surface import Surface, body_sizes
+from tetlux.meshing.surface.surface import Surface, body_sizes
 from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
 from tetlux.meshing.topology import bodies, compact
 

@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import winding_number
-from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface import signed_volume
+from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.surface import signed_volume
 
 # Triangles at one edge at less than this angle, radians, lie on each other.
 SAME_PLANE = 1e-4

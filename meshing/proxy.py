@@ -10,7 +10,7 @@ from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.pinches import pull_apart
 from tetlux.meshing.resolution import FLAT
-from tetlux.meshing.surface import Surface, signed_volume, triangle_areas
+from tetlux.meshing.surface.surface import Surface, signed_volume, triangle_areas
 from tetlux.meshing.topology import Edges, bodies, compact
 
 # Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a

@@ -17,7 +17,7 @@ from tetlux.meshing.holes import Holes
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
 from tetlux.meshing.host.quiet import quiet
 from tetlux.meshing.repair import surface_from_arrays
-from tetlux.meshing.surface import MILLIMETRES, Surface
+from tetlux.meshing.surface.surface import MILLIMETRES, Surface
 
 READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
     ".stl": read_stl,

@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from tetlux.meshing.regions import nodes_of
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_volumes
 
 # When boundary nodes move, no tetrahedron may keep less than this share of its volume or of its quality; and

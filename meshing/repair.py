@@ -16,7 +16,7 @@ from tetlux.meshing.pinches import mend_parts
 from tetlux.meshing.resolution import FLAT
 from tetlux.meshing.seams import stitch
 from tetlux.meshing.specks import drop_specks
-from tetlux.meshing.surface import UNITS, Surface, signed_volume, triangle_areas
+from tetlux.meshing.surface.surface import UNITS, Surface, signed_volume, triangle_areas
 from tetlux.meshing.topology import Edges, bodies, compact
 
 # In whatever unit.

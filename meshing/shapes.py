@@ -8,8 +8,8 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair import LONGEST, surface_from_arrays
-from tetlux.meshing.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
+from tetlux.meshing.surface.surface import Surface
 
 
 def _positive(**lengths: float) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface import body_sizes, place_words
+from tetlux.meshing.surface.surface import body_sizes, place_words
 from tetlux.meshing.topology import bodies, compact
 
 # A body of a mean thickness 2 V/A below this many of the mesher's deviations is dropped. Balls and cubes beside a ball

@@ -18,7 +18,7 @@ from tetlux.meshing.marched import Kept
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.proximity import ClosestPoint
 from tetlux.meshing.search.rays import RayCaster
-from tetlux.meshing.surface import Surface, barycentric_of, triangle_areas
+from tetlux.meshing.surface.surface import Surface, barycentric_of, triangle_areas
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])

@@ -26,7 +26,7 @@ from tetlux.cases.picture_stage import (
 from tetlux.cases.picture_view import PANEL, Camera
 from tetlux.meshing import box, sphere, torus
 from tetlux.meshing.arrays import FloatArray, Vector
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 DIES: tuple[str, ...] = (sys.executable, "-c", "import os; os.abort()")
 

@@ -10,8 +10,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.pinches import parts_of, pull_apart
 from tetlux.meshing.proxy import proxy
-from tetlux.meshing.subdivide import edges_of, split_edges
-from tetlux.meshing.surface import signed_volume
+from tetlux.meshing.surface.subdivide import edges_of, split_edges
+from tetlux.meshing.surface.surface import signed_volume
 from tetlux.meshing.topology import Edges, bodies
 
 BALL = sphere(10.0)

@@ -8,8 +8,8 @@ from tetlux.fem.exact import half_space
 from tetlux.fem.surface_exitance import surface_exitance
 from tetlux.meshing import slab
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.surface import signed_volume, triangle_areas
 
 
 def smallest_angle(points: FloatArray, faces: IntArray) -> float:

@@ -24,7 +24,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.search import proximity
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
-from tetlux.meshing.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
+from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # Rounds of Newton's method that find a point of a curved facet; the facets are nearly flat.
 ROUNDS = 3

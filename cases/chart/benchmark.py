@@ -13,7 +13,7 @@ from tetlux.fem.grading import lit_points
 from tetlux.fem.lights import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.solids import Shape
+from tetlux.meshing.surface.solids import Shape
 
 # Other programs of the machine disturb a run: a short one is repeated so many times.
 REPEATS = 3

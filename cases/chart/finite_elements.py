@@ -14,7 +14,7 @@ from tetlux.fem.solve import solve
 from tetlux.fem.sources import Subtract
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.refine import refine
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 MOST_TETRAHEDRA = 2_000_000

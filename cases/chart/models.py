@@ -13,7 +13,7 @@ from tetlux.fem.exact import dipole, half_space, monte_carlo
 from tetlux.fem.exact.registry import polar_angle
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.solids import Slab, Sphere
+from tetlux.meshing.surface.solids import Slab, Sphere
 
 # Monte Carlo counts in this many rings round the light, the first one this share of the source's depth wide.
 RINGS, FIRST_RING = 60, 0.1

@@ -17,7 +17,7 @@ from tetlux.cases.chart.methods import REPEAT_SECONDS, Method, Outcome
 from tetlux.fem.exitance_field import LinearFluence
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
-from tetlux.meshing.solids import Slab, Sphere, Torus
+from tetlux.meshing.surface.solids import Slab, Sphere, Torus
 
 # Seconds until a peer is stopped.
 TIME_LIMIT = 300.0

@@ -14,7 +14,7 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.solids import Shape, Slab, Sphere
+from tetlux.meshing.surface.solids import Shape, Slab, Sphere
 
 # The far finer run that is the reference where there is no closed form: the first of these tolerances that is met,
 # or else the run that came closest.

@@ -12,7 +12,7 @@ from tetlux.fem.lights import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.solids import Cylinder, Shape, Slab, Sphere
+from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere
 
 # By shape: the names of its closed forms.
 NAMES: dict[type, tuple[str, ...]] = {

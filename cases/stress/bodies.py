@@ -8,7 +8,7 @@ import numpy.typing as npt
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.repair import surface_from_arrays
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 SEGMENTS = 32
 

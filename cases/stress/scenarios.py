@@ -15,8 +15,8 @@ from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.grading import lit_points
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.solids import Sphere
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.solids import Sphere
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 TOLERANCE = 0.05

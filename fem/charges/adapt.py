@@ -13,7 +13,7 @@ from tetlux.fem.charges.kernel import Equation, NumberArray
 from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, distance_from, places_for
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # The first fit, and how many times more charges the next one has. Estimate in % by 300 charges after 100, and after 100
 # and 170, which takes .08 s longer: hare .47 / .42, its ear 1.6 / .94, spot 1.8 / 1.5.

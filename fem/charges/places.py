@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.charges.samples import APART, Cells, Samples, Spacing, cells_of, spread, thin
 from tetlux.meshing.arrays import BoolArray, FloatArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # A charge is this many spacings above the surface, where the field is rough and where it is smooth; ...
 LOW, HIGH = 2.0, 3.0

@@ -32,7 +32,7 @@ from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, summed
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

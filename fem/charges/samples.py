@@ -13,8 +13,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
-from tetlux.meshing.subdivide import quartered
-from tetlux.meshing.surface import Surface, longest_sides
+from tetlux.meshing.surface.subdivide import quartered
+from tetlux.meshing.surface.surface import Surface, longest_sides
 
 # Candidates to each square of the spacing.
 CANDIDATES = 4.0

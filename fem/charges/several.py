@@ -18,7 +18,7 @@ from tetlux.fem.charges.kernel import Equation, NumberArray
 from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, above, distance_from, fitting_cells, places_at, scaled
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 # Light that went deep is faint: rows far from the source weigh more than in one medium. Reading at 30° of a four-layer
 # head by 1,050 charges, error in % and that of the whole for powers of .75 / 1.25 / 1.5: -.99, .0045 / -.75, .0047 /

@@ -22,7 +22,7 @@ from tetlux.fem.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.regions import nesting, region_at
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.solids import Cylinder, Shape, Slab, Sphere
+from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere
 
 # A closed form of an infinite body holds this many decay lengths of its slowest mode away from the ends of a finite
 # one: what the end changes has faded by exp(-4) on the way there and back.

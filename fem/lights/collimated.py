@@ -13,8 +13,8 @@ from tetlux.fem.paths import Rays, entered, follow
 from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.subdivide import quartered
-from tetlux.meshing.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.surface.subdivide import quartered
+from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tetmesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.

@@ -10,7 +10,7 @@ from tetlux.fem.body import Body
 from tetlux.fem.coefficients import Coefficients
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 

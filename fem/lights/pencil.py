@@ -18,7 +18,7 @@ from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.surface import Surface
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
 
 # A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path

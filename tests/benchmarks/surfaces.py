@@ -15,7 +15,7 @@ import numpy as np
 from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, PencilBeam, solve
 from tetlux.meshing import Surface, read_surface
-from tetlux.meshing.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
 
 ACROSS = 60.0
 

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
-from tetlux.meshing.curved import CurvedPatches
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
-from tetlux.meshing.solids import Shape, lies_on
+from tetlux.meshing.surface.curved import CurvedPatches
+from tetlux.meshing.surface.solids import Shape, lies_on
 
 # Triangles beyond which a surface is taken to be fine enough.
 MOST_BULGING = 20_000

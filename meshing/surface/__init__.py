@@ -1,0 +1,1 @@
+"""`Surface`, the closed triangle mesh that bounds a body, and the smooth surface it stands for."""
