@@ -7,7 +7,7 @@ from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.refine import refine
 from tetlux.meshing.regions import check_regions
-from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh

@@ -4,11 +4,11 @@ import numpy as np
 
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.pinches import parts_of
+from tetlux.meshing.repair.pinches import parts_of
+from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.shells import Shell
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tetmesh import TetMesh
-from tetlux.meshing.topology import bodies, compact
 
 # A mesh whose boundary is farther from the surface than so many deviations has lost a part.
 LOST = 2.5

@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.repair.topology import distinct_rows
 from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
-from tetlux.meshing.topology import distinct_rows
 
 # The largest coordinate, in whatever unit.
 LONGEST = 1e30

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.pinches import pull_apart
+from tetlux.meshing.repair.crossings import count_self_intersections
+from tetlux.meshing.repair.pinches import pull_apart
+from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
 from tetlux.meshing.surface.surface import Surface, signed_volume, triangle_areas
-from tetlux.meshing.topology import Edges, bodies, compact
 
 # Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a
 # sphere, 5 to 10 on organic and mechanical surfaces. The first try; the next ones follow from what it measured.

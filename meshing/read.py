@@ -13,10 +13,10 @@ from tetlux.meshing.formats.off import read_off
 from tetlux.meshing.formats.ply import read_ply
 from tetlux.meshing.formats.scene import read_scene, unit_of_3mf
 from tetlux.meshing.formats.stl import read_stl
-from tetlux.meshing.holes import Holes
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
 from tetlux.meshing.host.quiet import quiet
-from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.repair.holes import Holes
+from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.surface.surface import MILLIMETRES, Surface
 
 READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.repair import LONGEST, surface_from_arrays
+from tetlux.meshing.repair.pipeline import LONGEST, surface_from_arrays
 from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 from tetlux.meshing.surface.surface import Surface
 

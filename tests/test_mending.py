@@ -9,9 +9,9 @@ import pytest
 from tetlux.cases.cli import main
 from tetlux.meshing import InputError, Surface, box, cylinder, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.caps import cap, triangulate_polygon
-from tetlux.meshing.specks import SPECK
-from tetlux.meshing.topology import Edges
+from tetlux.meshing.repair.caps import cap, triangulate_polygon
+from tetlux.meshing.repair.specks import SPECK
+from tetlux.meshing.repair.topology import Edges
 
 BALL = sphere(10.0, subdivisions=2)
 FINE = sphere(10.0, subdivisions=4)

@@ -8,11 +8,11 @@ import pytest
 from tetlux.meshing import Surface, box, child_mesher, mesher, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import two_sided_distance
-from tetlux.meshing.pinches import parts_of, pull_apart
 from tetlux.meshing.proxy import proxy
+from tetlux.meshing.repair.pinches import parts_of, pull_apart
+from tetlux.meshing.repair.topology import Edges, bodies
 from tetlux.meshing.surface.subdivide import edges_of, split_edges
 from tetlux.meshing.surface.surface import signed_volume
-from tetlux.meshing.topology import Edges, bodies
 
 BALL = sphere(10.0)
 

@@ -7,10 +7,10 @@ import pytest
 
 from tetlux.meshing import InputError, Surface, box, proxy, sphere, surface_from_arrays, torus
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.proxy import proxy as proxy_of
-from tetlux.meshing.topology import Edges, bodies
+from tetlux.meshing.repair.crossings import count_self_intersections
+from tetlux.meshing.repair.topology import Edges, bodies
 
 
 def _together(*surfaces: Surface) -> Surface:

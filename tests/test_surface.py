@@ -8,20 +8,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from tetlux.meshing import (
-    InputError,
-    Surface,
-    box,
-    crossings,
-    cylinder,
-    read_surface,
-    slab,
-    sphere,
-    surface_from_arrays,
-    torus,
-)
+from tetlux.meshing import InputError, Surface, box, cylinder, read_surface, slab, sphere, surface_from_arrays, torus
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.crossings import count_self_intersections
+from tetlux.meshing.repair import crossings
+from tetlux.meshing.repair.crossings import count_self_intersections
 from tetlux.meshing.search import proximity
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus

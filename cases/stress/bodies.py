@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
-from tetlux.meshing.repair import surface_from_arrays
+from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.surface.surface import Surface
 
 SEGMENTS = 32

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.caps import triangulate_polygon
+from tetlux.meshing.repair.caps import triangulate_polygon
 
 
 def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:

@@ -13,7 +13,7 @@ import numpy as np
 from tetlux.meshing import Surface, TetMesh, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.regions import nesting, own_volumes
-from tetlux.meshing.topology import compact
+from tetlux.meshing.repair.topology import compact
 
 
 def ellipsoid(*radii: float) -> Surface:

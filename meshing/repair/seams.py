@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.merge import near_pairs, without_collapsed
+from tetlux.meshing.repair.merge import near_pairs, without_collapsed
+from tetlux.meshing.repair.topology import Edges, compact, components
 from tetlux.meshing.search.proximity import overlapping_boxes
-from tetlux.meshing.topology import Edges, compact, components
 
 # A vertex of a rim nearer to an edge of a rim than this share of the diagonal lies on it: text of six digits rounds
 # at 1e-6. A vertex is no nearer to another than this share of the rim's edges there, or they are one.

@@ -6,18 +6,18 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.crossings import count_self_intersections
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.holes import Holes, check_closed, close_holes
-from tetlux.meshing.merge import MERGE_TOLERANCE, merge_vertices, single_faces, without_pairs
 from tetlux.meshing.notes import Note
-from tetlux.meshing.orient import face_outward, wind_consistently
-from tetlux.meshing.pinches import mend_parts
+from tetlux.meshing.repair.crossings import count_self_intersections
+from tetlux.meshing.repair.holes import Holes, check_closed, close_holes
+from tetlux.meshing.repair.merge import MERGE_TOLERANCE, merge_vertices, single_faces, without_pairs
+from tetlux.meshing.repair.orient import face_outward, wind_consistently
+from tetlux.meshing.repair.pinches import mend_parts
+from tetlux.meshing.repair.seams import stitch
+from tetlux.meshing.repair.specks import drop_specks
+from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
-from tetlux.meshing.seams import stitch
-from tetlux.meshing.specks import drop_specks
 from tetlux.meshing.surface.surface import UNITS, Surface, signed_volume, triangle_areas
-from tetlux.meshing.topology import Edges, bodies, compact
 
 # In whatever unit.
 LONGEST = 1e30

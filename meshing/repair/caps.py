@@ -9,8 +9,8 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.merge import without_collapsed
-from tetlux.meshing.topology import Edges
+from tetlux.meshing.repair.merge import without_collapsed
+from tetlux.meshing.repair.topology import Edges
 
 # Longer rims are triangulated over every second, third, ... vertex first: time goes with the cube (.3 s).
 LONGEST_RIM = 300

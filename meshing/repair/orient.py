@@ -5,9 +5,9 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
+from tetlux.meshing.repair.topology import Edges, bodies, components
 from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.surface import signed_volume
-from tetlux.meshing.topology import Edges, bodies, components
 
 # More separate bodies than these are a surface that fell to pieces.
 MOST_BODIES = 1000

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.topology import components
+from tetlux.meshing.repair.topology import components
 
 # A rim lies in the plane of another one if it is nearer to it than this share of the gap between the two. The two rims
 # of a shallow funnel lie nearly so too, but are of one part; a scan's ragged rims of two parts may be farther apart.

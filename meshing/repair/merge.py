@@ -3,8 +3,8 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.repair.topology import Edges, compact, components, distinct_rows
 from tetlux.meshing.search.proximity import winding_number
-from tetlux.meshing.topology import Edges, compact, components, distinct_rows
 
 # Vertices nearer than this share of the diagonal are one: text formats round at about 1e-7.
 MERGE_TOLERANCE = 1e-7
