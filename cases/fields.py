@@ -13,8 +13,8 @@ from tetlux.fem.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.files import read_with_meshio
-from tetlux.meshing.given import unjoined
 from tetlux.meshing.host.filesystem import is_file, is_folder
+from tetlux.meshing.tets.given import unjoined
 
 IMAGES = (".png", ".tif", ".tiff")
 # White of the grey images that Pillow reads, by their mode.

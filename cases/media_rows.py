@@ -12,7 +12,7 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.scene import media_of
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 def media_rows(case: Case, mesh: TetMesh) -> list[list[dict[str, Any]]]:

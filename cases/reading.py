@@ -16,7 +16,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.files import read_mesh
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass

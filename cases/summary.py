@@ -16,7 +16,7 @@ from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.host.libraries import installed_versions
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 

@@ -25,7 +25,7 @@ from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import cross, dot, over_corners
-from tetlux.meshing.tetmesh import EDGES, TetMesh
+from tetlux.meshing.tets.mesh import EDGES, TetMesh
 
 Mass = Literal["lumped", "consistent"]
 

@@ -10,7 +10,7 @@ from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 AnyMedium = Medium | VaryingMedium
 # Media by the regions or labels of a mesh that they fill: the body's own, or the outermost, first.

@@ -47,9 +47,9 @@ from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import at_once
-from tetlux.meshing.regions import owners
 from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.regions import owners
 
 # Facets of a round body err to one side, and partly against the gradients: with half of their sum the estimate is 0.6
 # to 3 times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the

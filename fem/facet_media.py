@@ -7,9 +7,9 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.paths import optical_depths
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.march import march
-from tetlux.meshing.tetmesh import TetMesh
-from tetlux.meshing.thickness import thickness
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.thickness import thickness
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ def media_under_facets(mesh: TetMesh, coefficients: Coefficients) -> tuple[Local
     media : LocalMedia
         Of each facet.
     thickness : (f,) ndarray
-        `tetlux.meshing.thickness`, as optical depth: in mean free paths of what is on the way.
+        `tetlux.meshing.tets.thickness`, as optical depth: in mean free paths of what is on the way.
     """
     lengths = mesh.remembered(thickness, lambda: thickness(mesh))
     at_facet = media_in(coefficients, mesh.boundary_cells)

@@ -11,7 +11,7 @@ from tetlux.fem.varying import Field, as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Two meshes of one curved body differ by about this share of its diagonal: so far outside, the nearest value holds.
 MARGIN = 0.01

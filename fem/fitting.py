@@ -22,7 +22,7 @@ import numpy as np
 from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Below this k h the elements' own coefficients are as good: the exitance's error on balls is the same from .4 down.
 FITTED = 0.5

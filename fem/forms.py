@@ -18,7 +18,7 @@ from skfem.helpers import dot, grad
 
 from tetlux.fem.assembly import Mass
 from tetlux.fem.medium import Medium
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.
 _CORNERS_OF_TETRAHEDRON = (np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), np.full(4, 1 / 24))

@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.blocks import THREADS
-from tetlux.meshing.refine import refine
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.refine import refine
 
 # Edges on the first mesh are no longer than this times the distance from the light, or times what resolves it
 # where they are at it. Its error then is some per cent, and its estimate good to a factor of three.

@@ -15,7 +15,7 @@ from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import signed_volume, triangle_areas
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Media by label or by its name, of one channel or of several.
 GivenMedia = Mapping[Any, AnyMedium] | Mapping[Any, AnyMedium | Sequence[AnyMedium]]

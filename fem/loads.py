@@ -11,8 +11,8 @@ from tetlux.fem.fresnel import moments
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.paths import cells_of, optical_depths
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
-from tetlux.meshing.march import march
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> FloatArray:

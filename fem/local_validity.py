@@ -16,7 +16,7 @@ from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.validity_tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.march import march
-from tetlux.meshing.regions import by_volume, region_at
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.regions import by_volume, region_at
 
 # A path crosses the surface of one region no more often than this.
 MOST_CROSSINGS = 200

@@ -12,11 +12,11 @@ from tetlux.fem.fresnel import reflectance
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.march import march
 from tetlux.meshing.search.cell_tree import Stretches
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import triangle_areas
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import TetMesh
 
 # What a ray still carries when it has faded to this share of the average ray's power stays where the rest of it did.
 FAINTEST = 1e-10

@@ -12,12 +12,12 @@ from tetlux.fem.region import Region, check_list_of_regions
 from tetlux.fem.solution import Solution
 from tetlux.fem.system import System
 from tetlux.fem.validity import check_media, warnings_for_regions
-from tetlux.meshing.conformity import conformity_of
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.regions import check_regions
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.conformity import conformity_of
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.regions import check_regions
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface, longest_sides
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.notes import Note
-from tetlux.meshing.refine import refine
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.refine import refine
 
 # A fluence below zero by less than this share of its maximum is not worth a sentence.
 NEGLIGIBLE_DIP = 1e-6

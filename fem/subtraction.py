@@ -31,11 +31,11 @@ from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import in_blocks
-from tetlux.meshing.march import march
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.subdivide import quartered
 from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
-from tetlux.meshing.tetmesh import FACES, TetMesh
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import FACES, TetMesh
 
 # The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,
 # as far as a share of exp(-REACH) of it.

@@ -24,9 +24,9 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import count, one_line
-from tetlux.meshing.regions import own_volumes
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.regions import own_volumes
 
 # A light needs its own, once more where its patch shrinks, and two to estimate the error.
 LOADS_OF_A_LIGHT = 4

@@ -2,15 +2,15 @@
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
 from tetlux.meshing.files import read_mesh
-from tetlux.meshing.given import mesh_from_arrays
 from tetlux.meshing.mesher import tetrahedralize
 from tetlux.meshing.read import read_surface
-from tetlux.meshing.refine import refine
-from tetlux.meshing.regions import check_regions
 from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.given import mesh_from_arrays
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.refine import refine
+from tetlux.meshing.tets.regions import check_regions
 
 __all__ = [
     "InputError",

@@ -8,7 +8,7 @@ from tetlux.meshing.repair.pinches import parts_of
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.shells import Shell
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # A mesh whose boundary is farther from the surface than so many deviations has lost a part.
 LOST = 2.5

@@ -13,7 +13,7 @@ import numpy as np
 
 from tetlux.meshing.host.scratch import abandoned
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # To be raised whenever the code makes other meshes of the same settings, or writes them otherwise.
 FORMAT = 2

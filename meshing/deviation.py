@@ -4,7 +4,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Places of a surface at which the distance to another is measured, at 4 µs each. Surfaces that have more
 # vertices than this are far finer than what they are compared with, and a part of them tells as much.

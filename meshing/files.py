@@ -12,13 +12,13 @@ import numpy as np
 from tetlux.meshing import nirfast
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.given import Given, checked_mesh, oriented
 from tetlux.meshing.gmsh import is_gmsh, read_gmsh
 from tetlux.meshing.gmsh_write import write_gmsh
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
 from tetlux.meshing.labels import REGION, labels_of
 from tetlux.meshing.raw import RawMesh
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.given import Given, checked_mesh, oriented
+from tetlux.meshing.tets.mesh import TetMesh
 
 if TYPE_CHECKING:
     import meshio

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Gmsh's number of straight tetrahedra, and the dimension of their entities.
 TETRAHEDRON, SOLID = 4, 3

@@ -7,10 +7,10 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.given import whole_numbers
 from tetlux.meshing.gmsh import ENTITY, PHYSICAL
 from tetlux.meshing.notes import Note
 from tetlux.meshing.raw import RawMesh
+from tetlux.meshing.tets.given import whole_numbers
 
 REGION = "region"
 # What programs call labels, the likeliest first.

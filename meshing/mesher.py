@@ -16,13 +16,13 @@ from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remem
 from tetlux.meshing.child_mesher import run_pytetwild
 from tetlux.meshing.errors import InputError, RunError
 from tetlux.meshing.proxy import proxy
-from tetlux.meshing.refine import moved_to_surface
-from tetlux.meshing.regions import tagged
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.shells import shells_of
 from tetlux.meshing.surface.surface import Surface, body_sizes
-from tetlux.meshing.tetmesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.regions import tagged
 
 # Measured with what follows on 2 cores, from surface to mesh, without the cache. Seconds are of the quietest of four
 # runs; the rest is over ten. Volume is against the surface's; deviation is of the mesh whose boundary was moved back,

@@ -28,8 +28,9 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.paths import Rays
 from tetlux.fem.solve import solve_each
 from tetlux.fem.varying import VaryingMedium
-from tetlux.meshing import InputError, Surface, TetMesh, box, sphere, tetmesh
+from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.tets import mesh as tetmesh
 
 RED = Medium(sigma_a=0.01, sigma_s=4.0, g=0.75, eta=1.4)
 BLUE = Medium(sigma_a=0.3, sigma_s=6.0, g=0.7, eta=1.4)

@@ -14,12 +14,13 @@ from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
 from tetlux.fem.paths import Rays, follow
-from tetlux.meshing import Surface, TetMesh, marched, refine
-from tetlux.meshing import march as marching
+from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.march import march
-from tetlux.meshing.marched import Marched
 from tetlux.meshing.search.cell_tree import CellTree, Stretches
+from tetlux.meshing.tets import march as marching
+from tetlux.meshing.tets import path_cache as marched
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.path_cache import Marched
 
 
 class NoTree:

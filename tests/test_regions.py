@@ -26,12 +26,12 @@ from tetlux.meshing import (
     surface_from_arrays,
     tetrahedralize,
 )
-from tetlux.meshing import regions as regions_module
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.cache import mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.files import read_mesh, write_mesh
-from tetlux.meshing.refine import moved_to_surface
-from tetlux.meshing.regions import nesting, tagged
+from tetlux.meshing.tets import regions as regions_module
+from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.regions import nesting, tagged
 
 OUTER, INNER = sphere(10.0, subdivisions=3), sphere(5.0, subdivisions=3)
 LAYERS = [box((60.0, 60.0, 2.0), center=(0.0, 0.0, -1.0)), box((60.0, 60.0, 3.0), center=(0.0, 0.0, -3.5))]

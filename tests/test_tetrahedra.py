@@ -27,8 +27,8 @@ from tetlux.meshing import (
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.files import read_mesh, write_mesh
-from tetlux.meshing.refine import moved_to_surface
 from tetlux.meshing.repair.topology import bodies
+from tetlux.meshing.tets.refine import moved_to_surface
 
 
 def test_the_mesher_fills_the_body(ball: Surface, ball_mesh: TetMesh) -> None:

@@ -16,7 +16,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.validity import warnings_for, warnings_for_regions
 from tetlux.meshing import Surface, TetMesh, cylinder, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.thickness import thickness
+from tetlux.meshing.tets.thickness import thickness
 
 EDGES = np.radians(np.arange(0, 181, 10))
 AREAS = -0.5 * np.diff(np.cos(EDGES))

@@ -13,9 +13,9 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.fem.sources import Subtract
 from tetlux.meshing.mesher import tetrahedralize
-from tetlux.meshing.refine import refine
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.refine import refine
 
 MOST_TETRAHEDRA = 2_000_000
 

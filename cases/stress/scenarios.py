@@ -17,7 +17,7 @@ from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Sphere
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 TOLERANCE = 0.05
 # The ball of all panels where a mesh is given: subdivisions of its icospheres, and how many of these are nested.

@@ -33,7 +33,7 @@ from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.medium import Medium
 from tetlux.meshing.arrays import FloatArray, summed
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)

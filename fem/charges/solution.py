@@ -21,8 +21,8 @@ from tetlux.fem.medium import Medium
 from tetlux.fem.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.regions import nesting, region_at
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.regions import nesting, region_at
 
 
 @dataclass(frozen=True)

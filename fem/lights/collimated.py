@@ -15,7 +15,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.subdivide import quartered
 from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.
 LOOKS = 2000

@@ -11,7 +11,7 @@ from tetlux.fem.coefficients import Coefficients
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 def _no_vectors() -> FloatArray:

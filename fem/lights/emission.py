@@ -10,7 +10,7 @@ from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from tetlux.meshing.arrays import FloatArray, Vector, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # The map is summed to as many directions, each the mean of what it stands for: even light is right to 0.1 %.
 DIRECTIONS = 512

@@ -19,7 +19,7 @@ from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path
 # apart, up to the second number: closer than that, what they deposit runs together.

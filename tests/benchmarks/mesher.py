@@ -12,8 +12,8 @@ import numpy as np
 
 from tetlux.meshing import Surface, TetMesh, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.deviation import surface_deviation
-from tetlux.meshing.regions import nesting, own_volumes
 from tetlux.meshing.repair.topology import compact
+from tetlux.meshing.tets.regions import nesting, own_volumes
 
 
 def ellipsoid(*radii: float) -> Surface:

@@ -10,10 +10,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.topology import distinct_rows
-from tetlux.meshing.tetmesh import EDGES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
+from tetlux.meshing.tets.mesh import EDGES, TetMesh, tetrahedron_volumes
 
 # The largest coordinate, in whatever unit.
 LONGEST = 1e30

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Rays at 45 degrees round the one straight inwards.
 AROUND = 6

@@ -14,11 +14,11 @@ from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped, in_blocks, once
 from tetlux.meshing.host.corners import cross, dot, over_corners
-from tetlux.meshing.marched import Kept
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.proximity import ClosestPoint
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface, barycentric_of, triangle_areas
+from tetlux.meshing.tets.path_cache import Kept
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -348,7 +348,7 @@ class TetMesh:
 
     @cached_property
     def marched(self) -> Kept:
-        """Paths that were marched through it, see `tetlux.meshing.march`."""
+        """Paths that were marched through it, see `tetlux.meshing.tets.march`."""
         return Kept()
 
     @cached_property

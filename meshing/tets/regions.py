@@ -17,7 +17,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tetmesh import FACES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.mesh import FACES, TetMesh, tetrahedron_volumes
 
 # Surfaces nearer than this share of the body's diagonal touch: files round at about a tenth of it.
 TOUCH = 1e-6

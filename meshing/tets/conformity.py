@@ -8,7 +8,7 @@ from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped
 from tetlux.meshing.notes import Note
-from tetlux.meshing.tetmesh import FACES, TetMesh
+from tetlux.meshing.tets.mesh import FACES, TetMesh
 
 # How far outside the middle of a facet another tetrahedron is looked for, as a share of the facet's size; and of the
 # mesh's diagonal, since files round coordinates.

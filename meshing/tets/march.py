@@ -12,9 +12,9 @@ import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.host.corners import cross, dot
-from tetlux.meshing.marched import Marched, keys_of
 from tetlux.meshing.search.cell_tree import SLACK, Stretches
-from tetlux.meshing.tetmesh import TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.path_cache import Marched, keys_of
 
 # How far outside a tetrahedron, in barycentric coordinates, a stretch in it may begin. Where a path passes an edge
 # within `SLACK`, the next tetrahedron has it some times as far outside.
