@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tetlux.cases.picture_stage import see_through
-from tetlux.meshing._mesher_process import die_with
+from tetlux.meshing.mesher._mesher_process import die_with
 
 if TYPE_CHECKING:
     from pyvista import PolyData

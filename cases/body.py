@@ -18,7 +18,7 @@ from tetlux.fem.region import Region
 from tetlux.fem.scene import media_of as media_of_scenes
 from tetlux.fem.validity import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import check_thickness
+from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import check_regions

@@ -14,8 +14,8 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.validity import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.host.libraries import installed_versions
+from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.tets.mesh import TetMesh
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")

@@ -26,7 +26,7 @@ from tetlux.fem.system import Step
 from tetlux.fem.validity import warnings_for
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.mesher import TIME_LIMIT, tetrahedralize
+from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh

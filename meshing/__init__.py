@@ -2,7 +2,7 @@
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
 from tetlux.meshing.files import read_mesh
-from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.mesher.api import tetrahedralize
 from tetlux.meshing.read import read_surface
 from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus

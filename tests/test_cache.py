@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.meshing import Surface, TetMesh, box, cache, mesher, tetrahedralize
-from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing import Surface, TetMesh, box, tetrahedralize
+from tetlux.meshing.mesher import api as mesher
+from tetlux.meshing.mesher import cache
+from tetlux.meshing.mesher.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
 
 MESH = block((2, 3, 4), (1.0, 2.0, 3.0))
 

@@ -21,9 +21,11 @@ from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
 from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES
-from tetlux.meshing import RunError, child_mesher, mesher, sphere, tetrahedralize
-from tetlux.meshing.cache import remember_mesh, remembered_mesh
+from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.host.scratch import scratch
+from tetlux.meshing.mesher import api as mesher
+from tetlux.meshing.mesher import child as child_mesher
+from tetlux.meshing.mesher.cache import remember_mesh, remembered_mesh
 
 CASE = """\
 name: ball
@@ -476,7 +478,7 @@ WRITER = """\
 import sys
 from pathlib import Path
 from tests.conftest import block
-from tetlux.meshing.cache import remember_mesh
+from tetlux.meshing.mesher.cache import remember_mesh
 
 while True:
     for number in (1, 2):

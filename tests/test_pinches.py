@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetlux.meshing import Surface, box, child_mesher, mesher, sphere, surface_from_arrays, tetrahedralize
+from tetlux.meshing import Surface, box, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.deviation import two_sided_distance
-from tetlux.meshing.proxy import proxy
+from tetlux.meshing.mesher import api as mesher
+from tetlux.meshing.mesher import child as child_mesher
+from tetlux.meshing.mesher.deviation import two_sided_distance
+from tetlux.meshing.mesher.proxy import proxy
 from tetlux.meshing.repair.pinches import parts_of, pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies
 from tetlux.meshing.surface.subdivide import edges_of, split_edges

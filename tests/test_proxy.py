@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetlux.meshing import InputError, Surface, box, proxy, sphere, surface_from_arrays, torus
+from tetlux.meshing import InputError, Surface, box, sphere, surface_from_arrays, torus
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.deviation import two_sided_distance
-from tetlux.meshing.proxy import proxy as proxy_of
+from tetlux.meshing.mesher import proxy
+from tetlux.meshing.mesher.deviation import two_sided_distance
+from tetlux.meshing.mesher.proxy import proxy as proxy_of
 from tetlux.meshing.repair.crossings import count_self_intersections
 from tetlux.meshing.repair.topology import Edges, bodies
 

@@ -18,17 +18,17 @@ from tetlux.meshing import (
     box,
     check_regions,
     cylinder,
-    mesher,
     refine,
-    shells,
     slab,
     sphere,
     surface_from_arrays,
     tetrahedralize,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.cache import mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.mesher import api as mesher
+from tetlux.meshing.mesher import shells
+from tetlux.meshing.mesher.cache import mesh_key, remember_mesh, remembered_mesh
 from tetlux.meshing.tets import regions as regions_module
 from tetlux.meshing.tets.refine import moved_to_surface
 from tetlux.meshing.tets.regions import nesting, tagged

@@ -14,10 +14,7 @@ from tetlux.meshing import (
     RunError,
     Surface,
     TetMesh,
-    acceptance,
     box,
-    child_mesher,
-    mesher,
     refine,
     sphere,
     surface_from_arrays,
@@ -25,8 +22,11 @@ from tetlux.meshing import (
     torus,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.mesher import acceptance
+from tetlux.meshing.mesher import api as mesher
+from tetlux.meshing.mesher import child as child_mesher
+from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.repair.topology import bodies
 from tetlux.meshing.tets.refine import moved_to_surface
 
@@ -264,7 +264,7 @@ def test_the_envelope_follows_from_the_deviation_and_the_other_way(monkeypatch: 
 @pytest.mark.skipif(sys.platform != "linux", reason="PR_SET_PDEATHSIG is Linux's")
 def test_the_mesher_dies_with_its_parent() -> None:
     child = (
-        "import os, time; from tetlux.meshing._mesher_process import die_with; die_with(os.getppid());"
+        "import os, time; from tetlux.meshing.mesher._mesher_process import die_with; die_with(os.getppid());"
         "print(os.getpid(), flush=True); time.sleep(60)"
     )
     parent = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {child!r}])"
@@ -294,7 +294,7 @@ def _lives(pid: int) -> bool:
 @pytest.mark.parametrize("found", [True, False])
 def test_pytetwild_is_loaded_without_pyvista_and_if_need_be_with_it(found: bool) -> None:
     code = (
-        "import importlib.util, sys; from tetlux.meshing._mesher_process import _without_package;"
+        "import importlib.util, sys; from tetlux.meshing.mesher._mesher_process import _without_package;"
         "folder = importlib.util.find_spec('pytetwild').submodule_search_locations[0];"
         f"function = _without_package(folder if {found} else '/nowhere');"
         "print(function.__name__, 'pyvista' in sys.modules)"

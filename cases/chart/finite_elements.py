@@ -12,7 +12,7 @@ from tetlux.fem.grading import graded_towards
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.fem.sources import Subtract
-from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.mesher.api import tetrahedralize
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine

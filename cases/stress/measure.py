@@ -11,7 +11,7 @@ from tetlux.cases.stress.variants import Variant
 from tetlux.fem.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.mesher import tetrahedralize
+from tetlux.meshing.mesher.api import tetrahedralize
 
 # Where the adaptive runs stop: the map shows what breaks, not how fine a mesh can get.
 MOST_TETRAHEDRA = 30_000

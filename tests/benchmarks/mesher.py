@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.meshing import Surface, TetMesh, sphere, surface_from_arrays, tetrahedralize
-from tetlux.meshing.deviation import surface_deviation
+from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.repair.topology import compact
 from tetlux.meshing.tets.regions import nesting, own_volumes
 

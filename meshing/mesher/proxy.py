@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.deviation import two_sided_distance
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.mesher.deviation import two_sided_distance
 from tetlux.meshing.repair.crossings import count_self_intersections
 from tetlux.meshing.repair.pinches import pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies, compact

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.meshing.acceptance import NotTheBodyError, check_body, has_lost_a_part, part_of
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
-from tetlux.meshing.child_mesher import run_pytetwild
 from tetlux.meshing.errors import InputError, RunError
-from tetlux.meshing.proxy import proxy
+from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_a_part, part_of
+from tetlux.meshing.mesher.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.child import run_pytetwild
+from tetlux.meshing.mesher.proxy import proxy
+from tetlux.meshing.mesher.shells import shells_of
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.shells import shells_of
 from tetlux.meshing.surface.surface import Surface, body_sizes
 from tetlux.meshing.tets.mesh import TetMesh, tetrahedron_volumes
 from tetlux.meshing.tets.refine import moved_to_surface

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from tetlux.meshing.deviation import surface_deviation
 from tetlux.meshing.errors import RunError
+from tetlux.meshing.mesher.deviation import surface_deviation
+from tetlux.meshing.mesher.shells import Shell
 from tetlux.meshing.repair.pinches import parts_of
 from tetlux.meshing.repair.topology import bodies, compact
-from tetlux.meshing.shells import Shell
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 

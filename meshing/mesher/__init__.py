@@ -1,0 +1,1 @@
+"""From a closed surface to tetrahedra: pytetwild in a guarded process."""
