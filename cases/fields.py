@@ -12,7 +12,7 @@ from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.files import read_with_meshio
+from tetlux.meshing.files.meshes import read_with_meshio
 from tetlux.meshing.host.filesystem import is_file, is_folder
 from tetlux.meshing.tets.given import unjoined
 

@@ -13,8 +13,8 @@ from tetlux.fem.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.files import read_mesh
-from tetlux.meshing.read import read_surface
+from tetlux.meshing.files.meshes import read_mesh
+from tetlux.meshing.files.surfaces import read_surface
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 

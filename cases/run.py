@@ -19,7 +19,7 @@ from tetlux.cases.summary import summarize
 from tetlux.cases.vtp import write_vtp
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import prefixed
 
 Report = Callable[[str], None]

@@ -52,7 +52,7 @@ def find_case_file(request: str) -> Path:
 
 
 def _refuse_surface(path: Path) -> None:
-    from tetlux.meshing.read import SUFFIXES  # noqa: PLC0415
+    from tetlux.meshing.files.surfaces import SUFFIXES  # noqa: PLC0415
 
     if path.suffix.lower() in SUFFIXES:
         raise _input_error(f"{path} is a surface file; name it in a case file, as surface: {{file: {path.name}}}.")

@@ -1,9 +1,9 @@
 """Shapes and lengths: surfaces, tetrahedra, and nothing about light."""
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
-from tetlux.meshing.files import read_mesh
+from tetlux.meshing.files.meshes import read_mesh
+from tetlux.meshing.files.surfaces import read_surface
 from tetlux.meshing.mesher.api import tetrahedralize
-from tetlux.meshing.read import read_surface
 from tetlux.meshing.repair.pipeline import surface_from_arrays
 from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface.surface import Surface

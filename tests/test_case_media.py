@@ -19,7 +19,7 @@ from tetlux.fem.materials import material
 from tetlux.fem.phase import henyey_greenstein, table, two_term
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing import InputError, RunError, box
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 CUBE = """\
 surface: {box: {size: [8, 8, 8]}}

@@ -13,7 +13,7 @@ from tetlux.cases.case import load_cases
 from tetlux.cases.cli import main
 from tetlux.fem import Emission, Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, read_mesh
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 POINTS, TETRAHEDRA, PLACES = cube_of_cubes(4, 5.0)
 LABELS = np.where(PLACES[:, 2] < 2, 7, 3)

@@ -12,7 +12,7 @@ from tests.conftest import TISSUE, block
 from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
 from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing import InputError
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 CUBE = block((3, 3, 3), (2.0, 2.0, 2.0))
 MIDDLES = CUBE.points[CUBE.tetrahedra].mean(axis=1)

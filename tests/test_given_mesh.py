@@ -8,7 +8,7 @@ import pytest
 from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, mesh_from_arrays, refine
-from tetlux.meshing.files import oriented
+from tetlux.meshing.files.meshes import oriented
 from tetlux.meshing.tets import conformity
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)

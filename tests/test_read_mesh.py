@@ -11,7 +11,7 @@ import pytest
 from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import InputError, TetMesh, read_mesh
 from tetlux.meshing.arrays import IntArray
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 POINTS, TETRAHEDRA, PLACES = cube_of_cubes(2, 1.0)
 # The lower half is bone, the upper one muscle.

@@ -11,7 +11,7 @@ from tests.meshes_made import cube_of_cubes
 from tetlux.cases.case import load_cases
 from tetlux.cases.schema import CaseSpec
 from tetlux.meshing import TetMesh
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 

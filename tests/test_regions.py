@@ -25,7 +25,7 @@ from tetlux.meshing import (
     tetrahedralize,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.files.meshes import read_mesh, write_mesh
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import shells
 from tetlux.meshing.mesher.cache import mesh_key, remember_mesh, remembered_mesh

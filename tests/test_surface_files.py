@@ -14,11 +14,11 @@ import trimesh
 
 from tetlux.meshing import InputError, box, read_surface, sphere
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.formats.obj import read_obj
-from tetlux.meshing.formats.off import read_off
-from tetlux.meshing.formats.ply import read_ply
-from tetlux.meshing.formats.scene import check_gltf
-from tetlux.meshing.formats.stl import read_stl
+from tetlux.meshing.files.formats.obj import read_obj
+from tetlux.meshing.files.formats.off import read_off
+from tetlux.meshing.files.formats.ply import read_ply
+from tetlux.meshing.files.formats.scene import check_gltf
+from tetlux.meshing.files.formats.stl import read_stl
 from tetlux.meshing.host.quiet import quiet
 from tetlux.meshing.surface.surface import signed_volume
 

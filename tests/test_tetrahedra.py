@@ -22,7 +22,7 @@ from tetlux.meshing import (
     torus,
 )
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.files import read_mesh, write_mesh
+from tetlux.meshing.files.meshes import read_mesh, write_mesh
 from tetlux.meshing.mesher import acceptance
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import child as child_mesher

@@ -16,7 +16,7 @@ import numpy as np
 from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PencilBeam, solve
 from tetlux.meshing import TetMesh, read_mesh
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 # Cubes along an edge, of six tetrahedra each; a millimetre wide.
 CUBES = 37

@@ -13,7 +13,7 @@ from PIL import Image
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import TetMesh, box
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 RIGHT = [
     yaml.safe_load(text)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import TetMesh, refine
-from tetlux.meshing.files import write_mesh
+from tetlux.meshing.files.meshes import write_mesh
 
 POINTS, TETRAHEDRA, PLACES = cube_of_cubes(3, 4.0)
 LABELS = np.where(PLACES[:, 2] == 0, 1, 2)

@@ -7,9 +7,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.gmsh import ENTITY, PHYSICAL
+from tetlux.meshing.files.gmsh import ENTITY, PHYSICAL
+from tetlux.meshing.files.raw import RawMesh
 from tetlux.meshing.notes import Note
-from tetlux.meshing.raw import RawMesh
 from tetlux.meshing.tets.given import whole_numbers
 
 REGION = "region"

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.meshing import nirfast
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.gmsh import is_gmsh, read_gmsh
-from tetlux.meshing.gmsh_write import write_gmsh
+from tetlux.meshing.files import nirfast
+from tetlux.meshing.files.gmsh import is_gmsh, read_gmsh
+from tetlux.meshing.files.gmsh_write import write_gmsh
+from tetlux.meshing.files.labels import REGION, labels_of
+from tetlux.meshing.files.raw import RawMesh
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
-from tetlux.meshing.labels import REGION, labels_of
-from tetlux.meshing.raw import RawMesh
 from tetlux.meshing.tets.given import Given, checked_mesh, oriented
 from tetlux.meshing.tets.mesh import TetMesh
 

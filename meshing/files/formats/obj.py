@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.formats.polygons import triangulate
+from tetlux.meshing.files.formats.polygons import triangulate
 
 KINDS = {b"v ": 0, b"v\t": 0, b"f ": 1, b"f\t": 1}
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.formats.polygons import flatten, triangulate
+from tetlux.meshing.files.formats.polygons import flatten, triangulate
 
 # ST: texture; C: colour; N: normal; 4: homogeneous; n: of n dimensions.
 KIND = re.compile(rb"^(ST)?C?N?(4?n?)OFF(\d*)$", re.IGNORECASE)

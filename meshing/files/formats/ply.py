@@ -6,8 +6,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.formats.ply_rows import Binary, Column, Element, Lists, Text
-from tetlux.meshing.formats.polygons import triangulate
+from tetlux.meshing.files.formats.ply_rows import Binary, Column, Element, Lists, Text
+from tetlux.meshing.files.formats.polygons import triangulate
 
 TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",

@@ -13,9 +13,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.gmsh_numbers import BinaryNumbers, TextNumbers
+from tetlux.meshing.files.gmsh_numbers import BinaryNumbers, TextNumbers
+from tetlux.meshing.files.raw import RawMesh
 from tetlux.meshing.notes import Note
-from tetlux.meshing.raw import RawMesh
 
 Numbers = TextNumbers | BinaryNumbers
 PHYSICAL, ENTITY = "gmsh:physical", "gmsh:geometrical"

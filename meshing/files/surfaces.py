@@ -8,11 +8,11 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.formats.obj import read_obj
-from tetlux.meshing.formats.off import read_off
-from tetlux.meshing.formats.ply import read_ply
-from tetlux.meshing.formats.scene import read_scene, unit_of_3mf
-from tetlux.meshing.formats.stl import read_stl
+from tetlux.meshing.files.formats.obj import read_obj
+from tetlux.meshing.files.formats.off import read_off
+from tetlux.meshing.files.formats.ply import read_ply
+from tetlux.meshing.files.formats.scene import read_scene, unit_of_3mf
+from tetlux.meshing.files.formats.stl import read_stl
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
 from tetlux.meshing.host.quiet import quiet
 from tetlux.meshing.repair.holes import Holes

@@ -7,9 +7,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.files.raw import RawMesh
 from tetlux.meshing.host.filesystem import is_file
 from tetlux.meshing.notes import Note
-from tetlux.meshing.raw import RawMesh
 
 SUFFIXES = (".node", ".elem", ".region")
 REGION = "region"

@@ -1,0 +1,1 @@
+"""Surfaces and tetrahedra on disk."""
