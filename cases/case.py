@@ -15,11 +15,11 @@ from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
 from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated
-from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.lights.point import unit_vector
-from tetlux.fem.medium import Medium
-from tetlux.fem.region import Region
+from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.region import Region
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

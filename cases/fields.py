@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.cases.images import unreadable
-from tetlux.fem.fields import grid_field, mesh_field
-from tetlux.fem.varying import Field
+from tetlux.fem.media.fields import grid_field, mesh_field
+from tetlux.fem.media.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.files.meshes import read_with_meshio
@@ -36,7 +36,7 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
     Returns
     -------
     Field
-        See `tetlux.fem.fields.mesh_field`.
+        See `tetlux.fem.media.fields.mesh_field`.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def read_image_field(
     Returns
     -------
     Field
-        See `tetlux.fem.fields.grid_field`.
+        See `tetlux.fem.media.fields.grid_field`.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vecto
     Returns
     -------
     Field
-        See `tetlux.fem.fields.grid_field`.
+        See `tetlux.fem.media.fields.grid_field`.
 
     Raises
     ------

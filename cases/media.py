@@ -4,12 +4,12 @@ from tetlux.cases.channels import of_channel
 from tetlux.cases.document import Document, Key
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema_media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
-from tetlux.fem.coefficients import AnyMedium
-from tetlux.fem.materials import material
-from tetlux.fem.medium import Medium
-from tetlux.fem.phase import PhaseFunction, henyey_greenstein, table, two_term
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.media.materials import material
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.phase import PhaseFunction, henyey_greenstein, table, two_term
+from tetlux.fem.media.varying import Field, VaryingMedium
 from tetlux.fem.validity import check_scattering
-from tetlux.fem.varying import Field, VaryingMedium
 from tetlux.meshing.arrays import FloatArray
 
 

@@ -7,10 +7,18 @@ import numpy as np
 
 from tetlux.cases.case import Case
 from tetlux.cases.lighting import BODY
-from tetlux.fem.coefficients import AnyMedium, Coefficients, MediaByLabel, at_cells, base_of, by_label, coefficients_on
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.coefficients import (
+    AnyMedium,
+    Coefficients,
+    MediaByLabel,
+    at_cells,
+    base_of,
+    by_label,
+    coefficients_on,
+)
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.scene import media_of
-from tetlux.fem.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 

@@ -9,7 +9,7 @@ from tetlux.cases.images import read_pixels
 from tetlux.cases.schema import MeshSpec, SurfaceSpec
 from tetlux.cases.schema_media import FieldSpec
 from tetlux.cases.schema_parts import Encoding
-from tetlux.fem.varying import Field
+from tetlux.fem.media.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError

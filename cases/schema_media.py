@@ -52,7 +52,7 @@ class FieldSpec(Choice):
 
 
 class TwoTermSpec(Section):
-    """Two lobes, see `tetlux.fem.phase.two_term`."""
+    """Two lobes, see `tetlux.fem.media.phase.two_term`."""
 
     g1: Number
     g2: Number
@@ -60,7 +60,7 @@ class TwoTermSpec(Section):
 
 
 class TableSpec(Section):
-    """A table, see `tetlux.fem.phase.table`."""
+    """A table, see `tetlux.fem.media.phase.table`."""
 
     angles: Numbers = Field(description="degrees, ascending from 0 to 180")
     values: Numbers = Field(description="1/sr")
@@ -98,7 +98,7 @@ class MediumSpec(Section):
 class MaterialSpec(Section):
     """A measured material: three channels, red, green and blue."""
 
-    material: str = Field(description="see tetlux.fem.materials")
+    material: str = Field(description="see tetlux.fem.media.materials")
 
 
 def _kind(value: Any) -> str:

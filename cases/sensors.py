@@ -9,7 +9,7 @@ from typing import Any
 from tetlux.cases.schema_lights import DetectorSpec
 from tetlux.fem.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
 from tetlux.fem.exitance_field import Dark
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.fem.solution import Solution
 from tetlux.meshing.surface.surface import Surface
 

@@ -3,7 +3,6 @@
 from tetlux.fem.body import Body
 from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
-from tetlux.fem.fields import grid_field, mesh_field
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -18,15 +17,16 @@ from tetlux.fem.lights import (
     PointSource,
     Rectangle,
 )
-from tetlux.fem.materials import material
-from tetlux.fem.medium import Medium
-from tetlux.fem.phase import henyey_greenstein, table, two_term
+from tetlux.fem.media.fields import grid_field, mesh_field
+from tetlux.fem.media.materials import material
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.phase import henyey_greenstein, table, two_term
+from tetlux.fem.media.region import Region
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.radiance import radiance
-from tetlux.fem.region import Region
 from tetlux.fem.solution import Power, Solution
 from tetlux.fem.solve import solve, solve_each
 from tetlux.fem.system import System
-from tetlux.fem.varying import VaryingMedium
 
 __all__ = [
     "Body",

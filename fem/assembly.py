@@ -18,10 +18,10 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem.coefficients import Coefficients, apart, coefficients_of
 from tetlux.fem.krylov import Preconditioner
 from tetlux.fem.linear import Solver, solver_for
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.coefficients import Coefficients, apart, coefficients_of
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import cross, dot, over_corners

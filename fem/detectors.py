@@ -7,8 +7,8 @@ import numpy as np
 
 from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.lights.point import as_vector
+from tetlux.fem.media.varying import as_text
 from tetlux.fem.radiance import collected_share
-from tetlux.fem.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 

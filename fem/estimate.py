@@ -40,9 +40,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array
 
-from tetlux.fem.coefficients import Coefficients, at_cells
 from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line

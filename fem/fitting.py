@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.coefficients import Coefficients, at_cells
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh

@@ -17,7 +17,7 @@ from skfem import Basis, BilinearForm, ElementTetP1, FacetBasis, MeshTet1
 from skfem.helpers import dot, grad
 
 from tetlux.fem.assembly import Mass
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tetlux.fem.coefficients import AnyMedium, MediaByLabel, base_of, check_labels
+from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, check_labels
 from tetlux.fem.solution import Solution
 from tetlux.fem.validity import warning_for_part
 from tetlux.meshing.arrays import IntArray

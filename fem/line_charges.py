@@ -23,7 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
 # Length of the first panel in mean free paths, and Gauss points of each: exitance is 2e-4 off half a mean free path

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exitance_field import ExitanceField
-from tetlux.fem.fresnel import reflectance
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -6,9 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.fresnel import moments
 from tetlux.fem.local_validity import Validity
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.fresnel import moments
+from tetlux.fem.media.medium import Medium
 from tetlux.fem.subtraction import Patch
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count

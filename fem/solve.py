@@ -11,13 +11,13 @@ import numpy as np
 from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.charges.solve import solve_with_charges
-from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.lights.deposit import Light
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
-from tetlux.fem.region import Region
 from tetlux.fem.scene import Scene, channels_of, scene_of
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources import Sources, Subtract, check_list, sources_of

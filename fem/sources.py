@@ -9,7 +9,7 @@ import numpy as np
 from tetlux.fem.body import Body
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, charges_of
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

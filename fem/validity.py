@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import AnyMedium, base_of
 from tetlux.fem.local_validity import Validity
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.coefficients import AnyMedium, base_of
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface

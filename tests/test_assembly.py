@@ -11,8 +11,8 @@ from skfem.helpers import dot, grad
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium
 from tetlux.fem.assembly import Assembly, Mass, system_matrix
-from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.forms import weak_form_matrix
+from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.meshing import TetMesh
 from tetlux.meshing.tets.mesh import tetrahedron_volumes
 

@@ -15,9 +15,9 @@ from tetlux.cases.case import Case, load_cases
 from tetlux.cases.chart.benchmark import benchmark_of
 from tetlux.cases.cli import main
 from tetlux.fem import Medium, PencilBeam, PointSource
-from tetlux.fem.materials import material
-from tetlux.fem.phase import henyey_greenstein, table, two_term
-from tetlux.fem.varying import VaryingMedium
+from tetlux.fem.media.materials import material
+from tetlux.fem.media.phase import henyey_greenstein, table, two_term
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import InputError, RunError, box
 from tetlux.meshing.files.meshes import write_mesh
 

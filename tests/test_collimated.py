@@ -9,9 +9,9 @@ from tests.benchmarks.scenes import lit_ball, turbid
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Medium, Solution, System, solve
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import slab_plane, sphere_light
-from tetlux.fem.fresnel import reflectance
+from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing import InputError, TetMesh, box, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 

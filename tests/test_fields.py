@@ -10,7 +10,7 @@ from PIL import Image
 
 from tests.conftest import TISSUE, block
 from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
-from tetlux.fem.varying import VaryingMedium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import InputError
 from tetlux.meshing.files.meshes import write_mesh
 

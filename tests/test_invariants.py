@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.conftest import TISSUE, block
 from tests.convergence import ball_mesh
 from tetlux.fem import DiffuseLight, Light, Medium, PencilBeam, PointSource, solve
-from tetlux.fem.fresnel import reflectance
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing import Surface, TetMesh, box
 from tetlux.meshing.arrays import FloatArray, Vector
 

@@ -22,9 +22,9 @@ from tetlux.fem import (
     Solution,
     System,
 )
-from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.lights.spot import Spot
-from tetlux.fem.varying import VaryingMedium
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import Vector
 

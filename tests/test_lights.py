@@ -9,10 +9,10 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, paths, solve
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere_light
-from tetlux.fem.fresnel import reflectance
 from tetlux.fem.loads import load_vector
+from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing import InputError, Surface, TetMesh, box, slab, sphere, surface_from_arrays
 
 FORWARD = Medium(sigma_a=0.05, sigma_s=10.0, g=0.9, eta=1.4)

@@ -13,10 +13,10 @@ from tests.conftest import TISSUE, block, needs
 from tetlux.fem import Medium, PointSource, krylov, linear, solve
 from tetlux.fem import multigrid as multigrid_module
 from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
-from tetlux.fem.coefficients import apart, coefficients_of
 from tetlux.fem.direct import direct
 from tetlux.fem.krylov import Method, Product, jacobi
 from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.media.coefficients import apart, coefficients_of
 from tetlux.fem.multigrid import multigrid
 from tetlux.meshing import RunError, TetMesh, refine
 from tetlux.meshing.host import blocks

@@ -10,9 +10,9 @@ from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
 from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import Coefficients, coefficients_of
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
+from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.paths import Rays, follow
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tetlux.fem import Medium, PointSource, solve
-from tetlux.fem.materials import MATERIALS, material
+from tetlux.fem.media.materials import MATERIALS, material
 from tetlux.meshing import InputError, sphere
 
 # Diffuse reflectances that Jensen 2001 publishes beside the coefficients, red, green and blue.

@@ -19,8 +19,8 @@ from tetlux.fem import (
     System,
     solve,
 )
-from tetlux.fem.coefficients import coefficients_on
-from tetlux.fem.varying import VaryingMedium
+from tetlux.fem.media.coefficients import coefficients_on
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import InputError, Surface, TetMesh, box, refine, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 

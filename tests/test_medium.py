@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tetlux.fem import Medium
-from tetlux.fem.fresnel import moments, reflectance
+from tetlux.fem.media.fresnel import moments, reflectance
 from tetlux.meshing import InputError
 
 

@@ -16,7 +16,7 @@ from tetlux.fem import Medium
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate, Ledger
 from tetlux.fem.exact.transfer import photons
-from tetlux.fem.fresnel import reflectance
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing.errors import InputError
 
 # A seed fixes the result; four standard errors leave room for another numpy or another processor.

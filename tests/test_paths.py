@@ -8,9 +8,9 @@ import pytest
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System, paths
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import Coefficients, coefficients_of
-from tetlux.fem.fresnel import reflectance
 from tetlux.fem.loads import load_vector
+from tetlux.fem.media.coefficients import Coefficients, coefficients_of
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.paths import Rays, follow
 from tetlux.fem.solution import Power
 from tetlux.meshing import TetMesh

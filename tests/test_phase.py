@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tetlux.fem import Medium
-from tetlux.fem.phase import PhaseFunction, henyey_greenstein, table, two_term
+from tetlux.fem.media.phase import PhaseFunction, henyey_greenstein, table, two_term
 from tetlux.meshing import InputError
 
 DEGREES = np.linspace(0.0, 180.0, 361)

@@ -8,11 +8,11 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Medium, PencilBeam, PointSource
 from tetlux.fem.body import Body
-from tetlux.fem.coefficients import coefficients_of
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.local_validity import Validity
+from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.validity import warnings_for, warnings_for_regions
 from tetlux.meshing import Surface, TetMesh, cylinder, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray

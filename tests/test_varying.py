@@ -7,8 +7,8 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium
-from tetlux.fem.fields import grid_field, mesh_field
-from tetlux.fem.varying import Field, VaryingMedium
+from tetlux.fem.media.fields import grid_field, mesh_field
+from tetlux.fem.media.varying import Field, VaryingMedium
 from tetlux.meshing import InputError
 from tetlux.meshing.arrays import FloatArray
 

@@ -11,7 +11,7 @@ from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.methods import Method, Outcome, fastest_run
 from tetlux.fem.exact import dipole, half_space, monte_carlo
 from tetlux.fem.exact.registry import polar_angle
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Slab, Sphere
 

@@ -9,7 +9,7 @@ import numpy as np
 from tetlux.fem.exact import half_space
 from tetlux.fem.exact.registry import ClosedForm, IdealSources, closed_forms, ideal_sources, polar_angle
 from tetlux.fem.lights import Deposit
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere

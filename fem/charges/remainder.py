@@ -29,8 +29,8 @@ from tetlux.fem.assembly import Assembly
 from tetlux.fem.charges.adapt import FittedCharges
 from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
-from tetlux.fem.coefficients import coefficients_of
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, summed
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh

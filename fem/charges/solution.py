@@ -16,8 +16,8 @@ from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
-from tetlux.fem.fresnel import moments
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.fresnel import moments
+from tetlux.fem.media.medium import Medium
 from tetlux.fem.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.errors import InputError
 
 Source = Literal["delta-eddington", "similarity"]

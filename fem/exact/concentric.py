@@ -8,8 +8,8 @@ direction in which it grows, so that no digits are lost at any contrast.
 import math
 
 from tetlux.fem.exact import checks
-from tetlux.fem.fresnel import moments
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.fresnel import moments
+from tetlux.fem.media.medium import Medium
 
 
 def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius: float) -> float:

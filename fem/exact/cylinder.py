@@ -21,7 +21,7 @@ from tetlux.fem.exact import checks
 from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.cylindrical import CHUNK, HALF, cosine_sum, multiplicity, reach, reflection
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

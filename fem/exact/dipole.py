@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
 

@@ -13,7 +13,7 @@ from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
 from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
 

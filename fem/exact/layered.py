@@ -20,7 +20,7 @@ from scipy import special
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.transfer.batches import BATCHES, Batches, Estimate, Light, estimate, mean_and_error
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.numerics.layer import Layer
 from tetlux.fem.exact.slab_plane import escape_front
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

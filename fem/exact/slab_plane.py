@@ -5,7 +5,7 @@ import numpy as np
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
 

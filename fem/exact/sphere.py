@@ -19,7 +19,7 @@ from tetlux.fem.exact.numerics.ball import CHUNK, HALF, chord, residual_weight
 from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

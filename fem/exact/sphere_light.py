@@ -14,8 +14,8 @@ from tetlux.fem.exact.numerics.ball import HALF, along_diameter, beam_series, ch
 from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, two_decays
-from tetlux.fem.fresnel import moments
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.fresnel import moments
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.body import Body
 from tetlux.fem.lights.deposit import Deposit
-from tetlux.fem.varying import as_text
+from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.lights.point import as_vector
-from tetlux.fem.varying import as_text
+from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

@@ -43,9 +43,9 @@ from tetlux.fem import (
     grid_field,
     solve,
 )
-from tetlux.fem.coefficients import AnyMedium
 from tetlux.fem.exact import layered
 from tetlux.fem.lights.spot import sunflower
+from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.meshing import Surface, box, sphere
 from tetlux.meshing.arrays import FloatArray
 

@@ -20,7 +20,7 @@ from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
 from tetlux.fem.exact.slab_plane import escape_front
-from tetlux.fem.fresnel import reflectance
+from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing.arrays import FloatArray
 
 LINES: tuple[tuple[str, Source], ...] = (

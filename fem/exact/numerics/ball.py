@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule, graded_rule
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
 HALF = 0.5  # i_l is I_{l + 1/2} but for a power of its argument

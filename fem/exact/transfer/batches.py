@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -37,7 +37,7 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 @compiled
 def fresnel(mu: float, eta: float) -> float:
-    """Unpolarised reflectance: `tetlux.fem.fresnel.reflectance` for one cosine."""
+    """Unpolarised reflectance: `tetlux.fem.media.fresnel.reflectance` for one cosine."""
     if eta == 1.0:
         return 0.0
     sine_squared = eta**2 * (1.0 - mu**2)

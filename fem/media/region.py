@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tetlux.fem.coefficients import AnyMedium
+from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

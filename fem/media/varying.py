@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

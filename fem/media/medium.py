@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from tetlux.fem.fresnel import boundary_factor_classic, boundary_factor_exact
-from tetlux.fem.phase import PhaseFunction
+from tetlux.fem.media.fresnel import boundary_factor_classic, boundary_factor_exact
+from tetlux.fem.media.phase import PhaseFunction
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
@@ -32,7 +32,7 @@ class Medium:
     g : float, optional
         Mean cosine of the scattering angle (CS667 notes, definition 1.9 iv), between -1 and 1.
     phase : PhaseFunction, optional
-        How scattering distributes light over angles, see `tetlux.fem.phase`; g alone stands for Henyey-Greenstein's.
+        How scattering distributes light over angles, see `tetlux.fem.media.phase`; g alone stands for Henyey-Greenstein's.
     boundary : {"exact", "classic"}
         How internal reflection enters the boundary factor A: by the Fresnel moments, or by the fit
         that the published dipole uses.

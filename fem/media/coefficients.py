@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.medium import Medium
-from tetlux.fem.varying import VaryingMedium
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

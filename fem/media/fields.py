@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import map_coordinates
 
-from tetlux.fem.varying import Field, as_text
+from tetlux.fem.media.varying import Field, as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

@@ -2,7 +2,7 @@
 
 import difflib
 
-from tetlux.fem.medium import Medium
+from tetlux.fem.media.medium import Medium
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import MILLIMETRES
 

@@ -1,0 +1,1 @@
+"""Media: coefficients, phase functions, Fresnel reflection, materials."""
