@@ -10,11 +10,11 @@ from tetlux.cases.lighting import BODY
 from tetlux.cases.media import media_of
 from tetlux.cases.reading import Reader
 from tetlux.cases.schema import CaseSpec, MeshSpec
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
+from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labelled import label_of, outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.media.region import Region
-from tetlux.fem.partition import MeshPartition, SurfacePartition
 from tetlux.fem.scene import media_of as media_of_scenes
 from tetlux.fem.validity import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError

@@ -1,6 +1,6 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
 from tetlux.fem.lights import (

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.line_charges import in_points
 from tetlux.fem.media.medium import Medium

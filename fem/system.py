@@ -7,7 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.assembly import Assembly, Mass
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
+from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.lights.deposit import Deposit, Light
@@ -17,7 +18,6 @@ from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.partition import MeshPartition
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources import Sources, Subtract, sources_of
 from tetlux.fem.stopwatch import Stopwatch

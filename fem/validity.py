@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium

@@ -19,7 +19,7 @@ from skfem.refdom import RefTet, RefTri
 
 from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.assembly import system_matrix
-from tetlux.fem.body import Body as LitBody
+from tetlux.fem.body.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.linear import Solver

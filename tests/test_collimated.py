@@ -8,7 +8,7 @@ import pytest
 from tests.benchmarks.scenes import lit_ball, turbid
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Medium, Solution, System, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import slab_plane, sphere_light
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance

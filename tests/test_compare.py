@@ -16,7 +16,7 @@ from tetlux.cases.compare.differences import MEANINGS, compare
 from tetlux.cases.run import run_case
 from tetlux.cases.schema import ClosedForm
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import slab as exact_slab
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.meshing import InputError, RunError, slab, sphere

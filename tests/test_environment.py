@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import block
 from tests.test_paths import carved
 from tetlux.fem import CollimatedBeam, DiffuseLight, EnvironmentLight, Medium, Solution, System, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import moments, reflectance
 from tetlux.meshing import InputError, TetMesh, box, tetrahedralize, torus

@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, paths, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of

@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import TISSUE
 from tetlux.fem import Deposit, Medium, PencilBeam, solve
 from tetlux.fem import line_charges as lines
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.line_charges import in_points

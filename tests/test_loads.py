@@ -8,7 +8,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import Deposit, Medium, PencilBeam
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.meshing import Surface, TetMesh

@@ -9,7 +9,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
 from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Light, together
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of

@@ -11,7 +11,7 @@ import pytest
 from tests.conftest import TISSUE
 from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, Solution, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.meshing import InputError, Surface, TetMesh, mesh_from_arrays, sphere, surface_from_arrays
 from tetlux.meshing.notes import Note, codes_of, in_region, prefixed
 

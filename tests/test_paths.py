@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System, paths
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.fresnel import reflectance

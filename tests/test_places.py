@@ -24,10 +24,10 @@ from tetlux.fem import (
     VaryingMedium,
     solve,
 )
+from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.exact import layered
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.fresnel import reflectance
-from tetlux.fem.partition import MeshPartition, SurfacePartition
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 

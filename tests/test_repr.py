@@ -17,7 +17,7 @@ from tetlux.fem import (
     solve,
     table,
 )
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.meshing import Surface, TetMesh, box, sphere
 from tetlux.meshing.describe import LONGEST_LINE
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Gaussian, Image, Medium, Rectangle
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.spot import Spot
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.meshing import InputError, TetMesh, box

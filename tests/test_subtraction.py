@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.assembly import Mass
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space
 from tetlux.fem.sources import Subtract, sources_of
 from tetlux.fem.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of, patch_of

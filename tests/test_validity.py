@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Medium, PencilBeam, PointSource
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.lights.deposit import Light

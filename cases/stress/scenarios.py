@@ -9,7 +9,7 @@ from tetlux.cases.chart.samples import Samples, project_to_sphere, surface_sampl
 from tetlux.cases.stress.bodies import BODIES
 from tetlux.cases.stress.meshes import ball_of_layers, degrade
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.grading import lit_points

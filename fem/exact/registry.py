@@ -121,7 +121,7 @@ def closed_forms(shape: Shape | None, medium: Medium, deposits: Sequence[Deposit
     --------
     >>> import numpy as np
     >>> from tetlux.fem import Medium, PointSource
-    >>> from tetlux.fem.body import Body
+    >>> from tetlux.fem.body.body import Body
     >>> from tetlux.meshing import sphere
     >>> ball, medium = sphere(10.0), Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
     >>> deposit = PointSource((0.0, 0.0, 9.0)).deposit_in(Body(ball, (medium,)))

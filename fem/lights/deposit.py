@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line

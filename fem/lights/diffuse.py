@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
 from tetlux.fem.media.fresnel import moments

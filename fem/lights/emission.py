@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
 from tetlux.fem.media.coefficients import Coefficients

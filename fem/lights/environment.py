@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.lights.spot import check_pixels

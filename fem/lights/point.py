@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector

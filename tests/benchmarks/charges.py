@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.fem import Medium, PencilBeam, PointSource, Power, solve
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem import CollimatedBeam, DiffuseLight, Light, Medium, PointSource, Solution
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import cylinder as exact_cylinder
 from tetlux.fem.exact import slab as exact_slab
 from tetlux.fem.exact import sphere as exact_sphere

@@ -49,7 +49,7 @@ from scipy.optimize import brentq
 from tests.tables.diffusion_against_monte_carlo import entered, head, medium_of, ratio, ratios, row
 from tetlux.fem import Medium, PencilBeam
 from tetlux.fem.assembly import Assembly
-from tetlux.fem.body import Body
+from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate
 from tetlux.fem.grading import graded_towards, lit_points

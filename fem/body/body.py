@@ -6,10 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from tetlux.fem.body.optical_paths import OpticalPaths, paths_of
+from tetlux.fem.body.partition import Partition, SurfacePartition
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, by_label
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.optical_paths import OpticalPaths, paths_of
-from tetlux.fem.partition import Partition, SurfacePartition
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.surface import Surface
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tetlux.fem.partition import Pieces
+from tetlux.fem.body.partition import Pieces
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # A coefficient that varies is taken at the ends and quarters of each piece. Pieces are halved until the range of these

@@ -1,0 +1,1 @@
+"""`Body`: which medium is where, and what light meets on its way."""
