@@ -13,6 +13,7 @@ from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.charges.solve import solve_with_charges
 from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.known.split import Sources, Subtract, check_list, sources_of
 from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.lights.deposit import Light
 from tetlux.fem.media.coefficients import AnyMedium
@@ -20,7 +21,6 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.scene import Scene, channels_of, scene_of
 from tetlux.fem.solution import Solution
-from tetlux.fem.sources import Sources, Subtract, check_list, sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
 from tetlux.fem.validity import warnings_for
@@ -142,7 +142,7 @@ def solve(
         Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
     subtract : {"half-space", "free-space", "nothing"}
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
-        `tetlux.fem.subtraction`.
+        `tetlux.fem.known.subtraction`.
     limit : bool
         Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.limiter`.
     most_tetrahedra : int

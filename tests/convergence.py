@@ -22,10 +22,10 @@ from tetlux.fem.assembly import system_matrix
 from tetlux.fem.body.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.known.split import Subtract
 from tetlux.fem.linear import Solver
 from tetlux.fem.multigrid import multigrid
 from tetlux.fem.solve import solve
-from tetlux.fem.sources import Subtract
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing import sphere as sphere_surface
 from tetlux.meshing.arrays import FloatArray, IntArray

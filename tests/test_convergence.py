@@ -12,7 +12,7 @@ import pytest
 from tests import convergence
 from tests.convergence import BODIES, Table
 from tetlux.fem.exact import slab_plane
-from tetlux.fem.sources import Subtract
+from tetlux.fem.known.split import Subtract
 from tetlux.meshing import TetMesh
 
 # Bounds of the error on the finest of three meshes: fluence in the volume, exitance on the surface.

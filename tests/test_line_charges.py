@@ -7,13 +7,13 @@ import pytest
 
 from tests.conftest import TISSUE
 from tetlux.fem import Deposit, Medium, PencilBeam, solve
-from tetlux.fem import line_charges as lines
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
-from tetlux.fem.line_charges import in_points
-from tetlux.fem.sources import sources_of
-from tetlux.fem.subtraction import MOST_CHARGES
+from tetlux.fem.known import beam_as_charges as lines
+from tetlux.fem.known.beam_as_charges import in_points
+from tetlux.fem.known.split import sources_of
+from tetlux.fem.known.subtraction import MOST_CHARGES
 from tetlux.meshing import Surface, slab, sphere
 from tetlux.meshing.arrays import FloatArray
 

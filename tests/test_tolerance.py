@@ -6,7 +6,7 @@ import pytest
 from tests.benchmarks.scenes import SCENES
 from tetlux.fem import PointSource, System, solve, solve_each
 from tetlux.fem.body.body import Body
-from tetlux.fem.sources import sources_of
+from tetlux.fem.known.split import sources_of
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing import Surface, TetMesh, refine, sphere
 

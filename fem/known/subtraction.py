@@ -12,7 +12,7 @@ the fluence is ``phi_h = u_h + (G - I_h G)`` there, with ``I_h G`` the linear in
 values at the nodes, and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G - I_h G, v)``,
 and ``a(G, v)`` is, by Gauss, the source's own load and integrals over the patch's faces alone.
 
-Beams without width are sums of such sources too, some of them negative: `tetlux.fem.line_charges`.
+Beams without width are sums of such sources too, some of them negative: `tetlux.fem.known.beam_as_charges`.
 """
 
 from dataclasses import dataclass, replace
