@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.lights.deposit import Deposit
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.surface.surface import Surface

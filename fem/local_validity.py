@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.facet_media import LocalMedia, media_in, media_under_facets
 from tetlux.fem.lights.collimated import CollimatedBeam
-from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.validity_tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line

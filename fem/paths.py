@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.cell_tree import Stretches

@@ -15,12 +15,12 @@ from tetlux.fem.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.known.split import Sources, Subtract, check_list, sources_of
 from tetlux.fem.labelled import GivenMedia
-from tetlux.fem.lights.deposit import Light
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.scene import Scene, channels_of, scene_of
 from tetlux.fem.solution import Solution
+from tetlux.fem.sources.deposit import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
 from tetlux.fem.validity import warnings_for

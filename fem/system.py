@@ -13,7 +13,6 @@ from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.known.split import Sources, Subtract, sources_of
 from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import LinearResult, Solver, solver_for
 from tetlux.fem.loads import load_vector
@@ -21,6 +20,7 @@ from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.solution import Power, Solution, added
+from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import count, one_line

@@ -23,11 +23,11 @@ from tetlux.fem import (
     System,
     solve,
 )
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.paths import Rays
 from tetlux.fem.solve import solve_each
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets import mesh as tetmesh

@@ -18,10 +18,10 @@ from tests.convergence import summed
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
 from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import cylinder, half_space, slab, sphere
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import FloatArray
 

@@ -9,11 +9,11 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST
 from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
-from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.solution import Power
+from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity import check_media
 from tetlux.meshing.arrays import FloatArray

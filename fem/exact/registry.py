@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.exact import cylinder, dipole, slab, sphere, sphere_light
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere

@@ -22,8 +22,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 
 # Length of the first panel in mean free paths, and Gauss points of each: exitance is 2e-4 off half a mean free path

@@ -1,13 +1,13 @@
 """Lights, one a file: where each one's power goes."""
 
 from tetlux.fem.lights.collimated import CollimatedBeam
-from tetlux.fem.lights.deposit import Deposit, Light
 from tetlux.fem.lights.diffuse import DiffuseLight
 from tetlux.fem.lights.emission import Emission
 from tetlux.fem.lights.environment import EnvironmentLight
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.lights.point import PointSource
 from tetlux.fem.lights.spot import Disc, Gaussian, Image, Rectangle
+from tetlux.fem.sources.deposit import Deposit, Light
 
 __all__ = [
     "CollimatedBeam",

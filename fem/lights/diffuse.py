@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
 from tetlux.fem.media.fresnel import moments
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.errors import InputError
 
 

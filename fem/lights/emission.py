@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import check_positive
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh

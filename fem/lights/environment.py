@@ -7,12 +7,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.lights.spot import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.media.varying import as_text
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.deposit import Deposit
 from tetlux.fem.media.varying import as_text
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 

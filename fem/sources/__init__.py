@@ -1,0 +1,1 @@
+"""What a light leaves in a body, as plain data."""
