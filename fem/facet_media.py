@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.ballistic.follow import optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.paths import optical_depths
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh

@@ -6,9 +6,9 @@ Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that pa
 
 import numpy as np
 
+from tetlux.fem.ballistic.follow import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.paths import cells_of, optical_depths
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.tets.march import march

@@ -23,9 +23,9 @@ from tetlux.fem import (
     System,
     solve,
 )
+from tetlux.fem.ballistic.follow import Rays
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.paths import Rays
 from tetlux.fem.solve import solve_each
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere

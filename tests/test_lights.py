@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, paths, solve
+from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, solve
+from tetlux.fem.ballistic import follow as paths
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.loads import load_vector

@@ -8,11 +8,12 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tests.test_loads import AWKWARD, CLOSE, FORWARD, beams, careful_load, pressed, scattered, turned
-from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System, paths
+from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource, System
+from tetlux.fem.ballistic import follow as paths
+from tetlux.fem.ballistic.follow import Rays, follow
 from tetlux.fem.body.body import Body
 from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
-from tetlux.fem.paths import Rays, follow
 from tetlux.fem.sources.deposit import Light, together
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tetlux.fem.ballistic.follow import Rays, entered, follow
 from tetlux.fem.body.body import Body
 from tetlux.fem.lights.point import check_positive, unit_vector
 from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
-from tetlux.fem.paths import Rays, entered, follow
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
 from tetlux.meshing.errors import InputError

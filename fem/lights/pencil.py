@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from tetlux.fem.ballistic.follow import Rays, beyond, entered, follow
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.optical_paths import OpticalPaths
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
@@ -13,7 +14,6 @@ from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.spot import Disc, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
-from tetlux.fem.paths import Rays, beyond, entered, follow
 from tetlux.fem.sources.deposit import Deposit, together
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError

@@ -1,0 +1,1 @@
+"""Light before it is scattered: rays refracted, followed, deposited."""
