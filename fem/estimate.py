@@ -19,7 +19,7 @@ them, it is::
     ∮ |delta| [ |[D]| |grad_t phi . grad_t z| + |[1/D]| |D dphi/dn D dz/dn| + |[sigma_a]| phi z + |[Q0]| z ]
 
 Where light fades within less than the height of the boundary's tetrahedra, neither gradient shows it. What
-`tetlux.fem.fitting` leaves over there goes with the steps of fluence across these tetrahedra and x = k h::
+`tetlux.fem.operators.fitting` leaves over there goes with the steps of fluence across these tetrahedra and x = k h::
 
     ∮ D k LAYERS x²/(1 + x²)^(3/2) |phi step| z
 
@@ -40,9 +40,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array
 
-from tetlux.fem.fitting import Fitting
 from tetlux.fem.linear import Solver
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.operators.fitting import Fitting
 from tetlux.fem.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line

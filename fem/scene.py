@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labelled import GivenMedia, channels_by_label, one_label, warnings_for_cavities, warnings_for_labels
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
+from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.solution import Solution
 from tetlux.fem.system import System
 from tetlux.fem.validity import check_media, warnings_for_regions

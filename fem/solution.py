@@ -72,7 +72,7 @@ class Solution:
     warnings : list of str
         Plain sentences, each a `tetlux.meshing.notes.Note` with a code.
     moved : float
-        Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.limiter`.
+        Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.operators.limiter`.
     of_lights : tuple of Solution
         What each light adds, in their order, if there are several.
     validity : Validity, optional

@@ -8,7 +8,6 @@ from typing import Any, Literal, overload
 
 import numpy as np
 
-from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.charges.solve import solve_with_charges
 from tetlux.fem.estimate import ROUNDING
@@ -18,6 +17,7 @@ from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
+from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.scene import Scene, channels_of, scene_of
 from tetlux.fem.solution import Solution
 from tetlux.fem.sources.deposit import Light
@@ -139,12 +139,12 @@ def solve(
     mesh : TetMesh, optional
         Use this mesh of the body as it is.
     mass : {"lumped", "consistent"}
-        Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
+        Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     subtract : {"half-space", "free-space", "nothing"}
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
         `tetlux.fem.known.subtraction`.
     limit : bool
-        Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.limiter`.
+        Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.operators.limiter`.
     most_tetrahedra : int
         Where refinement stops even if the tolerance is not met; the solution then carries a warning. The
         mesher's own mesh, of some thousands, is the least. It stops earlier where memory is scarce.

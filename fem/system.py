@@ -6,19 +6,19 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.assembly import Assembly, Mass
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.estimate import Estimate, estimated
-from tetlux.fem.fitting import Fitting, fitting_of
 from tetlux.fem.known.split import Sources, Subtract, sources_of
 from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.fem.limiter import nonnegative
 from tetlux.fem.linear import LinearResult, Solver, solver_for
-from tetlux.fem.loads import load_vector
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
+from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.fitting import Fitting, fitting_of
+from tetlux.fem.operators.limiter import nonnegative
+from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -55,7 +55,7 @@ class System:
     surface : Surface, optional
         What the mesh stands for; its own boundary if not given.
     mass : {"lumped", "consistent"}
-        Integration of the terms without derivatives, see `tetlux.fem.assembly.system_matrix`.
+        Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     expected : int
         How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
     regions : tuple of Region
@@ -63,7 +63,7 @@ class System:
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     limit : bool
-        Whether the fluence is kept from going below zero, see `tetlux.fem.limiter`; not under a light for which the
+        Whether the fluence is kept from going below zero, see `tetlux.fem.operators.limiter`; not under a light for which the
         diffusion equation itself does.
     """
 

@@ -10,9 +10,9 @@ from skfem.helpers import dot, grad
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium
-from tetlux.fem.assembly import Assembly, Mass, system_matrix
-from tetlux.fem.forms import weak_form_matrix
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.operators.assembly import Assembly, Mass, system_matrix
+from tetlux.fem.operators.forms import weak_form_matrix
 from tetlux.meshing import TetMesh
 from tetlux.meshing.tets.mesh import tetrahedron_volumes
 

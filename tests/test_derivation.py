@@ -16,11 +16,11 @@ import pytest
 from tests.conftest import block
 from tests.convergence import summed
 from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
-from tetlux.fem.assembly import system_matrix
 from tetlux.fem.exact import cylinder, half_space, slab, sphere
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.operators.assembly import system_matrix
+from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import FloatArray

@@ -5,8 +5,8 @@ import pytest
 
 from tetlux.fem import DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region, System, solve
 from tetlux.fem.exact import concentric, sphere_light
-from tetlux.fem.fitting import fitting_of
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.operators.fitting import fitting_of
 from tetlux.meshing import TetMesh, sphere, tetrahedralize
 
 

@@ -11,9 +11,9 @@ from tetlux.fem import Deposit, DiffuseLight, Medium, PencilBeam, PointSource, s
 from tetlux.fem.ballistic import follow as paths
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere_light
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.operators.loads import load_vector
 from tetlux.meshing import InputError, Surface, TetMesh, box, slab, sphere, surface_from_arrays
 
 FORWARD = Medium(sigma_a=0.05, sigma_s=10.0, g=0.9, eta=1.4)

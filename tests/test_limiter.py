@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, System, solve
-from tetlux.fem.limiter import nonnegative
+from tetlux.fem.operators.limiter import nonnegative
 from tetlux.meshing import TetMesh, box, sphere, tetrahedralize
 
 DARK = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)

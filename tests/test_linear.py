@@ -12,12 +12,12 @@ from scipy.sparse.linalg import spsolve
 from tests.conftest import TISSUE, block, needs
 from tetlux.fem import Medium, PointSource, krylov, linear, solve
 from tetlux.fem import multigrid as multigrid_module
-from tetlux.fem.assembly import ALIKE, Assembly, system_matrix
 from tetlux.fem.direct import direct
 from tetlux.fem.krylov import Method, Product, jacobi
 from tetlux.fem.linear import Solver, solver_for
 from tetlux.fem.media.coefficients import apart, coefficients_of
 from tetlux.fem.multigrid import multigrid
+from tetlux.fem.operators.assembly import ALIKE, Assembly, system_matrix
 from tetlux.meshing import RunError, TetMesh, refine
 from tetlux.meshing.host import blocks
 
@@ -280,7 +280,9 @@ def test_a_run_says_that_its_solver_fell_back(wide: TetMesh, monkeypatch: pytest
     def helpless(product: Product) -> Method:
         return lambda rest: (0.0 * rest, 1)
 
-    monkeypatch.setattr("tetlux.fem.assembly.solver_for", lambda matrix, *_: Solver(matrix, [helpless, direct]))
+    monkeypatch.setattr(
+        "tetlux.fem.operators.assembly.solver_for", lambda matrix, *_: Solver(matrix, [helpless, direct])
+    )
     solution = solve(wide, TISSUE, [PointSource((0.0, 0.0, -1.0))])
     assert any("had to fall back from helpless to direct" in warning for warning in solution.warnings)
     assert abs(solution.power.balance_error) < 1e-12

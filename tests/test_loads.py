@@ -9,8 +9,8 @@ import pytest
 from tests.conftest import block
 from tetlux.fem import Deposit, Medium, PencilBeam
 from tetlux.fem.body.body import Body
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.operators.loads import load_vector
 from tetlux.meshing import Surface, TetMesh
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search import cell_tree

@@ -12,8 +12,8 @@ from tetlux.fem import CollimatedBeam, Deposit, Medium, PencilBeam, PointSource,
 from tetlux.fem.ballistic import follow as paths
 from tetlux.fem.ballistic.follow import Rays, follow
 from tetlux.fem.body.body import Body
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
+from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.deposit import Light, together
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray

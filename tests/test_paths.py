@@ -10,9 +10,9 @@ from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, Sys
 from tetlux.fem.ballistic import follow as paths
 from tetlux.fem.ballistic.follow import Rays, follow
 from tetlux.fem.body.body import Body
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.solution import Power
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector

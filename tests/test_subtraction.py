@@ -7,11 +7,11 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
-from tetlux.fem.assembly import Mass
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space
 from tetlux.fem.known.split import Subtract, sources_of
 from tetlux.fem.known.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of, patch_of
+from tetlux.fem.operators.assembly import Mass
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 

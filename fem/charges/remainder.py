@@ -25,12 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.assembly import Assembly
 from tetlux.fem.charges.adapt import FittedCharges
 from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.operators.assembly import Assembly
 from tetlux.meshing.arrays import FloatArray, summed
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh

@@ -23,10 +23,10 @@ from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
-from tetlux.fem.assembly import Mass
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
 from tetlux.meshing.describe import one_line

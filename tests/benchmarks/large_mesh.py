@@ -57,7 +57,7 @@ def tetlux(points: FloatArray, tetrahedra: IntArray, method: str) -> Row:
     import pyamg  # noqa: F401, PLC0415
 
     from tetlux.fem import Medium, krylov, linear  # noqa: PLC0415
-    from tetlux.fem.assembly import system_matrix  # noqa: PLC0415
+    from tetlux.fem.operators.assembly import system_matrix  # noqa: PLC0415
     from tetlux.meshing import TetMesh  # noqa: PLC0415
 
     if method == "jacobi":

@@ -48,14 +48,14 @@ from scipy.optimize import brentq
 
 from tests.tables.diffusion_against_monte_carlo import entered, head, medium_of, ratio, ratios, row
 from tetlux.fem import Medium, PencilBeam
-from tetlux.fem.assembly import Assembly
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.linear import solver_for
-from tetlux.fem.loads import load_vector
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.operators.assembly import Assembly
+from tetlux.fem.operators.loads import load_vector
 from tetlux.meshing import sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 

@@ -6,7 +6,7 @@ Find phi such that for every test function v::
 
 which is equation 9 of the CS667 notes, tested with v and integrated by parts, with the partial-current
 boundary ``E.n = phi/(2A)``. The boundary term of Q1 cancels against that of the flux
-``E = Q1/sigma_t' - D grad phi`` and is left out on purpose. The right-hand side is in `tetlux.fem.loads`.
+``E = Q1/sigma_t' - D grad phi`` and is left out on purpose. The right-hand side is in `tetlux.fem.operators.loads`.
 """
 
 from typing import Any
@@ -16,8 +16,8 @@ from scipy.sparse import csr_array
 from skfem import Basis, BilinearForm, ElementTetP1, FacetBasis, MeshTet1
 from skfem.helpers import dot, grad
 
-from tetlux.fem.assembly import Mass
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.operators.assembly import Mass
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.
@@ -44,7 +44,7 @@ def exitance(phi: Any, v: Any, w: Any) -> Any:
 
 
 def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
-    """The matrix of the left-hand side by scikit-fem's quadrature: what `tetlux.fem.assembly` is held against.
+    """The matrix of the left-hand side by scikit-fem's quadrature: what `tetlux.fem.operators.assembly` is held against.
 
     Parameters
     ----------

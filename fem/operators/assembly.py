@@ -1,4 +1,4 @@
-"""The system matrix in closed form: what `tetlux.fem.forms` says, some ten times quicker.
+"""The system matrix in closed form: what `tetlux.fem.operators.forms` says, some ten times quicker.
 
 On a tetrahedron of volume V, with N_i the inward normal of the face opposite corner i, as long as twice its area,
 the gradients of the hat functions are ``N_i / (6V)``, so that (Zienkiewicz, Taylor & Zhu, The Finite Element Method,
@@ -35,7 +35,7 @@ ALIKE = 4.0
 
 
 def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
-    """The matrix of the left-hand side of the weak form in `tetlux.fem.forms`.
+    """The matrix of the left-hand side of the weak form in `tetlux.fem.operators.forms`.
 
     Several media on one mesh share an `Assembly`.
 
@@ -101,7 +101,7 @@ class Assembly:
             1/(2A), of all or of each boundary triangle.
         mass : {"lumped", "consistent"}
         kept : (n,) ndarray, optional
-            The share of its absorption that the lumped mass of each node keeps, see `tetlux.fem.fitting`.
+            The share of its absorption that the lumped mass of each node keeps, see `tetlux.fem.operators.fitting`.
 
         Returns
         -------

@@ -1,0 +1,1 @@
+"""The weak form as matrices and loads."""
