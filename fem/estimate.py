@@ -40,7 +40,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array
 
-from tetlux.fem.linear import Solver
+from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.operators.fitting import Fitting
 from tetlux.fem.solution import Solution

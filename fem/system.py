@@ -11,7 +11,7 @@ from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.estimate import Estimate, estimated
 from tetlux.fem.known.split import Sources, Subtract, sources_of
 from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
-from tetlux.fem.linear import LinearResult, Solver, solver_for
+from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
 from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium

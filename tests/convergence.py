@@ -22,8 +22,8 @@ from tetlux.fem.body.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.known.split import Subtract
-from tetlux.fem.linear import Solver
-from tetlux.fem.multigrid import multigrid
+from tetlux.fem.linear.multigrid import multigrid
+from tetlux.fem.linear.solver import Solver
 from tetlux.fem.operators.assembly import system_matrix
 from tetlux.fem.solve import solve
 from tetlux.meshing import Surface, TetMesh, refine

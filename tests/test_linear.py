@@ -10,13 +10,15 @@ from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block, needs
-from tetlux.fem import Medium, PointSource, krylov, linear, solve
-from tetlux.fem import multigrid as multigrid_module
-from tetlux.fem.direct import direct
-from tetlux.fem.krylov import Method, Product, jacobi
-from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem import Medium, PointSource, solve
+from tetlux.fem.linear import krylov
+from tetlux.fem.linear import multigrid as multigrid_module
+from tetlux.fem.linear import solver as linear
+from tetlux.fem.linear.direct import direct
+from tetlux.fem.linear.krylov import Method, Product, jacobi
+from tetlux.fem.linear.multigrid import multigrid
+from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import apart, coefficients_of
-from tetlux.fem.multigrid import multigrid
 from tetlux.fem.operators.assembly import ALIKE, Assembly, system_matrix
 from tetlux.meshing import RunError, TetMesh, refine
 from tetlux.meshing.host import blocks

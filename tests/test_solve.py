@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import DiffuseLight, Medium, PencilBeam, PointSource, Solution, krylov, solve, solve_each
+from tetlux.fem import DiffuseLight, Medium, PencilBeam, PointSource, Solution, solve, solve_each
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.linear import Solver
-from tetlux.fem.multigrid import multigrid
+from tetlux.fem.linear import krylov
+from tetlux.fem.linear.multigrid import multigrid
+from tetlux.fem.linear.solver import Solver
 from tetlux.fem.operators.assembly import system_matrix
 from tetlux.meshing import InputError, RunError, Surface, TetMesh, slab, sphere, surface_from_arrays, tetrahedralize
 

@@ -26,7 +26,8 @@ from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.trials import Trial
 from tetlux.cases.stress.variants import CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
-from tetlux.fem import direct, krylov, linear
+from tetlux.fem.linear import direct, krylov
+from tetlux.fem.linear import solver as linear
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.notes import Note
 

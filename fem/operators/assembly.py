@@ -18,8 +18,8 @@ from typing import Literal
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem.krylov import Preconditioner
-from tetlux.fem.linear import Solver, solver_for
+from tetlux.fem.linear.krylov import Preconditioner
+from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients, apart, coefficients_of
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed

@@ -52,7 +52,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate
 from tetlux.fem.grading import graded_towards, lit_points
-from tetlux.fem.linear import solver_for
+from tetlux.fem.linear.solver import solver_for
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.operators.loads import load_vector

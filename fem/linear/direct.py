@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.fem.krylov import Method, Product
+from tetlux.fem.linear.krylov import Method, Product
 
 
 def direct(product: Product) -> Method:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem import krylov
-from tetlux.fem.direct import direct
-from tetlux.fem.krylov import TOGETHER, Method, Preconditioner, Product, dots, jacobi
-from tetlux.fem.multigrid import HAS_PYAMG, Multigrid, multigrid
+from tetlux.fem.linear import krylov
+from tetlux.fem.linear.direct import direct
+from tetlux.fem.linear.krylov import TOGETHER, Method, Preconditioner, Product, dots, jacobi
+from tetlux.fem.linear.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.blocks import THREADS

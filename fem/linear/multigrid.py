@@ -6,8 +6,8 @@ from importlib.util import find_spec
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
-from tetlux.fem.direct import direct
-from tetlux.fem.krylov import Preconditioner, Product, dots, preconditioned
+from tetlux.fem.linear.direct import direct
+from tetlux.fem.linear.krylov import Preconditioner, Product, dots, preconditioned
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
@@ -26,7 +26,7 @@ class Multigrid:
     cycle: Preconditioner
 
     def __call__(self, rest: FloatArray) -> tuple[FloatArray, int]:
-        """See `tetlux.fem.krylov.Method`."""
+        """See `tetlux.fem.linear.krylov.Method`."""
         return preconditioned(self.product, self.cycle)(rest)
 
     __repr__ = one_line

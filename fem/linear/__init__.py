@@ -1,0 +1,1 @@
+"""Linear solvers that return the true residual."""
