@@ -66,7 +66,7 @@ class Solution:
     transmitted_irradiance : float or (b,) ndarray
         Diffuse light that passed to the inside, throughout or at each boundary node, W/unit².
     error_estimate : float
-        Estimated relative L2 error of the exitance: see `tetlux.fem.estimate`.
+        Estimated relative L2 error of the exitance: see `tetlux.fem.error.estimate`.
     seconds : dict
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str

@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.fem.charges.solution import ChargeSolution
 from tetlux.fem.charges.solve import solve_with_charges
-from tetlux.fem.estimate import ROUNDING
+from tetlux.fem.error.estimate import ROUNDING
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.known.split import Sources, Subtract, check_list, sources_of
 from tetlux.fem.labelled import GivenMedia
@@ -172,7 +172,7 @@ def solve(
 
     Notes
     -----
-    The error is estimated by a dual solution, see `tetlux.fem.estimate`; the tetrahedra that make most of it are
+    The error is estimated by a dual solution, see `tetlux.fem.error.estimate`; the tetrahedra that make most of it are
     split, until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
     approximation.
     """

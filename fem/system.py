@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
-from tetlux.fem.estimate import Estimate, estimated
+from tetlux.fem.error.estimate import Estimate, estimated
 from tetlux.fem.known.split import Sources, Subtract, sources_of
 from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for

@@ -1,0 +1,1 @@
+"""The estimated error of the exitance."""
