@@ -16,7 +16,7 @@ from tetlux.fem.labelled import label_of, outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.media.region import Region
 from tetlux.fem.scene import media_of as media_of_scenes
-from tetlux.fem.validity import check_media, check_size, check_together
+from tetlux.fem.validity.notes import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface

@@ -9,7 +9,7 @@ from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import PhaseFunction, henyey_greenstein, table, two_term
 from tetlux.fem.media.varying import Field, VaryingMedium
-from tetlux.fem.validity import check_scattering
+from tetlux.fem.validity.notes import check_scattering
 from tetlux.meshing.arrays import FloatArray
 
 

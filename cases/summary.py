@@ -10,9 +10,9 @@ from tetlux.cases.case import Channel
 from tetlux.cases.media_rows import media_rows
 from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in
-from tetlux.fem.local_validity import Validity
 from tetlux.fem.solution import Power, Solution
-from tetlux.fem.validity import NEAR, THIN
+from tetlux.fem.validity.local import Validity
+from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, check_labels
 from tetlux.fem.solution import Solution
-from tetlux.fem.validity import warning_for_part
+from tetlux.fem.validity.notes import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note

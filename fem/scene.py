@@ -11,7 +11,7 @@ from tetlux.fem.media.region import Region, check_list_of_regions
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.solution import Solution
 from tetlux.fem.system import System
-from tetlux.fem.validity import check_media, warnings_for_regions
+from tetlux.fem.validity.notes import check_media, warnings_for_regions
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface

@@ -7,9 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.known.subtraction import Patch
-from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
@@ -162,7 +162,7 @@ class Solution:
         Returns
         -------
         (q,) ndarray
-            1 less the expected relative error of the exitance, not below 0: see `tetlux.fem.local_validity`. It is the
+            1 less the expected relative error of the exitance, not below 0: see `tetlux.fem.validity.local`. It is the
             error of the model, which no mesh makes smaller; that of the mesh is `error_estimate`. nan at points that
             are not finite.
         """

@@ -23,7 +23,7 @@ from tetlux.fem.solution import Solution
 from tetlux.fem.sources.deposit import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
-from tetlux.fem.validity import warnings_for
+from tetlux.fem.validity.notes import warnings_for
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize

@@ -12,7 +12,6 @@ from tetlux.fem.error.estimate import Estimate, estimated
 from tetlux.fem.known.split import Sources, Subtract, sources_of
 from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
-from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.operators.assembly import Assembly, Mass
@@ -22,6 +21,7 @@ from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.solution import Power, Solution, added
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import count, one_line
 from tetlux.meshing.surface.surface import Surface

@@ -15,7 +15,7 @@ from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.solution import Power
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.validity import check_media
+from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

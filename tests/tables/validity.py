@@ -1,4 +1,4 @@
-"""How far diffusion is from radiative transfer, by one cause at a time: the figures of `tetlux.fem.validity_tables`.
+"""How far diffusion is from radiative transfer, by one cause at a time: the figures of `tetlux.fem.validity.tables`.
 
 Run ``python -m tests.tables.validity`` in the root of the repository (two minutes). Diffusion is its closed form each
 time, radiative transfer is `tetlux.fem.exact.monte_carlo`; the figures are ``|diffusion/transfer - 1|`` of the
@@ -17,7 +17,7 @@ from tests.tables.diffusion_against_monte_carlo import entered, line_under_a_bea
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab
 from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
-from tetlux.fem.validity_tables import (
+from tetlux.fem.validity.tables import (
     ALBEDOS,
     COSINES,
     DIAMETERS,

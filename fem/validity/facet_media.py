@@ -14,7 +14,7 @@ from tetlux.meshing.tets.thickness import thickness
 
 @dataclass(frozen=True, eq=False)
 class LocalMedia:
-    """Media at places: what `tetlux.fem.validity_tables` needs of them.
+    """Media at places: what `tetlux.fem.validity.tables` needs of them.
 
     Attributes
     ----------

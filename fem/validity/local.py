@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tetlux.fem.facet_media import LocalMedia, media_in, media_under_facets
 from tetlux.fem.lights.collimated import CollimatedBeam
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.sources.deposit import Deposit, Light
-from tetlux.fem.validity_tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
+from tetlux.fem.validity.facet_media import LocalMedia, media_in, media_under_facets
+from tetlux.fem.validity.tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
@@ -24,8 +24,8 @@ class Validity:
     """What is to be expected of the diffusion approximation on the surface of a body.
 
     It follows from coefficients, geometry and light alone: the relative error of the exitance by each of several
-    causes, as Monte Carlo has them (`tetlux.fem.validity_tables`), of which the largest counts. They were found in one
-    medium throughout; in a body of several each facet has that of the media below it (`tetlux.fem.facet_media`), and
+    causes, as Monte Carlo has them (`tetlux.fem.validity.tables`), of which the largest counts. They were found in one
+    medium throughout; in a body of several each facet has that of the media below it (`tetlux.fem.validity.facet_media`), and
     what is near a light that of the place where the light enters.
 
     Parameters

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.local_validity import Validity
 from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.validity.local import Validity
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
@@ -96,7 +96,7 @@ def warnings_for(surface: Surface, validity: Validity) -> list[str]:
 
     The figures are of diffusion against Monte Carlo. Those by reduced albedo and index are of slabs under a wide beam,
     as ``python -m tests.tables.diffusion_against_monte_carlo`` prints them; all others are those of
-    `tetlux.fem.validity_tables`.
+    `tetlux.fem.validity.tables`.
     """
     return [*_of_albedo(validity), *_of_thin_parts(surface, validity), *_of_distance(validity)]
 

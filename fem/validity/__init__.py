@@ -1,0 +1,1 @@
+"""Where the diffusion approximation itself is off, with figures."""
