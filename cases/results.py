@@ -9,9 +9,9 @@ import numpy.typing as npt
 from tetlux.cases.case import Case
 from tetlux.cases.channels import ALL
 from tetlux.cases.colours import RGB, Bytes, preview
-from tetlux.fem.radiance import radiance
-from tetlux.fem.solution import Solution
-from tetlux.fem.surface_exitance import surface_exitance
+from tetlux.fem.outcome.radiance import radiance
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface

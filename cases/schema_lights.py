@@ -125,7 +125,7 @@ class FibreSpec(DiscSpec):
 
 
 class DetectorSpec(Choice):
-    """A detector on the surface, see `tetlux.fem.detectors`."""
+    """A detector on the surface, see `tetlux.fem.outcome.detectors`."""
 
     name: Label
     point: Vector3 | None = None

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from tetlux.cases.schema_lights import DetectorSpec
-from tetlux.fem.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
-from tetlux.fem.exitance_field import Dark
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.surface.surface import Surface
 
 

@@ -10,7 +10,7 @@ from tetlux.cases.case import Channel
 from tetlux.cases.media_rows import media_rows
 from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in
-from tetlux.fem.solution import Power, Solution
+from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray

@@ -2,7 +2,6 @@
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.charges import ChargeSolution
-from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -23,8 +22,9 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.radiance import radiance
-from tetlux.fem.solution import Power, Solution
+from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
+from tetlux.fem.outcome.radiance import radiance
+from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.fem.solve import solve, solve_each
 from tetlux.fem.system import System
 

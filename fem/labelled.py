@@ -9,7 +9,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, check_labels
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError

@@ -9,7 +9,7 @@ from tetlux.fem.labelled import GivenMedia, channels_by_label, one_label, warnin
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
 from tetlux.fem.operators.assembly import Assembly, Mass
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.system import System
 from tetlux.fem.validity.notes import check_media, warnings_for_regions
 from tetlux.meshing.errors import InputError

@@ -18,8 +18,8 @@ from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scene import Scene, channels_of, scene_of
-from tetlux.fem.solution import Solution
 from tetlux.fem.sources.deposit import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step

@@ -18,7 +18,7 @@ from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import Fitting, fitting_of
 from tetlux.fem.operators.limiter import nonnegative
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.solution import Power, Solution, added
+from tetlux.fem.outcome.solution import Power, Solution, added
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity

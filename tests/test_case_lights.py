@@ -14,7 +14,7 @@ from tetlux.cases.images import read_pixels
 from tetlux.cases.picture_rays import rays
 from tetlux.fem import CollimatedBeam, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
-from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector
+from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector
 from tetlux.meshing import InputError, box
 
 CUBE = """\

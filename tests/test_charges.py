@@ -31,7 +31,7 @@ from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.charges.samples import Samples
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.surface_exitance import surface_exitance
+from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import InputError, Surface, box, read_surface, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 

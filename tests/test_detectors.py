@@ -10,10 +10,10 @@ from scipy.integrate import quad
 
 from tests.conftest import TISSUE
 from tetlux.fem import Medium, Solution
-from tetlux.fem.detectors import DiscDetector, FibreDetector, PointDetector, read
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.fresnel import moments, reflectance
-from tetlux.fem.radiance import collected_share, radiance
+from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.radiance import collected_share, radiance
 from tetlux.meshing import InputError, Surface, box
 from tetlux.meshing.arrays import FloatArray
 

@@ -19,8 +19,8 @@ from tetlux.cases.results import Results, results_of
 from tetlux.cases.run import run_case
 from tetlux.cases.sensors import readings
 from tetlux.fem import solve
-from tetlux.fem.radiance import radiance
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.radiance import radiance
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve_each
 from tetlux.meshing import Surface, box
 from tetlux.meshing.arrays import FloatArray

@@ -13,7 +13,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.solution import Power
+from tetlux.fem.outcome.solution import Power
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 

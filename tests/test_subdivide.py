@@ -5,7 +5,7 @@ import numpy as np
 from tests.conftest import TISSUE
 from tetlux.fem import PointSource, solve
 from tetlux.fem.exact import half_space
-from tetlux.fem.surface_exitance import surface_exitance
+from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import slab
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest

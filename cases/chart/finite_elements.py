@@ -10,7 +10,7 @@ from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.methods import Method, Outcome, fastest_run
 from tetlux.fem.grading import graded_towards
 from tetlux.fem.known.split import Subtract
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.mesher.api import tetrahedralize
 from tetlux.meshing.surface.surface import Surface

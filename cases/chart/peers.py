@@ -14,7 +14,7 @@ import numpy as np
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.finite_elements import GRADINGS, graded_mesh
 from tetlux.cases.chart.methods import REPEAT_SECONDS, Method, Outcome
-from tetlux.fem.exitance_field import LinearFluence
+from tetlux.fem.outcome.exitance_field import LinearFluence
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
 from tetlux.meshing.surface.solids import Slab, Sphere, Torus

@@ -10,7 +10,7 @@ from tetlux.cases.chart.samples import Samples, project_to_sphere
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.lights import Deposit
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.compare.comparison import Comparison
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import RunError
 

@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.cases.chart.samples import relative_error
 from tetlux.cases.stress.scenarios import TOLERANCE, Scenario, Truth
 from tetlux.cases.stress.variants import Variant
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import tetrahedralize

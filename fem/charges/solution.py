@@ -18,7 +18,7 @@ from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.solution import Power
+from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

@@ -12,7 +12,7 @@ from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.solution import Power
+from tetlux.fem.outcome.solution import Power
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.notes import check_media

@@ -43,7 +43,7 @@ from scipy.sparse import csc_array
 from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.operators.fitting import Fitting
-from tetlux.fem.solution import Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import at_once

@@ -9,8 +9,8 @@ Rendering has it so; divide by that share for a radiance that adds up to M, as f
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.media.fresnel import reflectance
+from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.exitance_field import ResolvedField
+from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
 from tetlux.meshing.surface.surface import Surface

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.exitance_field import ExitanceField
 from tetlux.fem.lights.point import as_vector
 from tetlux.fem.media.varying import as_text
-from tetlux.fem.radiance import collected_share
+from tetlux.fem.outcome.exitance_field import ExitanceField
+from tetlux.fem.outcome.radiance import collected_share
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 

@@ -1,0 +1,1 @@
+"""What a solution is asked for: exitance, fluence, power, readings."""
