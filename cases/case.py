@@ -8,10 +8,10 @@ from tetlux.cases.body import CaseBody, body_of
 from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.document import Document, read_document
+from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.lighting import keys_of, light_names, light_of
 from tetlux.cases.picture_view import UPRIGHT, toward_camera
 from tetlux.cases.reading import Reader
-from tetlux.cases.schema import CaseSpec
 from tetlux.cases.sensors import Sensor, sensor_of
 from tetlux.cases.sweep import LONGEST_NAME, swept
 from tetlux.cases.validation import validated

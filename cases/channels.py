@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from tetlux.cases.colours import RGB
 from tetlux.cases.document import Document, Key, dotted
-from tetlux.cases.schema import CaseSpec
-from tetlux.cases.schema_media import MaterialSpec, Media
+from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.file.schema.media import MaterialSpec, Media
 
 # The name of the only channel, and what the sum of all lights is called.
 ALL = "all"

@@ -177,7 +177,7 @@ def _stress(options: argparse.Namespace) -> int:
 def _schema(_: argparse.Namespace) -> int:
     import json  # noqa: PLC0415
 
-    from tetlux.cases.schema import CaseSpec  # noqa: PLC0415
+    from tetlux.cases.file.schema.case import CaseSpec  # noqa: PLC0415
 
     print(json.dumps(CaseSpec.model_json_schema(), indent=2))
     return 0

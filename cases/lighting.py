@@ -7,10 +7,10 @@ from pydantic import BaseModel
 
 from tetlux.cases.channels import of_channel
 from tetlux.cases.document import Key
+from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.file.schema.lights import CollimatedSpec, EmissionSpec, EnvironmentSpec, LightSpec, SpotSpec
 from tetlux.cases.images import of_channel as colour_of_channel
 from tetlux.cases.reading import Reader
-from tetlux.cases.schema import CaseSpec
-from tetlux.cases.schema_lights import CollimatedSpec, EmissionSpec, EnvironmentSpec, LightSpec, SpotSpec
 from tetlux.fem.lights import (
     CollimatedBeam,
     DiffuseLight,

@@ -2,8 +2,8 @@
 
 from tetlux.cases.channels import of_channel
 from tetlux.cases.document import Document, Key
+from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
 from tetlux.cases.reading import Reader
-from tetlux.cases.schema_media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.schema_lights import CameraSpec
+from tetlux.cases.file.schema.lights import CameraSpec
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.cases.file.schema.case import MeshSpec, SurfaceSpec
+from tetlux.cases.file.schema.media import FieldSpec
+from tetlux.cases.file.schema.parts import Encoding
 from tetlux.cases.images import read_pixels
-from tetlux.cases.schema import MeshSpec, SurfaceSpec
-from tetlux.cases.schema_media import FieldSpec
-from tetlux.cases.schema_parts import Encoding
 from tetlux.fem.media.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray

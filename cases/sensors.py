@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.schema_lights import DetectorSpec
+from tetlux.cases.file.schema.lights import DetectorSpec
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
 from tetlux.fem.outcome.exitance_field import Dark

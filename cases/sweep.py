@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from tetlux.cases.document import Document, Key
-from tetlux.cases.schema import CaseSpec
+from tetlux.cases.file.schema.case import CaseSpec
 
 MOST_RUNS = 20_000
 # Of folders, in bytes: what file systems hold.

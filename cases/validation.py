@@ -6,9 +6,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from tetlux.cases.document import Document, Key
+from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.file.schema.parts import TAG
 from tetlux.cases.nearest import did_you_mean
-from tetlux.cases.schema import CaseSpec
-from tetlux.cases.schema_parts import TAG
 
 # What pydantic says in words of Python's, by the beginning of its error's kind; of lists, how long they are.
 PLAIN = {

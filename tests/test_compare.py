@@ -13,8 +13,8 @@ from tests.conftest import TISSUE
 from tetlux.cases.case import Case, load_cases
 from tetlux.cases.compare.comparison import NAMES, source_model
 from tetlux.cases.compare.differences import MEANINGS, compare
+from tetlux.cases.file.schema.case import ClosedForm
 from tetlux.cases.run import run_case
-from tetlux.cases.schema import ClosedForm
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import slab as exact_slab

@@ -9,7 +9,7 @@ import pytest
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.cases.case import load_cases
-from tetlux.cases.schema import CaseSpec
+from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.meshing import TetMesh
 from tetlux.meshing.files.meshes import write_mesh
 

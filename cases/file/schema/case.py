@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.schema_lights import CameraSpec, DetectorSpec, LightSpec
-from tetlux.cases.schema_media import Media
-from tetlux.cases.schema_parts import TAG, Choice, Label, Length, Number, Section, Vector3
+from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
+from tetlux.cases.file.schema.media import Media
+from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3
 
 
 class SphereSpec(Section):

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.schema_parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
+from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
 
 
 class PencilSpec(Section):

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from tetlux.cases.schema_parts import (
+from tetlux.cases.file.schema.parts import (
     TAG,
     Choice,
     Each,

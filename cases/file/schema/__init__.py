@@ -1,0 +1,1 @@
+"""The case file's schema, a class for each section."""
