@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.case import Case, load_cases
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.publish import check_writable
 from tetlux.cases.run import Report, run_case
 from tetlux.cases.shipped import find_case_file

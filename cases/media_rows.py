@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.case import Case
-from tetlux.cases.lighting import BODY
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.lighting import BODY
 from tetlux.fem.media.coefficients import (
     AnyMedium,
     Coefficients,

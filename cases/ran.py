@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.case import Case
+from tetlux.cases.file.case import Case
 
 # Keys whose values are paths, relative to the case file.
 PATHS = ("file", "files")

@@ -6,9 +6,9 @@ from functools import cached_property, reduce
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.cases.case import Case
-from tetlux.cases.channels import ALL
-from tetlux.cases.colours import RGB, Bytes, preview
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.channels import ALL
+from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
@@ -59,7 +59,7 @@ class Results:
 
     @cached_property
     def preview(self) -> tuple[Bytes, float]:
-        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `tetlux.cases.colours.preview`."""
+        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `tetlux.cases.file.colours.preview`."""
         return preview(self.surface, np.column_stack([self.exitance(channel) for channel in RGB]))
 
     def by_light(self) -> list[tuple[str, str, Solution]]:

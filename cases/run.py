@@ -6,15 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.case import Case
 from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.sensors import readings, write_readings
 from tetlux.cases.picture import Scene, Shape, draw
 from tetlux.cases.picture_rays import rays
 from tetlux.cases.ply import write_ply
 from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.results import Results, results_of, surface_values, volume_values
-from tetlux.cases.sensors import readings, write_readings
 from tetlux.cases.summary import summarize
 from tetlux.cases.vtp import write_vtp
 from tetlux.fem.solve import solve_each

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.case import Channel
+from tetlux.cases.file.case import Channel
 from tetlux.cases.media_rows import media_rows
 from tetlux.cases.ran import as_ran
 from tetlux.cases.results import Results, lights_in

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.shipped import library_folder
 from tetlux.fem import PencilBeam, PointSource
 from tetlux.meshing import InputError, box

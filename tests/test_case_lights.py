@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
-from tetlux.cases.images import read_pixels
+from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.images import read_pixels
 from tetlux.cases.picture_rays import rays
 from tetlux.fem import CollimatedBeam, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot

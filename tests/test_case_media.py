@@ -11,9 +11,9 @@ import trimesh
 from PIL import Image
 
 from tests.conftest import block
-from tetlux.cases.case import Case, load_cases
 from tetlux.cases.chart.benchmark import benchmark_of
 from tetlux.cases.cli import main
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.fem import Medium, PencilBeam, PointSource
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term

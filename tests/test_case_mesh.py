@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.meshes_made import cube_of_cubes
-from tetlux.cases.case import load_cases
 from tetlux.cases.cli import main
+from tetlux.cases.file.case import load_cases
 from tetlux.fem import Emission, Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, read_mesh
 from tetlux.meshing.files.meshes import write_mesh

@@ -16,7 +16,6 @@ from PIL import Image
 
 from tests.conftest import TISSUE
 from tetlux import cases, fem, meshing
-from tetlux.cases.case import load_cases
 from tetlux.cases.chart import benchmark as chart_benchmark
 from tetlux.cases.chart import command as chart_module
 from tetlux.cases.chart import files, finite_elements, reference
@@ -31,6 +30,7 @@ from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
 from tetlux.cases.cli import main
+from tetlux.cases.file.case import load_cases
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from tests.conftest import TISSUE, block
-from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.cases.file.fields import read_array_field, read_image_field, read_mesh_field
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import InputError
 from tetlux.meshing.files.meshes import write_mesh

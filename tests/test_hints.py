@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.case import load_cases
+from tetlux.cases.file.case import load_cases
 from tetlux.cases.nearest import ALIASES, REMEDIES, did_you_mean, nearest
 from tetlux.meshing import InputError
 

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import picture, run
-from tetlux.cases.case import Case, load_cases
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.picture import Ray, Scene, Shape, draw
 from tetlux.cases.picture_frame import LEFT, TOP
 from tetlux.cases.picture_plain import draw_plain

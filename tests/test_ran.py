@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.cases.case import Case, load_cases
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.media_rows import coefficients, media_rows
 from tetlux.cases.ran import as_ran
 from tetlux.cases.shipped import library_folder

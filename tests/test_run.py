@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import batch, picture, run
-from tetlux.cases.case import Case, load_cases
 from tetlux.cases.cli import main
+from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.run import run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab

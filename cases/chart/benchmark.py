@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.case import Case
 from tetlux.cases.chart.reference import Reference, closed_form_reference, finer_run_reference
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
+from tetlux.cases.file.case import Case
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact.registry import ideal_sources
 from tetlux.fem.grading import lit_points

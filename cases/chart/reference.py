@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.case import Case
 from tetlux.cases.chart.samples import Samples, project_to_sphere
+from tetlux.cases.file.case import Case
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.lights import Deposit
 from tetlux.fem.media.medium import Medium

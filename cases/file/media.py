@@ -1,9 +1,9 @@
 """From the case file's media to those that are solved with."""
 
-from tetlux.cases.channels import of_channel
-from tetlux.cases.document import Document, Key
+from tetlux.cases.file.channels import of_channel
+from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
-from tetlux.cases.reading import Reader
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.cases.images import unreadable
+from tetlux.cases.file.images import unreadable
 from tetlux.fem.media.fields import grid_field, mesh_field
 from tetlux.fem.media.varying import Field
 from tetlux.meshing.arrays import Vector

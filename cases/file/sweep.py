@@ -5,7 +5,7 @@ import itertools
 import math
 from typing import Any
 
-from tetlux.cases.document import Document, Key
+from tetlux.cases.file.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 
 MOST_RUNS = 20_000

@@ -4,17 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from tetlux.cases.body import CaseBody, body_of
-from tetlux.cases.channels import ALL, channel_names, check_different
 from tetlux.cases.compare.comparison import Comparison, comparison_for
-from tetlux.cases.document import Document, read_document
+from tetlux.cases.file.body import CaseBody, body_of
+from tetlux.cases.file.channels import ALL, channel_names, check_different
+from tetlux.cases.file.document import Document, read_document
+from tetlux.cases.file.lighting import keys_of, light_names, light_of
+from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.lighting import keys_of, light_names, light_of
+from tetlux.cases.file.sensors import Sensor, sensor_of
+from tetlux.cases.file.sweep import LONGEST_NAME, swept
+from tetlux.cases.file.validation import validated
 from tetlux.cases.picture_view import UPRIGHT, toward_camera
-from tetlux.cases.reading import Reader
-from tetlux.cases.sensors import Sensor, sensor_of
-from tetlux.cases.sweep import LONGEST_NAME, swept
-from tetlux.cases.validation import validated
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of

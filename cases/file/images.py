@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.colours import LUMINANCE, to_linear
+from tetlux.cases.file.colours import LUMINANCE, to_linear
 from tetlux.cases.file.schema.parts import Encoding
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError

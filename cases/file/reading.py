@@ -4,11 +4,11 @@ import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tetlux.cases.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.cases.file.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.cases.file.images import read_pixels
 from tetlux.cases.file.schema.case import MeshSpec, SurfaceSpec
 from tetlux.cases.file.schema.media import FieldSpec
 from tetlux.cases.file.schema.parts import Encoding
-from tetlux.cases.images import read_pixels
 from tetlux.fem.media.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray

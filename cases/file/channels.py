@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from tetlux.cases.colours import RGB
-from tetlux.cases.document import Document, Key, dotted
+from tetlux.cases.file.colours import RGB
+from tetlux.cases.file.document import Document, Key, dotted
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.media import MaterialSpec, Media
 

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from tetlux.cases.channels import check_different
-from tetlux.cases.document import Document, Key
+from tetlux.cases.file.channels import check_different
+from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.lighting import BODY
+from tetlux.cases.file.media import media_of
+from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec, MeshSpec
-from tetlux.cases.lighting import BODY
-from tetlux.cases.media import media_of
-from tetlux.cases.reading import Reader
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labelled import label_of, outermost_first

@@ -5,12 +5,12 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from tetlux.cases.channels import of_channel
-from tetlux.cases.document import Key
+from tetlux.cases.file.channels import of_channel
+from tetlux.cases.file.document import Key
+from tetlux.cases.file.images import of_channel as colour_of_channel
+from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.lights import CollimatedSpec, EmissionSpec, EnvironmentSpec, LightSpec, SpotSpec
-from tetlux.cases.images import of_channel as colour_of_channel
-from tetlux.cases.reading import Reader
 from tetlux.fem.lights import (
     CollimatedBeam,
     DiffuseLight,
