@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from tetlux.cases.file.case import Case, load_cases
-from tetlux.cases.publish import check_writable
 from tetlux.cases.run import Report, run_case
 from tetlux.cases.shipped import find_case_file
+from tetlux.cases.write.publish import check_writable
 from tetlux.meshing.errors import InputError, TetluxError
 
 # Runs that are named beside a warning that some of a sweep have; those of more are in their summaries.

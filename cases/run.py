@@ -12,11 +12,11 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.file.sensors import readings, write_readings
 from tetlux.cases.picture import Scene, Shape, draw
 from tetlux.cases.picture_rays import rays
-from tetlux.cases.ply import write_ply
-from tetlux.cases.publish import cannot_write, claimed, publish
-from tetlux.cases.results import Results, results_of, surface_values, volume_values
-from tetlux.cases.summary import summarize
-from tetlux.cases.vtp import write_vtp
+from tetlux.cases.write.ply import write_ply
+from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.write.results import Results, results_of, surface_values, volume_values
+from tetlux.cases.write.summary import summarize
+from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.solve import solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh

@@ -19,8 +19,8 @@ from tests.conftest import block
 from tetlux.cases import picture, run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
-from tetlux.cases.publish import claimed
 from tetlux.cases.run import ALL_FILES
+from tetlux.cases.write.publish import claimed
 from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.mesher import api as mesher
@@ -135,7 +135,7 @@ def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
 KILLER = """\
 import os, pathlib, signal, sys
 from pathlib import Path
-from tetlux.cases.publish import claimed, publish
+from tetlux.cases.write.publish import claimed, publish
 
 names, out, n = sys.argv[3:], Path(sys.argv[1]), 0
 while True:
@@ -215,7 +215,7 @@ def test_the_second_of_two_runs_is_refused(case: Path, tmp_path: Path, capsys: p
 RACER = """\
 import os, sys, time
 from pathlib import Path
-from tetlux.cases.publish import claimed, publish
+from tetlux.cases.write.publish import claimed, publish
 from tetlux.meshing import RunError
 
 out, me, done = Path(sys.argv[1]), sys.argv[2], 0

@@ -16,8 +16,8 @@ from tetlux.cases import run as run_module
 from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.file.colours import LUMINANCE, preview, to_linear, to_srgb
 from tetlux.cases.file.sensors import readings
-from tetlux.cases.results import Results, results_of
 from tetlux.cases.run import run_case
+from tetlux.cases.write.results import Results, results_of
 from tetlux.fem import solve
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution

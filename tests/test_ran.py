@@ -9,9 +9,9 @@ import pytest
 
 from tests.conftest import block
 from tetlux.cases.file.case import Case, load_cases
-from tetlux.cases.media_rows import coefficients, media_rows
-from tetlux.cases.ran import as_ran
 from tetlux.cases.shipped import library_folder
+from tetlux.cases.write.media_rows import coefficients, media_rows
+from tetlux.cases.write.ran import as_ran
 
 SWEPT = """\
 unit: cm

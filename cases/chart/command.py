@@ -12,7 +12,7 @@ from tetlux.cases.chart.methods import Method
 from tetlux.cases.chart.models import MODELS, MONTE_CARLO, monte_carlo_installed
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.runs import Charted, measure_methods
-from tetlux.cases.publish import check_writable
+from tetlux.cases.write.publish import check_writable
 from tetlux.fem import Medium, PointSource, solve
 from tetlux.meshing.errors import InputError, TetluxError
 from tetlux.meshing.shapes import sphere

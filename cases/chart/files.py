@@ -12,8 +12,8 @@ from typing import Any
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.picture import draw_chart
 from tetlux.cases.chart.runs import Charted, Measurement, exponents
-from tetlux.cases.publish import cannot_write, claimed, publish
-from tetlux.cases.summary import LIBRARIES
+from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
 FILES = ("chart.csv", "chart.png", "chart.json")

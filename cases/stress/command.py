@@ -4,13 +4,13 @@ import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tetlux.cases.publish import check_writable
 from tetlux.cases.stress.files import FILES, write_map
 from tetlux.cases.stress.grid import PANELS
 from tetlux.cases.stress.panels import Panel
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import violations
 from tetlux.cases.stress.trials import TIME_LIMIT, Trial, run_trials
+from tetlux.cases.write.publish import check_writable
 
 # Trials between two lines that say how far it is.
 PROGRESS = 50

@@ -6,11 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.publish import cannot_write, claimed, publish
 from tetlux.cases.stress.picture import draw_map
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
+from tetlux.cases.write.publish import cannot_write, claimed, publish
 
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (

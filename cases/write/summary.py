@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.file.case import Channel
-from tetlux.cases.media_rows import media_rows
-from tetlux.cases.ran import as_ran
-from tetlux.cases.results import Results, lights_in
+from tetlux.cases.write.media_rows import media_rows
+from tetlux.cases.write.ran import as_ran
+from tetlux.cases.write.results import Results, lights_in
 from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
