@@ -10,8 +10,8 @@ from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.sensors import readings, write_readings
-from tetlux.cases.picture import Scene, Shape, draw
-from tetlux.cases.picture_rays import rays
+from tetlux.cases.picture.arrows import rays
+from tetlux.cases.picture.draw import Scene, Shape, draw
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import cannot_write, claimed, publish
 from tetlux.cases.write.results import Results, results_of, surface_values, volume_values

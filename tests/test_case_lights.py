@@ -11,7 +11,7 @@ from PIL import Image
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.file.images import read_pixels
-from tetlux.cases.picture_rays import rays
+from tetlux.cases.picture.arrows import rays
 from tetlux.fem import CollimatedBeam, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector

@@ -16,9 +16,10 @@ import meshio
 import pytest
 
 from tests.conftest import block
-from tetlux.cases import picture, run
+from tetlux.cases import run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
+from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import ALL_FILES
 from tetlux.cases.write.publish import claimed
 from tetlux.meshing import RunError, sphere, tetrahedralize

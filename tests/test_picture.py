@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import picture
-from tetlux.cases.picture import Ray, Scene, draw
-from tetlux.cases.picture_frame import LEFT, TOP, bar_ticks
-from tetlux.cases.picture_plain import draw_plain
-from tetlux.cases.picture_stage import (
+from tetlux.cases.picture import draw as picture
+from tetlux.cases.picture.draw import Ray, Scene, draw
+from tetlux.cases.picture.frame import LEFT, TOP, bar_ticks
+from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.stage import (
     BACKGROUND,
     DARK,
     OVERSAMPLING,
@@ -23,7 +23,7 @@ from tetlux.cases.picture_stage import (
     exitance_range,
     map_shares,
 )
-from tetlux.cases.picture_view import PANEL, Camera
+from tetlux.cases.picture.view import PANEL, Camera
 from tetlux.meshing import box, sphere, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.surface.surface import Surface

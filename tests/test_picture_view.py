@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import picture, run
+from tetlux.cases import run
 from tetlux.cases.file.case import Case, load_cases
-from tetlux.cases.picture import Ray, Scene, Shape, draw
-from tetlux.cases.picture_frame import LEFT, TOP
-from tetlux.cases.picture_plain import draw_plain
-from tetlux.cases.picture_stage import (
+from tetlux.cases.picture import draw as picture
+from tetlux.cases.picture.draw import Ray, Scene, Shape, draw
+from tetlux.cases.picture.frame import LEFT, TOP
+from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.stage import (
     ARROW_OPACITY,
     BACKGROUND,
     LIGHT,
@@ -22,7 +23,7 @@ from tetlux.cases.picture_stage import (
     build_stage,
     see_through,
 )
-from tetlux.cases.picture_view import PANEL, Camera, camera_at, choose_view, direction_of, upright_axes
+from tetlux.cases.picture.view import PANEL, Camera, camera_at, choose_view, direction_of, upright_axes
 from tetlux.cases.run import run_case
 from tetlux.meshing import InputError, box, sphere
 from tetlux.meshing.arrays import FloatArray, Vector

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import batch, picture, run
+from tetlux.cases import batch, run
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab

@@ -14,7 +14,7 @@ from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.sensors import Sensor, sensor_of
 from tetlux.cases.file.sweep import LONGEST_NAME, swept
 from tetlux.cases.file.validation import validated
-from tetlux.cases.picture_view import UPRIGHT, toward_camera
+from tetlux.cases.picture.view import UPRIGHT, toward_camera
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of

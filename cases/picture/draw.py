@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.picture_frame import frame
-from tetlux.cases.picture_marks import Shape, marks_of
-from tetlux.cases.picture_plain import draw_plain
-from tetlux.cases.picture_stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
-from tetlux.cases.picture_view import PANEL, UPRIGHT, Ray
+from tetlux.cases.picture.frame import frame
+from tetlux.cases.picture.marks import Shape, marks_of
+from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
+from tetlux.cases.picture.view import PANEL, UPRIGHT, Ray
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.host.scratch import run_child, scratch
 from tetlux.meshing.notes import Note
@@ -20,7 +20,7 @@ from tetlux.meshing.notes import Note
 __all__ = ["Ray", "Scene", "Shape", "draw"]
 
 # The command that draws a body with PyVista; the names of two files and the number of this process are added.
-RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases._render_process")
+RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases.picture._render_process")
 # Seconds; 50,000 triangles take about two without a graphics card.
 TIME_LIMIT = 120.0
 # Measured on a bare Debian 12: either package alone is not enough.

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture_marks import Marks, draw_marks
-from tetlux.cases.picture_stage import BACKGROUND, DARK, LIGHT
-from tetlux.cases.picture_view import PANEL, Camera, Ray
+from tetlux.cases.picture.marks import Marks, draw_marks
+from tetlux.cases.picture.stage import BACKGROUND, DARK, LIGHT
+from tetlux.cases.picture.view import PANEL, Camera, Ray
 from tetlux.meshing.arrays import FloatArray
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.cases.picture_view import Ray
+from tetlux.cases.picture.view import Ray
 from tetlux.fem.lights import CollimatedBeam, Light, PencilBeam, PointSource
 from tetlux.fem.lights.point import unit_vector
 from tetlux.meshing.arrays import FloatArray, Vector

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture_plain import nearest_triangles
-from tetlux.cases.picture_stage import OVERSAMPLING
-from tetlux.cases.picture_view import PANEL, Camera, in_view
+from tetlux.cases.picture.plain import nearest_triangles
+from tetlux.cases.picture.stage import OVERSAMPLING
+from tetlux.cases.picture.view import PANEL, Camera, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.picture_view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
+from tetlux.cases.picture.view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture_stage import see_through
+from tetlux.cases.picture.stage import see_through
 from tetlux.meshing.mesher._mesher_process import die_with
 
 if TYPE_CHECKING:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.cases.picture_stage import (
+from tetlux.cases.picture.stage import (
     FULL,
     LIGHT,
     OVERSAMPLING,
@@ -11,7 +11,7 @@ from tetlux.cases.picture_stage import (
     Stage,
     see_through,
 )
-from tetlux.cases.picture_view import PANEL
+from tetlux.cases.picture.view import PANEL
 from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Pairs of a pixel and a triangle looked at in one go; bounds the memory to about 100 MB.
