@@ -144,7 +144,8 @@ def solve(
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
         `tetlux.fem.known.subtraction`.
     limit : bool
-        Whether the fluence is kept from going below zero where lumping does not see to that, see `tetlux.fem.operators.limiter`.
+        Whether the fluence is kept from going below zero where lumping does not see to that, see
+        `tetlux.fem.operators.limiter`.
     most_tetrahedra : int
         Where refinement stops even if the tolerance is not met; the solution then carries a warning. The
         mesher's own mesh, of some thousands, is the least. It stops earlier where memory is scarce.

@@ -63,8 +63,8 @@ class System:
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     limit : bool
-        Whether the fluence is kept from going below zero, see `tetlux.fem.operators.limiter`; not under a light for which the
-        diffusion equation itself does.
+        Whether the fluence is kept from going below zero, see `tetlux.fem.operators.limiter`; not under a light for
+        which the diffusion equation itself does.
     """
 
     mesh: TetMesh

@@ -59,7 +59,7 @@ class Results:
 
     @cached_property
     def preview(self) -> tuple[Bytes, float]:
-        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `tetlux.cases.file.colours.preview`."""
+        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `cases.file.colours.preview`."""
         return preview(self.surface, np.column_stack([self.exitance(channel) for channel in RGB]))
 
     def by_light(self) -> list[tuple[str, str, Solution]]:

@@ -32,7 +32,8 @@ class Medium:
     g : float, optional
         Mean cosine of the scattering angle (CS667 notes, definition 1.9 iv), between -1 and 1.
     phase : PhaseFunction, optional
-        How scattering distributes light over angles, see `tetlux.fem.media.phase`; g alone stands for Henyey-Greenstein's.
+        How scattering distributes light over angles, see `tetlux.fem.media.phase`; g alone stands for
+        Henyey-Greenstein's.
     boundary : {"exact", "classic"}
         How internal reflection enters the boundary factor A: by the Fresnel moments, or by the fit
         that the published dipole uses.

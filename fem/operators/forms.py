@@ -44,7 +44,7 @@ def exitance(phi: Any, v: Any, w: Any) -> Any:
 
 
 def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
-    """The matrix of the left-hand side by scikit-fem's quadrature: what `tetlux.fem.operators.assembly` is held against.
+    """The matrix of the left-hand side by scikit-fem's quadrature, to check `tetlux.fem.operators.assembly` by.
 
     Parameters
     ----------

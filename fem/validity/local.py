@@ -25,8 +25,8 @@ class Validity:
 
     It follows from coefficients, geometry and light alone: the relative error of the exitance by each of several
     causes, as Monte Carlo has them (`tetlux.fem.validity.tables`), of which the largest counts. They were found in one
-    medium throughout; in a body of several each facet has that of the media below it (`tetlux.fem.validity.facet_media`), and
-    what is near a light that of the place where the light enters.
+    medium throughout; in a body of several each facet has that of the media below it
+    (`tetlux.fem.validity.facet_media`), and what is near a light that of the place where the light enters.
 
     Parameters
     ----------

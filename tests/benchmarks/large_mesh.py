@@ -56,9 +56,8 @@ def tetlux(points: FloatArray, tetrahedra: IntArray, method: str) -> Row:
     """Assemble and solve here."""
     import pyamg  # noqa: F401, PLC0415
 
-    from tetlux.fem import Medium
-    from tetlux.fem.linear import krylov
-    from tetlux.fem.linear import solver as linear
+    from tetlux.fem import Medium  # noqa: PLC0415
+    from tetlux.fem.linear import krylov  # noqa: PLC0415
     from tetlux.fem.operators.assembly import system_matrix  # noqa: PLC0415
     from tetlux.meshing import TetMesh  # noqa: PLC0415
 
