@@ -328,8 +328,8 @@ def test_a_scheduler_may_stop_it(number: signal.Signals, tmp_path: Path) -> None
     temporary = tmp_path / "tmp"
     temporary.mkdir()
     # Its mesher would take for ever.
-    hanging = "import sys; from tetlux.meshing import child_mesher; from tetlux.cases.cli import main;" + (
-        "child_mesher.MESHER = (sys.executable, '-c', 'import time; time.sleep(60)'); sys.exit(main(sys.argv[1:]))"
+    hanging = "import sys; from tetlux.meshing.mesher import child; from tetlux.cases.cli import main;" + (
+        "child.MESHER = (sys.executable, '-c', 'import time; time.sleep(60)'); sys.exit(main(sys.argv[1:]))"
     )
     command = [sys.executable, "-c", hanging, "run", str(written(tmp_path)), "--out", str(tmp_path / "out")]
     environment = {**os.environ, "TMPDIR": str(temporary), "TETLUX_CACHE_DIR": str(tmp_path / "cache")}

@@ -1,5 +1,6 @@
 """What a solution needs of memory, and what is done where there is less."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -150,7 +151,8 @@ def test_a_process_that_may_not_have_more() -> None:
     done = subprocess.run([sys.executable, "-c", SHORT, "350000000"], capture_output=True, text=True, check=False)
     assert done.stderr == ""
     refused, stopped = done.stdout.splitlines()
-    assert refused.startswith("384,000 tetrahedra need about 0.472 GB of memory, and 0.3")
+    # The check of the given mesh has left its tables of faces, which the solution would use too.
+    assert re.match(r"384,000 tetrahedra need about 0\.472 GB of memory, and 0\.[23]\d* GB", refused)
     assert "tetrahedra that 0.3" in stopped
     assert "GB of memory suffice for" in stopped
 
