@@ -285,3 +285,13 @@ def test_beams_enter_the_smooth_surface_that_triangles_stand_for() -> None:
         inside = math.sqrt(1.0 - (1.0 - cosine**2) / 1.4**2)
         refracted = np.array([0.0, 0.0, -1.0]) / 1.4 + (cosine / 1.4 - inside) * normal
         assert found == pytest.approx(entry + refracted / 1.01, abs=0.02)
+
+
+@pytest.mark.parametrize("far", [(0.0, 1.7e308, 2.0), (0.0, 0.0, 1.7e308), (1e200, 1e200, 1e200)])
+def test_a_place_beyond_the_range_of_products_is_refused(far: tuple[float, float, float]) -> None:
+    with pytest.raises(InputError, match=r"origin is \[.*\]; coordinates reach from -1e\+30 to 1e\+30"):
+        PencilBeam(far, (0.0, 0.0, -1.0))
+    with pytest.raises(InputError, match="position is"):
+        PointSource(far)
+    # A direction may have any length.
+    assert PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.7e308)).power == 1.0

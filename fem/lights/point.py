@@ -13,12 +13,23 @@ from tetlux.meshing.errors import InputError
 
 # A point nearer to the surface than this share of the body's diagonal is on it.
 ON_SURFACE = 1e-9
+# Farther away, in whatever unit, products of coordinates overflow.
+FARTHEST = 1e30
 # Squares of fainter and brighter lights are no numbers any more.
 FAINTEST = 1e-60
 
 
 def as_vector(value: Vector, name: str) -> FloatArray:
-    """Three finite coordinates as an array, or an InputError that names them."""
+    """Three coordinates as an array, or an InputError that names them."""
+    vector = _finite(value, name)
+    if np.abs(vector).max() > FARTHEST:
+        raise InputError(
+            f"{name} is {vector.tolist()}; coordinates reach from -{FARTHEST:g} to {FARTHEST:g}.", field=name
+        )
+    return vector
+
+
+def _finite(value: Vector, name: str) -> FloatArray:
     try:
         vector = np.asarray(value, dtype=float)
     except (TypeError, ValueError) as error:
@@ -30,7 +41,7 @@ def as_vector(value: Vector, name: str) -> FloatArray:
 
 def unit_vector(value: Vector, name: str) -> FloatArray:
     """A direction of length 1, or an InputError that names it."""
-    vector = as_vector(value, name)
+    vector = _finite(value, name)
     largest = np.abs(vector).max()
     if not largest > 0:
         raise InputError(f"{name} is zero; give the {name} in which the light travels.", field=name)

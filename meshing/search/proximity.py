@@ -199,7 +199,8 @@ def cross_segments(
     p = np.cross(directions, edge2)
     determinant = np.einsum("ij,ij->i", edge1, p)
     size = np.prod([np.linalg.norm(v, axis=1) for v in (edge1, edge2, directions)], axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    # Products with an origin near the end of the number range overflow; such a line misses the triangle.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = 1.0 / determinant
         s = origins - corners[:, 0]
         u = np.einsum("ij,ij->i", s, p) * inverse
