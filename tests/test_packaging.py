@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from graphlib import TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -97,6 +98,27 @@ def imports_of(*paths: Path) -> set[str]:
     """Modules of the package that modules import."""
     pattern = re.compile(r"^\s*(?:from|import) (tetlux[\w.]*)", re.MULTILINE)
     return {name for path in paths for name in pattern.findall(path.read_text(encoding="utf-8"))}
+
+
+def test_arrows_between_rooms_form_no_cycle() -> None:
+    """A room is a folder; a module that is in none, such as fem/solve.py, is a room of its own."""
+    modules = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path
+        for top in ("meshing", "fem", "cases")
+        for path in (ROOT / top).rglob("*.py")
+        if path.name != "__init__.py"
+    }
+
+    def room_of(module: str) -> str:
+        return module.rsplit(".", 1)[0] if module.count(".") > 1 else module
+
+    arrows: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        named = {name.removeprefix("tetlux.") for name in imports_of(path)}
+        rooms = {room_of(name) for name in named if name in modules}
+        arrows.setdefault(room_of(module), set()).update(rooms - {room_of(module)})
+    # Raises a CycleError that names them.
+    assert set(TopologicalSorter(arrows).static_order()) >= {"meshing.surface", "fem.solve", "cases.file"}
 
 
 def test_rooms_that_measure_lead_nowhere_back() -> None:

@@ -188,6 +188,7 @@ def test_solutions_are_the_same(light: Light, ring: TetMesh, monkeypatch: pytest
     ("missing", "engine"), [pytest.param([], "Embree", marks=needs("embreex")), (["embreex"], "RayLocator")]
 )
 def test_the_engine_is_the_one_that_is_installed(missing: list[str], engine: str) -> None:
-    code = f"import sys; sys.modules.update(dict.fromkeys({missing}))\nfrom tetlux.meshing.search import rays; print(rays.ENGINE)"
+    hide = f"import sys; sys.modules.update(dict.fromkeys({missing}))"
+    code = f"{hide}; from tetlux.meshing.search import rays; print(rays.ENGINE)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert engine in done.stdout
