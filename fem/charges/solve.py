@@ -18,11 +18,14 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.regions import check_regions
 
 # Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
 NEAREST = 1e-3
+# An exitance below zero by less than this share of its maximum is not worth a sentence.
+NEGLIGIBLE_DIP = 1e-6
 _INSTEAD = 'solve it with model "full".'
 
 
@@ -93,7 +96,26 @@ def solve_with_charges(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
             f"{solution.charges} charges; {_INSTEAD}"
         )
+    warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
+
+
+def _below_zero(solution: ChargeSolution) -> list[str]:
+    """What to say where the exitance is below zero: there it is less than its error."""
+    points, areas = solution.samples[0].points, solution.samples[0].areas
+    exitance = solution.exitance_on(points)
+    below = exitance < -NEGLIGIBLE_DIP * exitance.max()
+    if not below.any():
+        return []
+    share = float(areas[below].sum() / areas.sum())
+    return [
+        Note(
+            "exitance-negative",
+            f"the exitance is below zero on {share:.1%} of the surface, where there is less light than charges are "
+            f"off by; ask for a smaller tolerance, or {_INSTEAD}",
+            value=share,
+        )
+    ]
 
 
 def _entry(deposit: Deposit) -> Entry:
