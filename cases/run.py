@@ -2,7 +2,8 @@
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,13 @@ from tetlux.cases.picture.arrows import rays
 from tetlux.cases.picture.draw import Scene, Shape, draw
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import cannot_write, claimed, publish
-from tetlux.cases.write.results import Results, results_of, surface_values, volume_values
+from tetlux.cases.write.results import AnySolution, Results, results_of, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
-from tetlux.fem.solve import solve_each
+from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.media.region import Region
+from tetlux.fem.scene import media_of
+from tetlux.fem.solve import solve, solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import prefixed
@@ -72,15 +76,7 @@ def run_case(
     started, target = time.perf_counter(), out / case.name
     try:
         with claimed(out, case.name) as folder:
-            solutions = solve_each(
-                case.mesh or case.surface,
-                [channel.media for channel in case.channels],
-                [list(channel.lights.values()) for channel in case.channels],
-                regions=case.regions,
-                tolerance=case.tolerance,
-                cache=cache,
-                report=report,
-            )
+            solutions = _solve(case, report, cache=cache)
             try:
                 warnings = _write(results_of(case, solutions), folder, started)
                 publish(folder, target, ALL_FILES)
@@ -98,6 +94,36 @@ def run_case(
     return target
 
 
+def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
+    """A solution for each channel, by the model that the case asks for."""
+    if case.spec.model == "charges":
+        return _solve_with_charges(case, report)
+    return solve_each(
+        case.mesh or case.surface,
+        [channel.media for channel in case.channels],
+        [list(channel.lights.values()) for channel in case.channels],
+        regions=case.regions,
+        tolerance=case.tolerance,
+        cache=cache,
+        report=report,
+    )
+
+
+def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
+    """A solution for each channel, each with the seconds of all."""
+    solutions = []
+    media = media_of([channel.medium for channel in case.channels], case.regions, len(case.channels))
+    for channel, (body, *inner) in zip(case.channels, media, strict=True):
+        regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
+        lights = list(channel.lights.values())
+        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
+        where = f"{channel.name}: " if len(case.channels) > 1 else ""
+        report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
+        solutions.append(solution)
+    seconds = {stage: sum(one.seconds[stage] for one in solutions) for stage in solutions[0].seconds}
+    return [replace(solution, seconds=seconds) for solution in solutions]
+
+
 def _write(results: Results, folder: Path, started: float) -> list[str]:
     """Write all files of a run into a folder, and return its warnings."""
     writing = time.perf_counter()
@@ -107,7 +133,7 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     if "surface" in case.outputs:
         _write_surface(results, folder)
     if "volume" in case.outputs:
-        write_mesh(first.mesh, folder / FILES["volume"], volume_values(results))
+        write_mesh(results.with_mesh[0].mesh, folder / FILES["volume"], volume_values(results))
     found = readings(case.sensors, results.by_light())
     if "picture" in case.outputs:
         warnings += draw(_scene(results, found), folder / FILES["picture"])
@@ -115,7 +141,7 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         write_readings(found, unit, folder / READINGS)
     compared = None
     if case.comparison is not None:
-        compared = compare(case.comparison, first)
+        compared = compare(case.comparison, results.with_mesh[0])
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)

@@ -7,7 +7,7 @@ from pathlib import Path
 from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.file.body import CaseBody, body_of
 from tetlux.cases.file.channels import ALL, channel_names, check_different
-from tetlux.cases.file.document import Document, read_document
+from tetlux.cases.file.document import Document, Key, read_document
 from tetlux.cases.file.lighting import keys_of, light_names, light_of
 from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec
@@ -15,6 +15,7 @@ from tetlux.cases.file.sensors import Sensor, sensor_of
 from tetlux.cases.file.sweep import LONGEST_NAME, swept
 from tetlux.cases.file.validation import validated
 from tetlux.cases.picture.view import UPRIGHT, toward_camera
+from tetlux.fem.charges.solve import check_deposit, check_simple, even_medium
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.lights.point import unit_vector
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
@@ -184,6 +185,8 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values:
     channels = channel_names(document, spec)
     body = body_of(document, spec, len(channels), reader)
     surface, media = body.surface, body.media
+    if spec.model == "charges":
+        _check_for_charges(document, body)
     names = light_names(spec)
     check_different(document, "lights", names)
     _check_value_names(document, channels, names)
@@ -244,6 +247,8 @@ def _lights(
                     continue
                 lights[channel][names[i]] = light
                 deposit = light.deposit_in(of_channel)
+                if spec.model == "charges":
+                    check_deposit(light, deposit, of_channel, [region.surface for region in body.regions])
                 if channel == 0:
                     deposits.append(deposit)
     if not all(lights):
@@ -252,6 +257,24 @@ def _lights(
             ("lights",), f"all lights are dark in channel {dark}; give one of them some power there, or leave it out."
         )
     return lights, deposits
+
+
+def _check_for_charges(document: Document, body: CaseBody) -> None:
+    """Refuse a body that charges cannot be fitted to.
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+    """
+    parts: list[tuple[Key, Surface]] = [((), body.surface)]
+    parts += [(("regions", i), region.surface) for i, region in enumerate(body.regions)]
+    for number, (key, surface) in enumerate(parts):
+        with document.at((*key, "surface")):
+            check_simple(surface)
+        with document.at((*key, "medium")):
+            for of_channel in body.of_channels:
+                even_medium(of_channel.by_label[number])
 
 
 def _check_value_names(document: Document, channels: tuple[str, ...], lights: tuple[str, ...]) -> None:

@@ -9,8 +9,7 @@ from typing import Any
 from tetlux.cases.file.schema.lights import DetectorSpec
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
-from tetlux.fem.outcome.exitance_field import Dark
-from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
 from tetlux.meshing.surface.surface import Surface
 
 
@@ -44,13 +43,13 @@ def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
     return Sensor(spec.name, spec.kind, detector)
 
 
-def readings(sensors: Sequence[Sensor], solutions: Sequence[tuple[str, str, Solution]]) -> list[dict[str, Any]]:
+def readings(sensors: Sequence[Sensor], solutions: Sequence[tuple[str, str, ExitanceField]]) -> list[dict[str, Any]]:
     """What detectors read, a row for each of them and each solution.
 
     Parameters
     ----------
     sensors : sequence of Sensor
-    solutions : sequence of (str, str, Solution)
+    solutions : sequence of (str, str, Solution or another ExitanceField)
         With the names of channel and light.
 
     Returns

@@ -44,7 +44,7 @@ def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
         first = failure.errors()[0]
         key: Key = tuple(part for part in first["loc"] if not str(part).startswith(TAG))
         context = first.get("ctx", {})
-        if first["type"] == "unknown_key":
+        if first["type"] in ("unknown_key", "no_mesh"):
             key = (*key, context["key"])
         if first["type"] == "body":
             key = () if "name" in context else ("mesh",)
@@ -65,7 +65,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "body"):
+    if kind in ("unknown_key", "one_of", "scale", "body", "no_mesh"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"

@@ -16,21 +16,20 @@ from tetlux.fem.media.coefficients import (
     by_label,
     coefficients_on,
 )
-from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.scene import media_of
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 
 
-def media_rows(case: Case, mesh: TetMesh) -> list[list[dict[str, Any]]]:
+def media_rows(case: Case, mesh: TetMesh | None) -> list[list[dict[str, Any]]]:
     """Coefficients of the body outside of its regions and of each region, or of each label, for each channel.
 
     Parameters
     ----------
     case : Case
-    mesh : TetMesh
-        That the case was solved on.
+    mesh : TetMesh or None
+        That the case was solved on; none where media are even.
 
     Returns
     -------
@@ -42,8 +41,12 @@ def media_rows(case: Case, mesh: TetMesh) -> list[list[dict[str, Any]]]:
         names = {label: case.mesh.labels.get(label, str(label)) for label in case.mesh.region_volumes}
     channels = []
     for media in _media_by_label(case):
-        on_mesh = coefficients_on(mesh, media)
-        channels.append([_row(names[region], medium, mesh, on_mesh, region) for region, medium in media.items()])
+        rows = {region: {"name": names[region], **coefficients(medium)} for region, medium in media.items()}
+        if mesh is not None:
+            on_mesh = coefficients_on(mesh, media)
+            for region in [region for region, medium in media.items() if isinstance(medium, VaryingMedium)]:
+                rows[region] |= _means(mesh, on_mesh, region)
+        channels.append(list(rows.values()))
     return channels
 
 
@@ -54,21 +57,19 @@ def _media_by_label(case: Case) -> list[MediaByLabel]:
     return [by_label(each) for each in media_of(media, case.regions, len(media))]
 
 
-def _row(name: str, medium: AnyMedium, mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, Any]:
-    if isinstance(medium, Medium):
-        return {"name": name, **coefficients(medium)}
+def _means(mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, float]:
+    """Coefficients of a region whose medium varies, as means over its volume."""
     cells: IntArray = np.flatnonzero(mesh.regions == region)
     sigma_a, total = (
         _mean(at_cells(each, cells), mesh.volumes[cells]) for each in (on_mesh.sigma_a, on_mesh.sigma_t_prime)
     )
-    means = {
+    return {
         "sigma_a": sigma_a,
         "sigma_s_prime": total - sigma_a,
         "albedo": 1.0 - sigma_a / total,
         "sigma_tr": math.sqrt(3.0 * sigma_a * total),
         "mean_free_path": 1.0 / total,
     }
-    return {"name": name, **coefficients(medium), **means}
 
 
 def coefficients(medium: AnyMedium) -> dict[str, Any]:

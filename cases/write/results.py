@@ -1,6 +1,7 @@
 """What a run found: the solutions of its channels, and their exitance on one set of vertices."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, reduce
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy.typing as npt
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
+from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
@@ -16,12 +20,28 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
+AnySolution = Solution | ChargeSolution
+
 
 @dataclass(frozen=True, eq=False)
-class _Together(Solution):
+class _Together:
     """Solutions of several channels, whose exitances are added: their media may differ."""
 
-    channels: tuple[Solution, ...] = ()
+    channels: tuple[AnySolution, ...]
+
+    @property
+    def surface(self) -> Surface:
+        return self.channels[0].surface
+
+    @property
+    def medium(self) -> Medium:
+        return self.channels[0].medium
+
+    @property
+    def resolution(self) -> tuple[FloatArray, FloatArray]:
+        # The place nearest to a point is mostly one of the channel that is finest there.
+        places, sizes = zip(*(channel.resolution for channel in self.channels), strict=True)
+        return np.vstack(places), np.concatenate(sizes)
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
@@ -34,7 +54,7 @@ class Results:
     Attributes
     ----------
     case : Case
-    solutions : tuple of Solution
+    solutions : tuple of Solution or ChargeSolution
         One for each channel.
     surface : Surface
         That of the case, with vertices added where its triangles are too large to show the exitance.
@@ -43,7 +63,7 @@ class Results:
     """
 
     case: Case
-    solutions: tuple[Solution, ...]
+    solutions: tuple[AnySolution, ...]
     surface: Surface
     parts: dict[tuple[str, str], FloatArray]
 
@@ -51,6 +71,11 @@ class Results:
         """Exitance (v,) of a channel and a light, or the sum over all of them, W/unit²."""
         of = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
         return reduce(np.add, of, np.zeros(len(self.surface.points)))
+
+    @property
+    def with_mesh(self) -> tuple[Solution, ...]:
+        """The solutions, if they have a mesh; else none."""
+        return tuple(solution for solution in self.solutions if isinstance(solution, Solution))
 
     @property
     def has_colours(self) -> bool:
@@ -62,9 +87,9 @@ class Results:
         """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `cases.file.colours.preview`."""
         return preview(self.surface, np.column_stack([self.exitance(channel) for channel in RGB]))
 
-    def by_light(self) -> list[tuple[str, str, Solution]]:
+    def by_light(self) -> list[tuple[str, str, AnySolution]]:
         """All solutions with the names of channel and light: the sum, and each light if the case has several."""
-        found = []
+        found: list[tuple[str, str, AnySolution]] = []
         for channel, solution in zip(self.case.channels, self.solutions, strict=True):
             found.append((channel.name, ALL, solution))
             if len(self.case.light_names) > 1:
@@ -74,22 +99,19 @@ class Results:
     __repr__ = one_line
 
 
-def lights_in(names: list[str], solution: Solution) -> list[tuple[str, Solution]]:
+def lights_in(names: list[str], solution: AnySolution) -> list[tuple[str, AnySolution]]:
     """What each light adds to a solution, by name."""
     return list(zip(names, solution.of_lights or (solution,), strict=True))
 
 
-def results_of(case: Case, solutions: list[Solution]) -> Results:
+def results_of(case: Case, solutions: Sequence[AnySolution]) -> Results:
     """Choose vertices that show the exitance of all channels together, and take that of each at them."""
-    first = solutions[0]
-    if len(solutions) > 1:
-        same = {field.name: getattr(first, field.name) for field in fields(Solution)}
-        first = _Together(**same, channels=tuple(solutions))
-    surface, total = surface_exitance(first)
+    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _Together(tuple(solutions))
+    surface, total = surface_exitance(whole)
     parts = {}
     for channel, solution in zip(case.channels, solutions, strict=True):
         for name, part in lights_in(list(channel.lights), solution):
-            parts[channel.name, name] = total if part is first else part.exitance_on(surface.points)
+            parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
     return Results(case, tuple(solutions), surface, parts)
 
 
@@ -106,8 +128,9 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
         values |= {
             f"exitance_{one}_{channel}": results.exitance(channel, one) for one in lights for channel in channels
         }
-    # What is to be trusted in every channel.
-    values["valid"] = np.min([solution.valid_on(results.surface.points) for solution in results.solutions], axis=0)
+    if results.with_mesh:
+        # What is to be trusted in every channel; it is known by the facets of a mesh.
+        values["valid"] = np.min([solution.valid_on(results.surface.points) for solution in results.with_mesh], axis=0)
     if case.camera is not None:
         seen = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
         values["radiance"] = np.sum(seen, axis=0)
@@ -122,5 +145,5 @@ def volume_values(results: Results) -> dict[str, FloatArray]:
     """What `volume.vtu` holds at each node."""
     names = results.case.channel_names
     if len(names) == 1:
-        return {"fluence": results.solutions[0].fluence}
-    return {f"fluence_{name}": one.fluence for name, one in zip(names, results.solutions, strict=True)}
+        return {"fluence": results.with_mesh[0].fluence}
+    return {f"fluence_{name}": one.fluence for name, one in zip(names, results.with_mesh, strict=True)}

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.file.case import Channel
+from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.write.media_rows import media_rows
 from tetlux.cases.write.ran import as_ran
-from tetlux.cases.write.results import Results, lights_in
-from tetlux.fem.outcome.solution import Power, Solution
+from tetlux.cases.write.results import AnySolution, Results, lights_in
+from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.outcome.solution import Power
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
@@ -25,7 +26,8 @@ def summarize(
     results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
 ) -> dict[str, Any]:
     """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
-    case, mesh = results.case, results.solutions[0].mesh
+    case = results.case
+    mesh = results.with_mesh[0].mesh if results.with_mesh else None
     several = len(case.light_names) > 1
     channels = [
         _channel(
@@ -40,18 +42,10 @@ def summarize(
     return {
         "case": case.name,
         "unit": case.surface.unit,
-        "model": "fem",
+        "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
         "as_ran": as_ran(case),
-        "mesh": {
-            "nodes": len(mesh.points),
-            "tetrahedra": len(mesh.tetrahedra),
-            "volume": mesh.volume,
-            "area": mesh.area,
-            "surface_deviation": surface_deviation(mesh, case.surface),
-            "min_quality": float(mesh.quality.min()),
-            **({"labels": _labels(case.mesh)} if case.mesh else {}),
-        },
+        **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
@@ -62,10 +56,22 @@ def summarize(
     }
 
 
+def _mesh(case: Case, mesh: TetMesh) -> dict[str, Any]:
+    return {
+        "nodes": len(mesh.points),
+        "tetrahedra": len(mesh.tetrahedra),
+        "volume": mesh.volume,
+        "area": mesh.area,
+        "surface_deviation": surface_deviation(mesh, case.surface),
+        "min_quality": float(mesh.quality.min()),
+        **({"labels": _labels(case.mesh)} if case.mesh else {}),
+    }
+
+
 def _channel(
-    channel: Channel, solution: Solution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
+    channel: Channel, solution: AnySolution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    estimate = solution.error_estimate
+    area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
     figures: dict[str, Any] = {
         "name": channel.name,
         # Those of the body outside of its regions.
@@ -76,16 +82,30 @@ def _channel(
         "exitance": {
             "min": float(exitance.min()),
             "max": float(exitance.max()),
-            "mean": solution.power.exited / solution.mesh.area,
+            "mean": solution.power.exited / area,
         },
-        "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
-        "error_estimate": estimate if math.isfinite(estimate) else None,
-        **({"validity": _validity(solution.validity)} if solution.validity else {}),
+        "error_estimate": _finite(solution.error_estimate),
+        **_of_model(solution),
     }
     if several:
         lights = lights_in(list(channel.lights), solution)
         figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
     return figures
+
+
+def _of_model(solution: AnySolution) -> dict[str, Any]:
+    """Figures that only one of the models has."""
+    if isinstance(solution, ChargeSolution):
+        # Fluence has a pole at each source, and no largest value.
+        return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
+    return {
+        "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
+        **({"validity": _validity(solution.validity)} if solution.validity else {}),
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _labels(mesh: TetMesh) -> list[dict[str, Any]]:

@@ -160,7 +160,7 @@ class ChargeSolution:
         What exits is the integral of the exitance. What is absorbed is, by Gauss's theorem, what sources give and what
         flows into each region through its walls: the ledger balances as far as the conditions there hold.
         """
-        area, exited, inflow = self._flows
+        area, diffused, inflow = self._flows
         known = [entry.known for entry in self.entries]
         irradiance = sum(entry.irradiance for entry in self.entries)
         transmitted = sum(entry.transmitted for entry in self.entries)
@@ -168,11 +168,16 @@ class ChargeSolution:
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
             absorbed=sum(each.absorbed for each in known) + float(self.sources.sum()) + inflow,
-            exited=exited + area * self._unscattered,
+            exited=diffused + area * self._unscattered,
             ballistic=sum(each.ballistic for each in known),
         )
 
     @property
+    def area(self) -> float:
+        """Area of the body, unit²."""
+        return self._flows[0]
+
+    @cached_property
     def _flows(self) -> tuple[float, float, float]:
         """Area of the body, integral of ``phi/(2A)`` over it, and what flows into all regions through their walls."""
         area, diffused, inflow = 0.0, 0.0, 0.0

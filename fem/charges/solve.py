@@ -18,11 +18,14 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.regions import check_regions
 
 # Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
 NEAREST = 1e-3
+# An exitance below zero by less than this share of its maximum is not worth a sentence.
+NEGLIGIBLE_DIP = 1e-6
 _INSTEAD = 'solve it with model "full".'
 
 
@@ -70,20 +73,21 @@ def solve_with_charges(
     """
     watch = Stopwatch()
     with watch.stage("surface"):
-        inner = [(region.surface, _even(only_medium(region))) for region in regions]
-        body = _even(medium)
+        inner = [(region.surface, even_medium(only_medium(region))) for region in regions]
+        body = even_medium(medium)
         for each in (surface, *(own for own, _ in inner)):
-            _check_simple(each)
+            check_simple(each)
         check_regions(surface, [each for each, _ in inner])
         whole = Body(surface, (body, *(each for _, each in inner)), SurfacePartition([each for each, _ in inner]))
         check_media(whole)
-        deposits = [_deposit(light, whole) for light in lights]
+        deposits = [light.deposit_in(whole) for light in lights]
+        for light, deposit in zip(lights, deposits, strict=True):
+            check_deposit(light, deposit, whole, [each for each, _ in inner])
     with watch.stage("solve"):
         owners = np.repeat(np.arange(len(deposits)), [len(deposit.points) for deposit in deposits])
         powers = np.zeros((len(owners), len(deposits)))
         powers[np.arange(len(owners)), owners] = np.concatenate([deposit.powers for deposit in deposits])
         points = np.vstack([deposit.points for deposit in deposits])
-        _check_apart(points, body, [each for each, _ in inner])
         entries = [_entry(deposit) for deposit in deposits]
         solution = charge_solution(surface, body, points, powers, entries, inner=inner, tolerance=tolerance, most=most)
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
@@ -92,7 +96,26 @@ def solve_with_charges(
             f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
             f"{solution.charges} charges; {_INSTEAD}"
         )
+    warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
+
+
+def _below_zero(solution: ChargeSolution) -> list[str]:
+    """What to say where the exitance is below zero: there it is less than its error."""
+    points, areas = solution.samples[0].points, solution.samples[0].areas
+    exitance = solution.exitance_on(points)
+    below = exitance < -NEGLIGIBLE_DIP * exitance.max()
+    if not below.any():
+        return []
+    share = float(areas[below].sum() / areas.sum())
+    return [
+        Note(
+            "exitance-negative",
+            f"the exitance is below zero on {share:.1%} of the surface, where there is less light than charges are "
+            f"off by; ask for a smaller tolerance, or {_INSTEAD}",
+            value=share,
+        )
+    ]
 
 
 def _entry(deposit: Deposit) -> Entry:
@@ -100,7 +123,13 @@ def _entry(deposit: Deposit) -> Entry:
     return Entry(known, float(deposit.irradiance), float(deposit.transmitted_irradiance))
 
 
-def _check_simple(surface: Surface) -> None:
+def check_simple(surface: Surface) -> None:
+    """Refuse a surface some of which does not bound the body.
+
+    Raises
+    ------
+    InputError
+    """
     if surface.overlaps:
         raise InputError(
             f'{surface.name} crosses itself or holds a body within, and model "charges" needs a surface all of which '
@@ -120,15 +149,36 @@ def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -
             )
 
 
-def _even(medium: AnyMedium) -> Medium:
+def even_medium(medium: AnyMedium) -> Medium:
+    """The medium, if it does not vary.
+
+    Raises
+    ------
+    InputError
+        If it does.
+    """
     if isinstance(medium, Medium):
         return medium
     raise InputError(f'the medium varies within the body, and model "charges" has even ones; {_INSTEAD}')
 
 
-def _deposit(light: Light, body: Body) -> Deposit:
-    """What a light leaves, if that is points and even diffuse light."""
-    deposit, name = light.deposit_in(body), type(light).__name__
+def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Surface]) -> None:
+    """Refuse what a light leaves in a body, unless that is points and even diffuse light.
+
+    Parameters
+    ----------
+    light : Light
+    deposit : Deposit
+        What it leaves.
+    body : Body
+    inner : sequence of Surface
+        Of the body's regions.
+
+    Raises
+    ------
+    InputError
+    """
+    name = type(light).__name__
     if len(deposit.starts) or deposit.on_mesh is not None:
         raise InputError(f'{name} leaves light along lines or by facets, and model "charges" has points; {_INSTEAD}')
     if np.any(deposit.emission):
@@ -137,4 +187,4 @@ def _deposit(light: Light, body: Body) -> Deposit:
         raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
     if deposit.irradiance and body.only_medium is None:
         raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
-    return deposit
+    _check_apart(deposit.points, body.outer, inner)

@@ -99,6 +99,7 @@ class MeshSpec(Section):
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture"]
+Model = Literal["full", "charges"]
 
 
 def _word_or_number(value: object) -> str:
@@ -127,6 +128,9 @@ class CaseSpec(Section):
     )
     regions: list[RegionSpec] = Field([])
     lights: Annotated[list[LightSpec], Field(min_length=1)]
+    model: Model = Field(
+        "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
+    )
     tolerance: Annotated[float, Field(strict=True, ge=1e-4, lt=1)] = Field(
         0.02, description="wanted relative L2 error of the exitance"
     )
@@ -135,7 +139,9 @@ class CaseSpec(Section):
         None, description="from where the picture is taken; chosen by the light if left out"
     )
     up: Vector3 = Field((0.0, 0.0, 1.0), description="what is up in the picture")
-    outputs: list[Output] = Field(["surface", "volume", "picture"])
+    outputs: list[Output] = Field(
+        ["surface", "volume", "picture"], description="default: all, with model charges all but volume"
+    )
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,
         description="closed forms to compare with: robin, images, dipole for slabs; series for spheres and cylinders",
@@ -143,6 +149,30 @@ class CaseSpec(Section):
     sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _outputs_of_model(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("model") == "charges" and "outputs" not in data:
+            return {**data, "outputs": ["surface", "picture"]}
+        return data
+
+    @model_validator(mode="after")
+    def _without_mesh(self) -> "CaseSpec":
+        if self.model == "charges":
+            for key, what, given in (
+                ("mesh", "a mesh", self.mesh),
+                ("outputs", "volume", "volume" in self.outputs),
+                ("compare", "compare", self.compare),
+            ):
+                if given:
+                    raise PydanticCustomError(
+                        "no_mesh",
+                        '{what} is for finite elements, which model "charges" does without; leave it out, or write '
+                        "model: full",
+                        {"key": key, "what": what},
+                    )
+        return self
 
     @model_validator(mode="after")
     def _one_body(self) -> "CaseSpec":
