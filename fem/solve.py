@@ -142,7 +142,7 @@ def solve(
         Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     subtract : {"half-space", "free-space", "nothing"}
         What is taken off the fluence of point sources in closed form before the rest is solved for, see
-        `tetlux.fem.known.subtraction`.
+        `tetlux.fem.known`.
     limit : bool
         Whether the fluence is kept from going below zero where lumping does not see to that, see
         `tetlux.fem.operators.limiter`.

@@ -9,8 +9,9 @@ import numpy as np
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.error.estimate import Estimate, estimated
+from tetlux.fem.known.patch import Patch, good_nodes, inherit_good_nodes, patch_of
+from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.known.split import Sources, Subtract, sources_of
-from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
@@ -188,7 +189,7 @@ class System:
             else:
                 coarse = before.solution.mesh.points
                 patches = [
-                    patch_of(mesh, charges, inherited(good, coarse, mesh))
+                    patch_of(mesh, charges, inherit_good_nodes(good, coarse, mesh))
                     for charges, good in zip(sources.charges, before.good, strict=True)
                 ]
             terms = [patch_terms(patch, self.mass) for patch in patches]

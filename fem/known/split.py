@@ -8,7 +8,8 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.known.beam_as_charges import in_points
-from tetlux.fem.known.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.meshing.describe import one_line

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.known.subtraction import Patch
+from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.validity.local import Validity
@@ -62,7 +62,7 @@ class Solution:
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
     patches : tuple of Patch
-        Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.known.subtraction`.
+        Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.known`.
     transmitted_irradiance : float or (b,) ndarray
         Diffuse light that passed to the inside, throughout or at each boundary node, W/unit².
     error_estimate : float
