@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
-from tetlux.fem.error.estimate import Estimate, estimated
+from tetlux.fem.error.estimate import Estimate, estimate_error
 from tetlux.fem.known.patch import Patch, good_nodes, inherit_good_nodes, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.known.split import Sources, Subtract, sources_of
@@ -102,15 +102,17 @@ class System:
 
     def _equations(self, fitting: Fitting | None) -> "Equations":
         mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
-        sigma_a, kept = coefficients.sigma_a, 1.0 if fitting is None else fitting.kept
+        sigma_a, scale = coefficients.sigma_a, 1.0 if fitting is None else fitting.absorption_scale
         volumes = sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
         loads = LOADS_OF_A_LIGHT * self.expected
         if fitting is None:
             solver = assembly.solver(coefficients, self.mass, loads)
         else:
-            matrix = assembly.matrix(fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.kept)
+            matrix = assembly.matrix(
+                fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.absorption_scale
+            )
             solver = solver_for(matrix, loads)
-        return Equations(solver, np.asarray(kept * volumes), fitting)
+        return Equations(solver, np.asarray(scale * volumes), fitting)
 
     @property
     def body(self) -> Surface:
@@ -150,7 +152,7 @@ class System:
         with watch.stage("solve"):
             inner = tuple(region.surface for region in self.regions)
             estimates = [
-                estimated(
+                estimate_error(
                     part.solution,
                     solution,
                     self.coefficients,
@@ -177,7 +179,9 @@ class System:
             loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
             for light, (deposit, equations) in enumerate(zip(deposits, laws, strict=True)):
                 if equations.fitting is not None and np.any(deposit.emission):
-                    withheld = (1.0 - equations.fitting.kept) * mesh.to_nodes(deposit.emission * mesh.volumes)
+                    withheld = (1.0 - equations.fitting.absorption_scale) * mesh.to_nodes(
+                        deposit.emission * mesh.volumes
+                    )
                     # Absorbed where it is emitted, since of its absorption a node keeps only that of the layer.
                     loads[light] -= withheld
                     deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))

@@ -12,8 +12,8 @@ from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.known import beam_as_charges as lines
 from tetlux.fem.known.beam_as_charges import in_points
-from tetlux.fem.known.split import sources_of
 from tetlux.fem.known.images import MOST_CHARGES
+from tetlux.fem.known.split import sources_of
 from tetlux.meshing import Surface, slab, sphere
 from tetlux.meshing.arrays import FloatArray
 

@@ -9,10 +9,10 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space
-from tetlux.fem.known.split import Subtract, sources_of
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.known.patch import Patch, _any_inside, _point_cells, patch_of
+from tetlux.fem.known.split import Subtract, sources_of
 from tetlux.fem.operators.assembly import Mass
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray

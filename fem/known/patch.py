@@ -145,7 +145,7 @@ def _any_inside(patch: Patch, places: FloatArray) -> bool:
 
 
 def inherit_good_nodes(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
-    """Good nodes of a refined mesh: the old nodes `points` (n, 3) keep their value, a new node takes the nearest one's."""
+    """Good nodes of a refined mesh: old nodes `points` (n, 3) keep their value, a new one takes the nearest's."""
     new = finer.points[len(points) :]
     if good.all() or len(new) == 0:
         return np.concatenate([good, np.ones(len(new), dtype=bool)])
