@@ -19,7 +19,7 @@ from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import Fitting, fitting_of
 from tetlux.fem.operators.limiter import nonnegative
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.outcome.solution import Power, Solution, added
+from tetlux.fem.outcome.solution import Power, Solution, sum_solutions
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
@@ -90,17 +90,17 @@ class System:
         return coefficients_on(self.mesh, self.media)
 
     @cached_property
-    def plain(self) -> "Equations":
-        """Those of points and beams."""
-        return self._equations(None)
+    def plain(self) -> "Operator":
+        """The operator for points and beams."""
+        return self._operator(None)
 
     @cached_property
-    def fitted(self) -> "Equations":
-        """Those of diffuse and emitted light, whose layers along the boundary are fitted where the mesh is coarse."""
+    def fitted(self) -> "Operator":
+        """The operator for diffuse and emitted light: layers along the boundary are fitted where the mesh is coarse."""
         fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
-        return self.plain if fitting is None else self._equations(fitting)
+        return self.plain if fitting is None else self._operator(fitting)
 
-    def _equations(self, fitting: Fitting | None) -> "Equations":
+    def _operator(self, fitting: Fitting | None) -> "Operator":
         mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
         sigma_a, scale = coefficients.sigma_a, 1.0 if fitting is None else fitting.absorption_scale
         volumes = sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
@@ -112,7 +112,7 @@ class System:
                 fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.absorption_scale
             )
             solver = solver_for(matrix, loads)
-        return Equations(solver, np.asarray(scale * volumes), fitting)
+        return Operator(solver, np.asarray(scale * volumes), fitting)
 
     @property
     def body(self) -> Surface:
@@ -156,11 +156,11 @@ class System:
                     part.solution,
                     solution,
                     self.coefficients,
-                    part.equations.solver,
+                    part.operator.solver,
                     part.load,
                     part.emission,
                     inner,
-                    part.equations.fitting,
+                    part.operator.fitting,
                 )
                 for part in parts
             ]
@@ -171,15 +171,15 @@ class System:
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
     ) -> "tuple[Solution, tuple[BoolArray, ...], list[_Part]]":
-        """The solution, where its charges are good guesses, and its parts by the equations that they obey."""
+        """The solution, where its charges are good guesses, and its parts by the operators that they belong to."""
         mesh = self.mesh
         with watch.stage("assemble"):
             deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
-            laws = [self._equations_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
+            laws = [self._operator_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
             loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
-            for light, (deposit, equations) in enumerate(zip(deposits, laws, strict=True)):
-                if equations.fitting is not None and np.any(deposit.emission):
-                    withheld = (1.0 - equations.fitting.absorption_scale) * mesh.to_nodes(
+            for light, (deposit, operator) in enumerate(zip(deposits, laws, strict=True)):
+                if operator.fitting is not None and np.any(deposit.emission):
+                    withheld = (1.0 - operator.fitting.absorption_scale) * mesh.to_nodes(
                         deposit.emission * mesh.volumes
                     )
                     # Absorbed where it is emitted, since of its absorption a node keeps only that of the layer.
@@ -220,17 +220,17 @@ class System:
             its_patches, its_terms = [patches[i] for i in own], [terms[i] for i in own]
             of_lights.append(self._solution(deposit, laws[light], fluence, its_patches, its_terms))
         found = []
-        for equations in dict.fromkeys(laws):
-            some = [light for light, each in enumerate(laws) if each is equations]
+        for operator in dict.fromkeys(laws):
+            some = [light for light, each in enumerate(laws) if each is operator]
             emission = sum((deposits[light].emission for light in some), 0.0)
             # Emission is even, and what deposits ripple by is that they are not.
             uneven = [loads[light] for light in some if not deposits[light].even]
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
-            found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
-        notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
+            found.append(_Part(operator, sum_solutions([of_lights[light] for light in some]), load, emission))
+        notes = [operator.solver.note for operator in dict.fromkeys(laws) if operator.solver.note]
         validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
         solution = replace(
-            added(of_lights),
+            sum_solutions(of_lights),
             warnings=notes,
             validity=validity,
             residual=max((result.residual for result in solved), default=0.0),
@@ -238,26 +238,26 @@ class System:
         )
         return solution, tuple(good), found
 
-    def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
-        """Fitted ones for what is spread evenly, the mesh's own for what is not."""
+    def _operator_of(self, light: int, deposit: Deposit, sources: Sources) -> "Operator":
+        """The fitted operator for light that is spread evenly, the plain one for all other light."""
         return self.fitted if deposit.even and light not in sources.owners else self.plain
 
     def _solution(
         self,
         deposit: Deposit,
-        equations: "Equations",
+        operator: "Operator",
         fluence: FloatArray,
         patches: list[Patch],
         terms: list[PatchTerms],
     ) -> Solution:
         """The solution of one light, by its deposit on this mesh."""
-        mesh, moved = self.mesh, 0.0
+        mesh, limited_power = self.mesh, 0.0
         if self.limit and not (self._has_first_moment(deposit) or any(patch.charges.dips for patch in patches)):
-            fluence, moved = nonnegative(fluence, mesh.edges, self._losing(equations))
+            fluence, limited_power = nonnegative(fluence, mesh.edges, self._losing(operator))
         outside = mesh.boundary_node_areas * deposit.irradiance
         transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
         emitted = float((mesh.volumes * deposit.emission).sum())
-        absorbed = float((equations.absorbing * fluence).sum())
+        absorbed = float((operator.absorbing * fluence).sum())
         ledger = Power(
             incident=deposit.incident + float(outside.sum()) + emitted,
             specular=deposit.specular + float((outside - transmitted).sum()),
@@ -273,7 +273,7 @@ class System:
             ledger,
             tuple(patches),
             deposit.transmitted_irradiance,
-            moved=moved,
+            limited_power=limited_power,
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
@@ -290,9 +290,9 @@ class System:
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
         return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
 
-    def _losing(self, equations: "Equations") -> FloatArray:
+    def _losing(self, operator: "Operator") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""
-        losing = equations.absorbing.copy()
+        losing = operator.absorbing.copy()
         losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
         return losing
 
@@ -302,16 +302,16 @@ class System:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
-    """A matrix on a mesh.
+class Operator:
+    """A matrix on a mesh, and its solver.
 
     Attributes
     ----------
     solver : Solver
     absorbing : (n,) ndarray
-        What a fluence of 1 at each node loses by absorption, unit².
+        Power absorbed for a fluence of 1 at each node, unit².
     fitting : Fitting, optional
-        What the matrix has in place of some coefficients.
+        The coefficients of the matrix where they are not those of the media.
     """
 
     solver: Solver
@@ -321,11 +321,11 @@ class Equations:
     __repr__ = one_line
 
 
-def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
-    """Solve for the columns of (n, k) loads, each by equations of its own: (n, k), and what that took."""
+def _solve_columns(operators: "Sequence[Operator]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
+    """Solve for the columns of loads (n, k), each with its own operator: (n, k), and the result of each solve."""
     parts, solved = np.zeros(loads.shape), []
-    for some in dict.fromkeys(equations):
-        columns = [i for i, each in enumerate(equations) if each is some]
+    for some in dict.fromkeys(operators):
+        columns = [i for i, each in enumerate(operators) if each is some]
         solved.append(some.solver.solve(loads[:, columns]))
         parts[:, columns] = solved[-1].x
     return parts, solved
@@ -333,9 +333,9 @@ def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What of a solution obeys the same equations, what was put on the nodes for it, and what the volume emits."""
+    """The part of a solution that has one operator, its load at the nodes, and its emission in the volume."""
 
-    equations: Equations
+    operator: Operator
     solution: Solution
     load: FloatArray
     emission: float | FloatArray

@@ -117,6 +117,21 @@ def check_list(lights: Sequence[Light]) -> None:
             raise InputError(f"{light!r} is no light; give lights such as PencilBeam or DiffuseLight.")
 
 
+def check_scenes(scenes: Sequence[Sequence[Light]]) -> None:
+    """Refuse what is no list of lists of lights, or an empty list.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(scenes, Sequence):
+        raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
+    for lights in scenes:
+        check_list(lights)
+    if len(scenes) == 0:
+        raise InputError("there is no scene; give the lights of at least one.")
+
+
 def _charges_in_one_medium(
     deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
