@@ -59,7 +59,7 @@ class Problem:
     @property
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
-        return len(set(self.media)), sum(len(sources.lights) for sources in self.sources)
+        return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.known.beam_as_charges import in_points
+from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.media.medium import Medium
@@ -139,7 +139,7 @@ def _charges_in_one_medium(
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
     if len(deposit.starts):
-        trials.insert(0, (*in_points(deposit, medium), images))
+        trials.insert(0, (*beam_as_charges(deposit, medium), images))
     for bright, faint, with_images in trials:
         if 0 < len(bright.points) <= most:
             some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=most)
