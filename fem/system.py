@@ -174,69 +174,82 @@ class System:
         """The solution, where its charges are good guesses, and its parts by the operators that they belong to."""
         mesh = self.mesh
         with watch.stage("assemble"):
-            deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
-            laws = [self._operator_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
-            loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
-            for light, (deposit, operator) in enumerate(zip(deposits, laws, strict=True)):
-                if operator.fitting is not None and np.any(deposit.emission):
-                    withheld = (1.0 - operator.fitting.absorption_scale) * mesh.to_nodes(
-                        deposit.emission * mesh.volumes
-                    )
-                    # Absorbed where it is emitted, since of its absorption a node keeps only that of the layer.
-                    loads[light] -= withheld
-                    deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+            deposits, operators, loads = self._loads(sources)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.any()]
-            if before is None:
-                everywhere = np.ones(len(mesh.points), dtype=bool)
-                patches = [patch_of(mesh, charges, everywhere) for charges in sources.charges]
-            else:
-                coarse = before.solution.mesh.points
-                patches = [
-                    patch_of(mesh, charges, inherit_good_nodes(good, coarse, mesh))
-                    for charges, good in zip(sources.charges, before.good, strict=True)
-                ]
+            patches = self._patches(sources, before)
             terms = [patch_terms(patch, self.mass) for patch in patches]
-            of_columns = [*(self.plain for _ in terms), *(laws[light] for light in lit)]
+            of_columns = [*(self.plain for _ in terms), *(operators[light] for light in lit)]
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
             columns = np.column_stack([*(term.load for term in terms), *(loads[light] for light in lit)] or loads[:1])
             parts, solved = _solve_columns(of_columns, columns)
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
-        worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
-        if worse:
-            with watch.stage("assemble"):
-                for i in worse:
-                    patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(patches[i], self.mass)
-            with watch.stage("solve"):
-                solved.append(self.plain.solver.solve(np.column_stack([terms[i].load for i in worse])))
-                parts[:, worse] = solved[-1].x
+        if before is None:
+            solved += self._shrink(patches, terms, good, parts, watch)
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
         of_lights = []
         for light, deposit in enumerate(deposits):
             fluence = parts[:, : len(owners)][:, owners == light].sum(axis=1)
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
             its_patches, its_terms = [patches[i] for i in own], [terms[i] for i in own]
-            of_lights.append(self._solution(deposit, laws[light], fluence, its_patches, its_terms))
-        found = []
-        for operator in dict.fromkeys(laws):
-            some = [light for light, each in enumerate(laws) if each is operator]
-            emission = sum((deposits[light].emission for light in some), 0.0)
-            # Emission is even, and what deposits ripple by is that they are not.
-            uneven = [loads[light] for light in some if not deposits[light].even]
-            load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
-            found.append(_Part(operator, sum_solutions([of_lights[light] for light in some]), load, emission))
-        notes = [operator.solver.note for operator in dict.fromkeys(laws) if operator.solver.note]
-        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
+            of_lights.append(self._solution(deposit, operators[light], fluence, its_patches, its_terms))
         solution = replace(
             sum_solutions(of_lights),
-            warnings=notes,
-            validity=validity,
+            warnings=[operator.solver.note for operator in dict.fromkeys(operators) if operator.solver.note],
+            validity=Validity(mesh, self.coefficients, sources.lights, sources.deposits),
             residual=max((result.residual for result in solved), default=0.0),
             iterations=max((result.iterations for result in solved), default=0),
         )
-        return solution, tuple(good), found
+        return solution, tuple(good), _parts_by_operator(operators, deposits, loads, of_lights)
+
+    def _loads(self, sources: Sources) -> "tuple[list[Deposit], list[Operator], list[FloatArray]]":
+        """Of each light: its deposit on the mesh, its operator, and its load at the nodes (n,), W."""
+        mesh = self.mesh
+        deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
+        operators = [self._operator_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
+        loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+        for light, (deposit, operator) in enumerate(zip(deposits, operators, strict=True)):
+            if operator.fitting is not None and np.any(deposit.emission):
+                emitted = mesh.to_nodes(deposit.emission * mesh.volumes)
+                withheld = (1.0 - operator.fitting.absorption_scale) * emitted
+                # The fitted operator absorbs only in the layer: the rest is absorbed where it is emitted.
+                loads[light] -= withheld
+                deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+        return deposits, operators, loads
+
+    def _patches(self, sources: Sources, before: Step | None) -> list[Patch]:
+        """The patch of each of the charges: where they were a good guess on the mesh before, or else everywhere."""
+        mesh = self.mesh
+        if before is None:
+            everywhere = np.ones(len(mesh.points), dtype=bool)
+            return [patch_of(mesh, charges, everywhere) for charges in sources.charges]
+        coarse = before.solution.mesh.points
+        return [
+            patch_of(mesh, charges, inherit_good_nodes(good, coarse, mesh))
+            for charges, good in zip(sources.charges, before.good, strict=True)
+        ]
+
+    def _shrink(
+        self,
+        patches: list[Patch],
+        terms: list[PatchTerms],
+        good: list[BoolArray],
+        parts: FloatArray,
+        watch: Stopwatch,
+    ) -> list[LinearResult]:
+        """Shrink patches to the good nodes and solve for them again, in place."""
+        worse = [i for i in range(len(patches)) if not good[i].all()]
+        if not worse:
+            return []
+        with watch.stage("assemble"):
+            for i in worse:
+                patches[i] = patch_of(self.mesh, patches[i].charges, good[i], patches[i].at_nodes)
+                terms[i] = patch_terms(patches[i], self.mass)
+        with watch.stage("solve"):
+            result = self.plain.solver.solve(np.column_stack([terms[i].load for i in worse]))
+            parts[:, worse] = result.x
+        return [result]
 
     def _operator_of(self, light: int, deposit: Deposit, sources: Sources) -> "Operator":
         """The fitted operator for light that is spread evenly, the plain one for all other light."""
@@ -339,3 +352,21 @@ class _Part:
     solution: Solution
     load: FloatArray
     emission: float | FloatArray
+
+
+def _parts_by_operator(
+    operators: Sequence[Operator],
+    deposits: Sequence[Deposit],
+    loads: Sequence[FloatArray],
+    of_lights: Sequence[Solution],
+) -> list[_Part]:
+    """The lights of each operator together."""
+    found = []
+    for operator in dict.fromkeys(operators):
+        some = [light for light, each in enumerate(operators) if each is operator]
+        emission = sum((deposits[light].emission for light in some), 0.0)
+        # Only uneven deposits make the exitance ripple, and emission is even.
+        uneven = [loads[light] for light in some if not deposits[light].even]
+        load = np.sum([np.zeros_like(loads[0]), *uneven], axis=0)
+        found.append(_Part(operator, sum_solutions([of_lights[light] for light in some]), load, emission))
+    return found
