@@ -8,9 +8,10 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
-from tetlux.fem.error.estimate import Estimate, estimated
+from tetlux.fem.error.estimate import Estimate, estimate_error
+from tetlux.fem.known.patch import Patch, good_nodes, inherit_good_nodes, patch_of
+from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.known.split import Sources, Subtract, sources_of
-from tetlux.fem.known.subtraction import Patch, PatchTerms, good_nodes, inherited, patch_of, patch_terms
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
@@ -18,7 +19,7 @@ from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import Fitting, fitting_of
 from tetlux.fem.operators.limiter import nonnegative
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.outcome.solution import Power, Solution, added
+from tetlux.fem.outcome.solution import Power, Solution, sum_solutions
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
@@ -89,27 +90,29 @@ class System:
         return coefficients_on(self.mesh, self.media)
 
     @cached_property
-    def plain(self) -> "Equations":
-        """Those of points and beams."""
-        return self._equations(None)
+    def plain(self) -> "Operator":
+        """The operator for points and beams."""
+        return self._operator(None)
 
     @cached_property
-    def fitted(self) -> "Equations":
-        """Those of diffuse and emitted light, whose layers along the boundary are fitted where the mesh is coarse."""
+    def fitted(self) -> "Operator":
+        """The operator for diffuse and emitted light: layers along the boundary are fitted where the mesh is coarse."""
         fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
-        return self.plain if fitting is None else self._equations(fitting)
+        return self.plain if fitting is None else self._operator(fitting)
 
-    def _equations(self, fitting: Fitting | None) -> "Equations":
+    def _operator(self, fitting: Fitting | None) -> "Operator":
         mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
-        sigma_a, kept = coefficients.sigma_a, 1.0 if fitting is None else fitting.kept
+        sigma_a, scale = coefficients.sigma_a, 1.0 if fitting is None else fitting.absorption_scale
         volumes = sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
         loads = LOADS_OF_A_LIGHT * self.expected
         if fitting is None:
             solver = assembly.solver(coefficients, self.mass, loads)
         else:
-            matrix = assembly.matrix(fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.kept)
+            matrix = assembly.matrix(
+                fitting.diffusion, sigma_a, coefficients.escape, self.mass, fitting.absorption_scale
+            )
             solver = solver_for(matrix, loads)
-        return Equations(solver, np.asarray(kept * volumes), fitting)
+        return Operator(solver, np.asarray(scale * volumes), fitting)
 
     @property
     def body(self) -> Surface:
@@ -149,15 +152,15 @@ class System:
         with watch.stage("solve"):
             inner = tuple(region.surface for region in self.regions)
             estimates = [
-                estimated(
+                estimate_error(
                     part.solution,
                     solution,
                     self.coefficients,
-                    part.equations.solver,
+                    part.operator.solver,
                     part.load,
                     part.emission,
                     inner,
-                    part.equations.fitting,
+                    part.operator.fitting,
                 )
                 for part in parts
             ]
@@ -168,91 +171,106 @@ class System:
     def _solved(
         self, sources: Sources, watch: Stopwatch, before: Step | None
     ) -> "tuple[Solution, tuple[BoolArray, ...], list[_Part]]":
-        """The solution, where its charges are good guesses, and its parts by the equations that they obey."""
+        """The solution, where its charges are good guesses, and its parts by the operators that they belong to."""
         mesh = self.mesh
         with watch.stage("assemble"):
-            deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
-            laws = [self._equations_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
-            loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
-            for light, (deposit, equations) in enumerate(zip(deposits, laws, strict=True)):
-                if equations.fitting is not None and np.any(deposit.emission):
-                    withheld = (1.0 - equations.fitting.kept) * mesh.to_nodes(deposit.emission * mesh.volumes)
-                    # Absorbed where it is emitted, since of its absorption a node keeps only that of the layer.
-                    loads[light] -= withheld
-                    deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+            deposits, operators, loads = self._loads(sources)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.any()]
-            if before is None:
-                everywhere = np.ones(len(mesh.points), dtype=bool)
-                patches = [patch_of(mesh, charges, everywhere) for charges in sources.charges]
-            else:
-                coarse = before.solution.mesh.points
-                patches = [
-                    patch_of(mesh, charges, inherited(good, coarse, mesh))
-                    for charges, good in zip(sources.charges, before.good, strict=True)
-                ]
+            patches = self._patches(sources, before)
             terms = [patch_terms(patch, self.mass) for patch in patches]
-            of_columns = [*(self.plain for _ in terms), *(laws[light] for light in lit)]
+            of_columns = [*(self.plain for _ in terms), *(operators[light] for light in lit)]
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
             columns = np.column_stack([*(term.load for term in terms), *(loads[light] for light in lit)] or loads[:1])
             parts, solved = _solve_columns(of_columns, columns)
         good = [good_nodes(patch, part) for patch, part in zip(patches, parts.T, strict=False)]
-        worse = [i for i, patch in enumerate(patches) if before is None and not good[i].all()]
-        if worse:
-            with watch.stage("assemble"):
-                for i in worse:
-                    patches[i] = patch_of(mesh, patches[i].charges, good[i], patches[i].at_nodes)
-                    terms[i] = patch_terms(patches[i], self.mass)
-            with watch.stage("solve"):
-                solved.append(self.plain.solver.solve(np.column_stack([terms[i].load for i in worse])))
-                parts[:, worse] = solved[-1].x
+        if before is None:
+            solved += self._shrink(patches, terms, good, parts, watch)
         owners = np.array([*sources.owners, *lit], dtype=np.int64)
         of_lights = []
         for light, deposit in enumerate(deposits):
             fluence = parts[:, : len(owners)][:, owners == light].sum(axis=1)
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
             its_patches, its_terms = [patches[i] for i in own], [terms[i] for i in own]
-            of_lights.append(self._solution(deposit, laws[light], fluence, its_patches, its_terms))
-        found = []
-        for equations in dict.fromkeys(laws):
-            some = [light for light, each in enumerate(laws) if each is equations]
-            emission = sum((deposits[light].emission for light in some), 0.0)
-            # Emission is even, and what deposits ripple by is that they are not.
-            uneven = [loads[light] for light in some if not deposits[light].even]
-            load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
-            found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
-        notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
+            of_lights.append(self._solution(deposit, operators[light], fluence, its_patches, its_terms))
         solution = replace(
-            added(of_lights),
-            warnings=notes,
-            validity=validity,
+            sum_solutions(of_lights),
+            warnings=[operator.solver.note for operator in dict.fromkeys(operators) if operator.solver.note],
+            validity=Validity(mesh, self.coefficients, sources.lights, sources.deposits),
             residual=max((result.residual for result in solved), default=0.0),
             iterations=max((result.iterations for result in solved), default=0),
         )
-        return solution, tuple(good), found
+        return solution, tuple(good), _parts_by_operator(operators, deposits, loads, of_lights)
 
-    def _equations_of(self, light: int, deposit: Deposit, sources: Sources) -> "Equations":
-        """Fitted ones for what is spread evenly, the mesh's own for what is not."""
+    def _loads(self, sources: Sources) -> "tuple[list[Deposit], list[Operator], list[FloatArray]]":
+        """Of each light: its deposit on the mesh, its operator, and its load at the nodes (n,), W."""
+        mesh = self.mesh
+        deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
+        operators = [self._operator_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
+        loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+        for light, (deposit, operator) in enumerate(zip(deposits, operators, strict=True)):
+            if operator.fitting is not None and np.any(deposit.emission):
+                emitted = mesh.to_nodes(deposit.emission * mesh.volumes)
+                withheld = (1.0 - operator.fitting.absorption_scale) * emitted
+                # The fitted operator absorbs only in the layer: the rest is absorbed where it is emitted.
+                loads[light] -= withheld
+                deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+        return deposits, operators, loads
+
+    def _patches(self, sources: Sources, before: Step | None) -> list[Patch]:
+        """The patch of each of the charges: where they were a good guess on the mesh before, or else everywhere."""
+        mesh = self.mesh
+        if before is None:
+            everywhere = np.ones(len(mesh.points), dtype=bool)
+            return [patch_of(mesh, charges, everywhere) for charges in sources.charges]
+        coarse = before.solution.mesh.points
+        return [
+            patch_of(mesh, charges, inherit_good_nodes(good, coarse, mesh))
+            for charges, good in zip(sources.charges, before.good, strict=True)
+        ]
+
+    def _shrink(
+        self,
+        patches: list[Patch],
+        terms: list[PatchTerms],
+        good: list[BoolArray],
+        parts: FloatArray,
+        watch: Stopwatch,
+    ) -> list[LinearResult]:
+        """Shrink patches to the good nodes and solve for them again, in place."""
+        worse = [i for i in range(len(patches)) if not good[i].all()]
+        if not worse:
+            return []
+        with watch.stage("assemble"):
+            for i in worse:
+                patches[i] = patch_of(self.mesh, patches[i].charges, good[i], patches[i].at_nodes)
+                terms[i] = patch_terms(patches[i], self.mass)
+        with watch.stage("solve"):
+            result = self.plain.solver.solve(np.column_stack([terms[i].load for i in worse]))
+            parts[:, worse] = result.x
+        return [result]
+
+    def _operator_of(self, light: int, deposit: Deposit, sources: Sources) -> "Operator":
+        """The fitted operator for light that is spread evenly, the plain one for all other light."""
         return self.fitted if deposit.even and light not in sources.owners else self.plain
 
     def _solution(
         self,
         deposit: Deposit,
-        equations: "Equations",
+        operator: "Operator",
         fluence: FloatArray,
         patches: list[Patch],
         terms: list[PatchTerms],
     ) -> Solution:
         """The solution of one light, by its deposit on this mesh."""
-        mesh, moved = self.mesh, 0.0
+        mesh, limited_power = self.mesh, 0.0
         if self.limit and not (self._has_first_moment(deposit) or any(patch.charges.dips for patch in patches)):
-            fluence, moved = nonnegative(fluence, mesh.edges, self._losing(equations))
+            fluence, limited_power = nonnegative(fluence, mesh.edges, self._losing(operator))
         outside = mesh.boundary_node_areas * deposit.irradiance
         transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
         emitted = float((mesh.volumes * deposit.emission).sum())
-        absorbed = float((equations.absorbing * fluence).sum())
+        absorbed = float((operator.absorbing * fluence).sum())
         ledger = Power(
             incident=deposit.incident + float(outside.sum()) + emitted,
             specular=deposit.specular + float((outside - transmitted).sum()),
@@ -268,7 +286,7 @@ class System:
             ledger,
             tuple(patches),
             deposit.transmitted_irradiance,
-            moved=moved,
+            limited_power=limited_power,
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
         return replace(solution, power=replace(ledger, exited=exited))
@@ -285,9 +303,9 @@ class System:
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
         return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
 
-    def _losing(self, equations: "Equations") -> FloatArray:
+    def _losing(self, operator: "Operator") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""
-        losing = equations.absorbing.copy()
+        losing = operator.absorbing.copy()
         losing[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
         return losing
 
@@ -297,16 +315,16 @@ class System:
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
-    """A matrix on a mesh.
+class Operator:
+    """A matrix on a mesh, and its solver.
 
     Attributes
     ----------
     solver : Solver
     absorbing : (n,) ndarray
-        What a fluence of 1 at each node loses by absorption, unit².
+        Power absorbed for a fluence of 1 at each node, unit².
     fitting : Fitting, optional
-        What the matrix has in place of some coefficients.
+        The coefficients of the matrix where they are not those of the media.
     """
 
     solver: Solver
@@ -316,11 +334,11 @@ class Equations:
     __repr__ = one_line
 
 
-def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
-    """Solve for the columns of (n, k) loads, each by equations of its own: (n, k), and what that took."""
+def _solve_columns(operators: "Sequence[Operator]", loads: FloatArray) -> tuple[FloatArray, list[LinearResult]]:
+    """Solve for the columns of loads (n, k), each with its own operator: (n, k), and the result of each solve."""
     parts, solved = np.zeros(loads.shape), []
-    for some in dict.fromkeys(equations):
-        columns = [i for i, each in enumerate(equations) if each is some]
+    for some in dict.fromkeys(operators):
+        columns = [i for i, each in enumerate(operators) if each is some]
         solved.append(some.solver.solve(loads[:, columns]))
         parts[:, columns] = solved[-1].x
     return parts, solved
@@ -328,9 +346,27 @@ def _solve_columns(equations: "Sequence[Equations]", loads: FloatArray) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What of a solution obeys the same equations, what was put on the nodes for it, and what the volume emits."""
+    """The part of a solution that has one operator, its load at the nodes, and its emission in the volume."""
 
-    equations: Equations
+    operator: Operator
     solution: Solution
     load: FloatArray
     emission: float | FloatArray
+
+
+def _parts_by_operator(
+    operators: Sequence[Operator],
+    deposits: Sequence[Deposit],
+    loads: Sequence[FloatArray],
+    of_lights: Sequence[Solution],
+) -> list[_Part]:
+    """The lights of each operator together."""
+    found = []
+    for operator in dict.fromkeys(operators):
+        some = [light for light, each in enumerate(operators) if each is operator]
+        emission = sum((deposits[light].emission for light in some), 0.0)
+        # Only uneven deposits make the exitance ripple, and emission is even.
+        uneven = [loads[light] for light in some if not deposits[light].even]
+        load = np.sum([np.zeros_like(loads[0]), *uneven], axis=0)
+        found.append(_Part(operator, sum_solutions([of_lights[light] for light in some]), load, emission))
+    return found

@@ -67,7 +67,7 @@ def test_a_beam_of_a_first_moment_is_not_limited(flat: TetMesh) -> None:
     found = System(flat, forward).solve([light])
     raw = System(flat, forward, limit=False).solve([light])
     np.testing.assert_array_equal(found.fluence, raw.fluence)
-    assert found.moved == 0
+    assert found.limited_power == 0
 
 
 def test_what_was_moved_is_told() -> None:
@@ -76,7 +76,7 @@ def test_what_was_moved_is_told() -> None:
     leaning = upright.points + np.outer(upright.points[:, 2], (1.5, 0.0, 0.0))
     mesh = TetMesh(leaning, upright.tetrahedra, upright.unit)
     solution = solve(mesh, DARK, [PointSource((-15.0, 0.0, -10.0), 1.0)], subtract="nothing", tolerance=0.5)
-    assert solution.moved == pytest.approx(3.28e-3, rel=0.01)
+    assert solution.limited_power == pytest.approx(3.28e-3, rel=0.01)
     assert any("0.33% of the power was moved between nodes to keep the fluence" in w for w in solution.warnings)
 
 

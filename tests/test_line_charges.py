@@ -11,9 +11,9 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.known import beam_as_charges as lines
-from tetlux.fem.known.beam_as_charges import in_points
+from tetlux.fem.known.beam_as_charges import beam_as_charges
+from tetlux.fem.known.images import MOST_CHARGES
 from tetlux.fem.known.split import sources_of
-from tetlux.fem.known.subtraction import MOST_CHARGES
 from tetlux.meshing import Surface, slab, sphere
 from tetlux.meshing.arrays import FloatArray
 
@@ -61,7 +61,7 @@ def half_space_exitance(
 def test_powers_sum_to_what_the_beam_leaves(medium: Medium, length: float) -> None:
     """And their first moment is ``∫ Q0 l + Q1/sigma_t' dl``, which the diffuse light far away depends on."""
     deposit = segment(length, flux=0.7)
-    bright, faint = in_points(deposit, medium)
+    bright, faint = beam_as_charges(deposit, medium)
     beam = beam_source(medium, "delta-eddington")
     total = scattered(deposit, medium)
     assert bright.powers.sum() + scattered(faint, medium) == pytest.approx(total, rel=1e-13)
@@ -78,7 +78,7 @@ def test_powers_sum_to_what_the_beam_leaves(medium: Medium, length: float) -> No
 @pytest.mark.parametrize("medium", [TISSUE, FORWARD, MATCHED, BACKWARD])
 def test_exitance_is_the_lines_a_mean_free_path_from_the_entry(medium: Medium, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lines, "FADED", 1e-5)
-    bright, _ = in_points(segment(200.0), medium)
+    bright, _ = beam_as_charges(segment(200.0), medium)
     rho = np.array([0.5, 1.0, 1.5, 2.0, 4.0, 8.0]) * medium.mean_free_path
     found = half_space_exitance(medium, bright.points, bright.powers, rho, 0.0 * rho)
     truth = half_space.pencil_exitance(medium, rho=rho)
@@ -91,7 +91,7 @@ def test_exitance_is_the_lines_a_mean_free_path_from_the_entry(medium: Medium, m
 def test_exitance_of_a_slanting_line(medium: Medium, angle: float, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lines, "FADED", 1e-5)
     direction = np.array([math.sin(math.radians(angle)), 0.0, math.cos(math.radians(angle))])
-    bright, _ = in_points(segment(200.0, direction), medium)
+    bright, _ = beam_as_charges(segment(200.0, direction), medium)
     around = np.linspace(0.0, 2.0 * np.pi, 9)
     for rho in (1.0, 2.0, 4.0):
         x, y = rho * medium.mean_free_path * np.cos(around), rho * medium.mean_free_path * np.sin(around)
@@ -103,7 +103,7 @@ def test_exitance_of_a_slanting_line(medium: Medium, angle: float, monkeypatch: 
 
 def test_fluence_beside_the_line_is_the_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lines, "FADED", 1e-5)
-    bright, _ = in_points(segment(200.0), FORWARD)
+    bright, _ = beam_as_charges(segment(200.0), FORWARD)
     for beside, most in ((0.5, 0.02), (1.0, 2e-3)):
         points = np.array([[beside, 0.0, z] for z in (0.2, 0.5, 1.0, 2.0, 3.0)])
 

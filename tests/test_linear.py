@@ -18,7 +18,7 @@ from tetlux.fem.linear.direct import direct
 from tetlux.fem.linear.krylov import Method, Product, jacobi
 from tetlux.fem.linear.multigrid import multigrid
 from tetlux.fem.linear.solver import Solver, solver_for
-from tetlux.fem.media.coefficients import apart, coefficients_of
+from tetlux.fem.media.coefficients import coefficients_of, condition_bound
 from tetlux.fem.operators.assembly import ALIKE, Assembly, system_matrix
 from tetlux.meshing import RunError, TetMesh, refine
 from tetlux.meshing.host import blocks
@@ -303,7 +303,7 @@ def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPa
     base, near, beyond, far = (
         coefficients_of(Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)) for sigma_a in (0.02, 0.05, 0.125, 0.9)
     )
-    assert apart(beyond, near) < ALIKE
+    assert condition_bound(beyond, near) < ALIKE
     # What is like one that only borrowed is not like what that was prepared for.
     for coefficients, anew in ((base, True), (near, False), (beyond, True), (far, True), (near, False)):
         prepared.clear()
@@ -317,15 +317,15 @@ def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPa
 
 def test_how_far_apart_coefficients_are() -> None:
     base = coefficients_of(TISSUE)
-    assert apart(base, base) == 1.0
+    assert condition_bound(base, base) == 1.0
     darker = coefficients_of(replace(TISSUE, sigma_a=3.0 * TISSUE.sigma_a))
     # Diffusion is a little less there.
     ratio = 3.0 * (TISSUE.sigma_t_prime + 2.0 * TISSUE.sigma_a) / TISSUE.sigma_t_prime
-    assert apart(darker, base) == pytest.approx(ratio)
-    assert apart(base, darker) == pytest.approx(ratio)
+    assert condition_bound(darker, base) == pytest.approx(ratio)
+    assert condition_bound(base, darker) == pytest.approx(ratio)
     varying = replace(base, sigma_a=np.array([0.5, 1.0, 2.0]) * TISSUE.sigma_a)
-    assert apart(varying, base) == pytest.approx(4.0)
+    assert condition_bound(varying, base) == pytest.approx(4.0)
     clear = coefficients_of(replace(TISSUE, sigma_a=0.0))
-    assert apart(clear, clear) == 1.0
-    assert apart(clear, base) == apart(base, clear) == np.inf
+    assert condition_bound(clear, clear) == 1.0
+    assert condition_bound(clear, base) == condition_bound(base, clear) == np.inf
     assert ratio < ALIKE < np.inf

@@ -9,8 +9,10 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space
+from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.images import MOST_CHARGES, charges_of
+from tetlux.fem.known.patch import Patch, _any_inside, _point_cells, patch_of
 from tetlux.fem.known.split import Subtract, sources_of
-from tetlux.fem.known.subtraction import MOST_CHARGES, Charges, Patch, _any_inside, _homes, charges_of, patch_of
 from tetlux.fem.operators.assembly import Mass
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
@@ -261,7 +263,7 @@ def test_points_are_found_in_a_concave_body_by_the_way_from_its_boundary(ring_me
     truly, _ = ring_mesh.locate(points)
     assert 0.2 < (truly >= 0).mean() < 0.8
     foot, face, _ = ring_mesh.closest_boundary(points)
-    found = _homes(ring_mesh, points, foot, face)
+    found = _point_cells(ring_mesh, points, foot, face)
     assert ((found >= 0) == (truly >= 0)).all()
     # Between two tetrahedra either is right.
     inside = np.flatnonzero(found >= 0)

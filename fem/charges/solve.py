@@ -9,6 +9,9 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST
 from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
+from tetlux.fem.error.tolerance import check_tolerance
+from tetlux.fem.known.split import check_list
+from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
@@ -20,6 +23,7 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import check_regions
 
 # Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
@@ -30,8 +34,8 @@ _INSTEAD = 'solve it with model "full".'
 
 
 def solve_with_charges(
-    surface: Surface,
-    medium: AnyMedium,
+    surface: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
@@ -60,7 +64,7 @@ def solve_with_charges(
     Raises
     ------
     InputError
-        If a light or a region does not go with the body, or is none of those.
+        If the body is a mesh, there are several media, or the tolerance, a light or a region is not of those.
 
     Examples
     --------
@@ -71,6 +75,14 @@ def solve_with_charges(
     >>> solution.error_estimate < 0.02
     True
     """
+    if isinstance(surface, TetMesh):
+        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
+    if not isinstance(medium, AnyMedium):
+        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
+    check_tolerance(tolerance)
+    check_list(lights)
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
     watch = Stopwatch()
     with watch.stage("surface"):
         inner = [(region.surface, even_medium(only_medium(region))) for region in regions]

@@ -1,1 +1,1 @@
-"""The estimated error of the exitance."""
+"""The estimated error of a solution, and where to refine to meet a tolerance."""

@@ -1,1 +1,23 @@
-"""What is known in closed form and subtracted."""
+"""The singular part of the fluence of point sources, subtracted in closed form.
+
+Near a source the fluence is that of a half-space with a Robin boundary (`tetlux.fem.exact.half_space`): the source,
+its mirror image, and a line of sinks above the image (Bryan 1890). With the line cut into points, this is a sum of
+screened charges ``q e^{-k r}/(4 pi D r)``: one inside the body, the others outside. Such a sum G solves the diffusion
+equation inside the body whatever the strengths of the charges outside. Cutting the line into few points, or leaving out
+charges that would lie in another part of the body, therefore adds no error: G is then only a poorer guess of the
+fluence.
+
+Finite elements solve for the rest. G is used on a patch of tetrahedra only, those where it is a good guess. There the
+fluence is ``phi_h = u_h + (G - I_h G)``, with ``I_h G`` the linear interpolant of G: u_h is the fluence at the nodes,
+and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G - I_h G, v)``. By Gauss's theorem
+``a(G, v)`` is the load of the source and integrals over the faces of the patch.
+
+A beam without width is a sum of such sources too, some of them negative.
+
+    charges          screened point charges and their field
+    images           the charges of a point source: itself and its images
+    patch            the tetrahedra on which charges are subtracted
+    patch_terms      what a patch adds to the load and to the ledger
+    beam_as_charges  beams without width
+    split            what of the lights is subtracted, and what is left to the mesh
+"""

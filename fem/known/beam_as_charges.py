@@ -45,7 +45,7 @@ ENDS = ((0.06, 4.0), (0.12, -6.0), (0.18, 4.0), (0.24, -1.0))
 SHALLOW = 0.5
 
 
-def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
+def beam_as_charges(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
     """The bright parts of a deposit's segments as points, and what is left of it.
 
     Parameters
@@ -61,38 +61,21 @@ def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
     faint : Deposit
         The rest of the segments and nothing else.
     """
-    scattering, cosine = medium.delta_eddington
-    extinction = medium.sigma_a + scattering
-    forward = cosine * scattering / medium.sigma_t_prime
+    extinction = medium.sigma_a + medium.delta_eddington[0]
     strongest = float(deposit.fluxes.max(initial=0.0))
-    points, powers = [deposit.points], [deposit.powers]
     reaches = np.clip(np.log(deposit.fluxes / (FADED * strongest)) / extinction, 0.0, deposit.lengths)
     left = deposit.fluxes * np.exp(-extinction * reaches)
     ends = deposit.starts + reaches[:, None] * deposit.directions
-    for i in np.flatnonzero(reaches > 0):
-        along, lost = _panels(float(reaches[i]), extinction, FIRST * medium.mean_free_path)
-        points.append(deposit.starts[i] + along[:, None] * deposit.directions[i])
-        powers.append((scattering / extinction + forward) * deposit.fluxes[i] * lost)
-        length, direction = float(deposit.lengths[i]), deposit.directions[i]
-        inside, weights = _end(deposit.starts[i], direction, length, medium)
-        points.append(inside)
-        powers.append(-forward * deposit.fluxes[i] * weights)
-        inside, weights = ends[i][None], np.ones(1)
-        if reaches[i] == length:
-            inside, weights = _end(ends[i], -direction, length, medium)
-        points.append(inside)
-        powers.append(forward * left[i] * weights)
-    powers_of_all = np.concatenate(powers)
-    shining = powers_of_all != 0  # in a medium that counts as isotropic the ends have none
+    points, powers = _bright_points(deposit, medium, reaches, left, ends)
     bright = replace(
         deposit,
-        points=np.vstack(points)[shining],
-        powers=powers_of_all[shining],
+        points=points,
+        powers=powers,
         starts=deposit.starts[:0],
         directions=deposit.directions[:0],
         lengths=deposit.lengths[:0],
         fluxes=deposit.fluxes[:0],
-        lit=deposit.lit[:0],  # the points stand there
+        lit=deposit.lit[:0],  # the points mark the same places
         resolution=medium.mean_free_path,
     )
     faint_parts = reaches < deposit.lengths
@@ -108,6 +91,35 @@ def in_points(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]:
         cells=None,
     )
     return bright, faint
+
+
+def _bright_points(
+    deposit: Deposit, medium: Medium, reaches: FloatArray, left: FloatArray, ends: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Points (p, 3) of a deposit and in place of its segments, and their powers (p,), W.
+
+    By the lengths of the segments' bright parts, the flux left at the ends of these, and the ends (s, 3) themselves.
+    """
+    scattering, cosine = medium.delta_eddington
+    extinction = medium.sigma_a + scattering
+    forward = cosine * scattering / medium.sigma_t_prime
+    points, powers = [deposit.points], [deposit.powers]
+    for i in np.flatnonzero(reaches > 0):
+        along, lost = _panels(float(reaches[i]), extinction, FIRST * medium.mean_free_path)
+        points.append(deposit.starts[i] + along[:, None] * deposit.directions[i])
+        powers.append((scattering / extinction + forward) * deposit.fluxes[i] * lost)
+        length, direction = float(deposit.lengths[i]), deposit.directions[i]
+        inside, weights = _end(deposit.starts[i], direction, length, medium)
+        points.append(inside)
+        powers.append(-forward * deposit.fluxes[i] * weights)
+        inside, weights = ends[i][None], np.ones(1)
+        if reaches[i] == length:
+            inside, weights = _end(ends[i], -direction, length, medium)
+        points.append(inside)
+        powers.append(forward * left[i] * weights)
+    powers_of_all = np.concatenate(powers)
+    shining = powers_of_all != 0  # in a medium that counts as isotropic the ends have none
+    return np.vstack(points)[shining], powers_of_all[shining]
 
 
 def _panels(reach: float, extinction: float, first: float) -> tuple[FloatArray, FloatArray]:

@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.known.beam_as_charges import in_points
-from tetlux.fem.known.subtraction import MOST_CHARGES, Charges, charges_of
+from tetlux.fem.known.beam_as_charges import beam_as_charges
+from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.meshing.describe import one_line
@@ -116,6 +117,21 @@ def check_list(lights: Sequence[Light]) -> None:
             raise InputError(f"{light!r} is no light; give lights such as PencilBeam or DiffuseLight.")
 
 
+def check_scenes(scenes: Sequence[Sequence[Light]]) -> None:
+    """Refuse what is no list of lists of lights, or an empty list.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(scenes, Sequence):
+        raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
+    for lights in scenes:
+        check_list(lights)
+    if len(scenes) == 0:
+        raise InputError("there is no scene; give the lights of at least one.")
+
+
 def _charges_in_one_medium(
     deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
@@ -123,7 +139,7 @@ def _charges_in_one_medium(
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
     if len(deposit.starts):
-        trials.insert(0, (*in_points(deposit, medium), images))
+        trials.insert(0, (*beam_as_charges(deposit, medium), images))
     for bright, faint, with_images in trials:
         if 0 < len(bright.points) <= most:
             some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=most)

@@ -72,11 +72,11 @@ def coefficients_of(medium: Medium) -> Coefficients:
     return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, known_cosine(medium), medium)
 
 
-def apart(one: Coefficients, other: Coefficients) -> float:
-    """How far apart the ratios of two sets of coefficients are, the largest over the smallest, on one mesh.
+def condition_bound(one: Coefficients, other: Coefficients) -> float:
+    """A bound of the condition number of one matrix preconditioned by another, from their coefficients on one mesh.
 
-    For any fluence the terms of the one's weak form are within these ratios of the other's, and so is their sum: this
-    bounds the condition number of the one's matrix when it is preconditioned by the other's.
+    For any fluence, each term of one weak form is the same term of the other times a ratio of coefficients, and so the
+    sums differ by a factor between the least and the largest ratio. The bound is the largest over the least.
     """
     ratios = []
     for name in ("diffusion", "sigma_a", "escape"):

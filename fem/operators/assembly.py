@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 
 from tetlux.fem.linear.krylov import Preconditioner
 from tetlux.fem.linear.solver import Solver, solver_for
-from tetlux.fem.media.coefficients import Coefficients, apart, coefficients_of
+from tetlux.fem.media.coefficients import Coefficients, coefficients_of, condition_bound
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.describe import one_line
@@ -71,7 +71,7 @@ class Assembly:
 
     def solver(self, coefficients: Coefficients, mass: Mass, loads: int) -> Solver:
         """One for the matrix of given coefficients, prepared with what was prepared for others much like them."""
-        known = next((cycle for others, cycle in self.cycles if apart(coefficients, others) <= ALIKE), None)
+        known = next((cycle for others, cycle in self.cycles if condition_bound(coefficients, others) <= ALIKE), None)
         solver = solver_for(self.of(coefficients, mass), loads, known)
         if known is None and solver.cycle is not None:
             self.cycles.append((coefficients, solver.cycle))
@@ -87,7 +87,7 @@ class Assembly:
         sigma_a: float | FloatArray,
         escape: float | FloatArray,
         mass: Mass = "lumped",
-        kept: FloatArray | None = None,
+        absorption_scale: FloatArray | None = None,
     ) -> csr_array:
         """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ escape phi v``.
 
@@ -100,8 +100,8 @@ class Assembly:
         escape : float or (f,) ndarray
             1/(2A), of all or of each boundary triangle.
         mass : {"lumped", "consistent"}
-        kept : (n,) ndarray, optional
-            The share of its absorption that the lumped mass of each node keeps, see `tetlux.fem.operators.fitting`.
+        absorption_scale : (n,) ndarray, optional
+            The factor on the absorption in the lumped mass of each node, see `tetlux.fem.operators.fitting`.
 
         Returns
         -------
@@ -113,7 +113,7 @@ class Assembly:
         edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
         diagonal = -summed(low, edges, nodes) - summed(high, edges, nodes)
         absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
-        diagonal += absorbed if kept is None else kept * absorbed
+        diagonal += absorbed if absorption_scale is None else absorption_scale * absorbed
         diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
         if mass == "consistent":
             # Their rows sum to what those of the lumped ones hold on the diagonal.

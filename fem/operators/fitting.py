@@ -38,14 +38,14 @@ class Fitting:
     ----------
     diffusion : (m,) ndarray
         D of each tetrahedron, unit.
-    kept : (n,) ndarray
-        The share of its absorption that the lumped mass of each node keeps.
+    absorption_scale : (n,) ndarray
+        The factor on the absorption in the lumped mass of each node.
     across : (n,) ndarray
         k h at nodes on the boundary, and 0 at others.
     """
 
     diffusion: FloatArray
-    kept: FloatArray
+    absorption_scale: FloatArray
     across: FloatArray
 
     __repr__ = one_line
@@ -62,11 +62,11 @@ def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> Fitting | None:
     at_boundary = decay * spacing
     if at_boundary.max() <= FITTED:
         return None
-    across, kept = np.zeros(len(mesh.points)), np.ones(len(mesh.points))
+    across, scale = np.zeros(len(mesh.points)), np.ones(len(mesh.points))
     across[nodes] = np.maximum(at_boundary, LEAST)
-    kept[nodes] = np.tanh(0.5 * across[nodes]) / (0.5 * across[nodes])
+    scale[nodes] = np.tanh(0.5 * across[nodes]) / (0.5 * across[nodes])
     corners = across[mesh.tetrahedra]
     touching = np.count_nonzero(corners, axis=1)
     mean = np.minimum(corners.sum(axis=1) / np.maximum(touching, 1), MOST)
     share = np.divide(mean, np.sinh(mean), out=np.ones(len(mean)), where=touching > 0)
-    return Fitting(coefficients.diffusion * share, kept, across)
+    return Fitting(coefficients.diffusion * share, scale, across)

@@ -33,7 +33,7 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     -------
     fluence : (n,) ndarray
         None below zero, and the sum of weights times fluence as before; as it was if that sum is below 1e-250.
-    moved : float
+    limited_power : float
         Power that was taken from some nodes and given to others, W.
     """
     power = weights * fluence
@@ -41,7 +41,7 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     if fluence.min(initial=0.0) >= 0 or total < NOTHING:
         return fluence, 0.0
     lacking, left = np.maximum(-power, 0.0), np.maximum(power, 0.0)
-    moved = float(lacking.sum())
+    limited_power = float(lacking.sum())
 
     def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(nodes, values, minlength=len(power)), dtype=np.float64)
@@ -58,7 +58,7 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
         left = np.maximum(left - at_nodes(givers, given), 0.0)
     # Rounding too: so much is left in all.
     left *= _ratio(np.array(total), left.sum())
-    return np.where(weights > 0, _ratio(left, weights), np.maximum(fluence, 0.0)), moved
+    return np.where(weights > 0, _ratio(left, weights), np.maximum(fluence, 0.0)), limited_power
 
 
 def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:

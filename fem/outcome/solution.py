@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.known.subtraction import Patch
+from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.validity.local import Validity
@@ -62,7 +62,7 @@ class Solution:
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
     patches : tuple of Patch
-        Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.known.subtraction`.
+        Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.known`.
     transmitted_irradiance : float or (b,) ndarray
         Diffuse light that passed to the inside, throughout or at each boundary node, W/unit².
     error_estimate : float
@@ -71,7 +71,7 @@ class Solution:
         Seconds spent on surface, mesh, assemble, solve, and total.
     warnings : list of str
         Plain sentences, each a `tetlux.meshing.notes.Note` with a code.
-    moved : float
+    limited_power : float
         Power moved from node to node to keep the fluence from going below zero, W: see `tetlux.fem.operators.limiter`.
     of_lights : tuple of Solution
         What each light adds, in their order, if there are several.
@@ -93,7 +93,7 @@ class Solution:
     error_estimate: float = np.nan
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
-    moved: float = 0.0
+    limited_power: float = 0.0
     of_lights: "tuple[Solution, ...]" = ()
     validity: Validity | None = None
     residual: float = 0.0
@@ -239,7 +239,7 @@ class Solution:
         return f"Solution({', '.join(facts)})"
 
 
-def added(parts: Sequence[Solution]) -> Solution:
+def sum_solutions(parts: Sequence[Solution]) -> Solution:
     """The sum of solutions on one mesh, one for each light."""
     if len(parts) == 1:
         return parts[0]
@@ -250,6 +250,6 @@ def added(parts: Sequence[Solution]) -> Solution:
         power=Power(*(sum(column) for column in zip(*powers, strict=True))),
         patches=tuple(patch for part in parts for patch in part.patches),
         transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
-        moved=sum(part.moved for part in parts),
+        limited_power=sum(part.limited_power for part in parts),
         of_lights=tuple(parts),
     )

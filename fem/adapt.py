@@ -1,0 +1,145 @@
+"""Mesh a body, solve, estimate the error and refine, until the tolerance is met for every scene."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import Timer
+
+import numpy as np
+
+from tetlux.fem.error.tolerance import cells_to_split
+from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.known.split import Sources
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.scene import Scene
+from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.system import Step
+from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.refine import refine
+
+# Refinement stops at this many tetrahedra unless told otherwise.
+MOST_TETRAHEDRA = 1_000_000
+# After this many seconds in the mesher a progress line appears.
+SLOW = 8.0
+
+Report = Callable[[str], None]
+# Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
+SceneSolver = Callable[[int, Step | None], Step]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What is solved for: a body, the media and lights of each scene, and how.
+
+    Attributes
+    ----------
+    scene : Scene
+        The body and the media of each scene.
+    sources : list of Sources
+        The lights of each scene.
+    mass : {"lumped", "consistent"}
+    limit : bool
+        Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
+    watch : Stopwatch
+    """
+
+    scene: Scene
+    sources: list[Sources]
+    mass: Mass
+    limit: bool
+    watch: Stopwatch
+
+    @property
+    def media(self) -> list[tuple[AnyMedium, ...]]:
+        """The media of each scene."""
+        return self.scene.media
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
+        return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
+
+    def solver_on(self, mesh: TetMesh) -> SceneSolver:
+        """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
+        assembly = Assembly(mesh)
+        systems = {
+            media: self.scene.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            for media in dict.fromkeys(self.media)
+        }
+        return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
+
+
+def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+    """The mesher's mesh of a body, refined towards its lights."""
+    scene = problem.scene
+    with problem.watch.stage("mesh"):
+        with _report_if_slow(report):
+            mesh = tetrahedralize(scene.surface, scene.inner, cache=cache)
+        lit = lit_points([deposit for sources in problem.sources for deposit in sources.deposits])
+        mesh = graded_towards(mesh, scene.surface, *lit, most_tetrahedra, inner=scene.inner)
+    report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
+    return mesh
+
+
+@contextmanager
+def _report_if_slow(report: Report) -> Iterator[None]:
+    """Report once that the mesher is still running, if it takes long."""
+    words = f"still tetrahedralizing: thin parts and small regions take long; given up after {TIME_LIMIT:g} s"
+    timer = Timer(SLOW, report, [words])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def solve_and_refine(
+    mesh: TetMesh, problem: Problem, tolerance: float, most_tetrahedra: int, report: Report
+) -> list[Step]:
+    """Solve for all scenes on one mesh, refined until each meets the tolerance or the mesh is as large as it may be.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        To begin with.
+    problem : Problem
+    tolerance : float
+    most_tetrahedra : int
+        Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
+    report : callable
+        Called with a line of text as each mesh is solved on.
+
+    Returns
+    -------
+    list of Step
+        One for each scene, all on the same mesh.
+    """
+    # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
+    bodies = problem.scene.bodies
+    first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
+    solve_on = problem.solver_on(mesh)
+    steps = best = {first: solve_on(first, None)}
+    least = np.inf
+    while True:
+        worst = max(step.estimate.error for step in steps.values())
+        if worst < least:
+            best, least = steps, worst
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
+        marked = cells_to_split((step.estimate for step in steps.values()), tolerance)
+        fine_enough = not marked.any()
+        if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
+            with problem.watch.stage("mesh"):
+                finer = refine(mesh, marked, problem.scene.surface, problem.scene.inner)
+            if len(finer.tetrahedra) <= most_tetrahedra:
+                mesh, solve_on = finer, problem.solver_on(finer)
+                steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
+                continue
+        if not pending:
+            # Where refinement no longer reduces the error, an earlier mesh may have been better.
+            found = steps if fine_enough else best
+            return [found[scene] for scene in range(len(bodies))]
+        steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
+        pending, least = [], np.inf

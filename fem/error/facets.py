@@ -1,0 +1,118 @@
+"""The error of flat facets that stand for a curved boundary or interface.
+
+A boundary that lies a distance delta away adds the shape derivative of the weak form::
+
+    ∮ |delta| [ D |grad_t phi . grad_t z| + sigma_a phi z + |kappa - 1/zb| J z ]
+
+with J the net flux that leaves and kappa twice the mean curvature. An interface between regions adds, with jumps [.]
+across it::
+
+    ∮ |delta| [ |[D]| |grad_t phi . grad_t z| + |[1/D]| |D dphi/dn D dz/dn| + |[sigma_a]| phi z + |[Q0]| z ]
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.regions import owners
+
+# Facets that could add no more than the first share of the rest are not measured. The distance of a facet from a smooth
+# surface is at most the second share of its longest edge.
+NOT_MEASURED, FARTHEST = 0.02, 0.2
+# Farther from the surface than this share of its longest edge, a facet is not a chord of a smooth surface.
+BULGE = 0.1
+# The mean distance of a paraboloid from a triangle through three of its points, over the distance at the middle.
+MEAN_OVER_MIDDLE = 0.75
+
+
+def boundary_facets(
+    mesh: TetMesh,
+    coefficients: Coefficients,
+    surface: Surface,
+    values: tuple[FloatArray, FloatArray, FloatArray],
+    rest: float,
+    absorption_scale: float | FloatArray,
+) -> FloatArray:
+    """Shares in the error of flat facets of the boundary, (m,).
+
+    Parameters
+    ----------
+    values : tuple of three (n,) ndarray
+        At the nodes: the fluence, the net flux that leaves, and the dual.
+    rest : float
+        The sum of all other shares: facets that could add little to it are not measured.
+    absorption_scale : float or (m,) ndarray
+        A fitted layer moves with the facets, so that only their curvature matters to it: the other terms are scaled by
+        this.
+    """
+    fluence, leaving, dual = values
+    faces, cells = mesh.boundary_faces, mesh.boundary_cells
+    hats, nodes = mesh.hat_gradients[cells], mesh.tetrahedra[cells]
+    slopes = [np.einsum("mij,mi->mj", hats, at_nodes[nodes]) for at_nodes in (fluence, dual)]
+    normals, areas = mesh.surface.normals, mesh.boundary_areas
+    tangential = [s - np.einsum("ij,ij->i", s, normals)[:, None] * normals for s in slopes]
+    product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
+    outflow = np.abs(leaving[faces].mean(axis=1) * dual[faces].mean(axis=1))
+    diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
+    extrapolation = diffusion / coefficients.escape
+    scale = at_cells(absorption_scale, cells)
+    along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma_a * product
+    corners = mesh.points[faces]
+    length = longest_sides(corners)
+    most = FARTHEST * length * areas * (along + scale * outflow / extrapolation)
+    order = np.argsort(most)
+    measured = order[np.cumsum(most[order]) > NOT_MEASURED * rest]
+    distance = mesh.boundary_distances(surface, measured)
+    # A sphere through the corners of an equilateral triangle is h²/6R above its middle. A facet farther away has a
+    # node that could not be moved onto the surface, and its distance says nothing of the curvature.
+    curvature = np.where(distance < BULGE * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0)
+    bent = np.abs(curvature - (scale / extrapolation)[measured]) * outflow[measured]
+    shares = MEAN_OVER_MIDDLE * distance * areas[measured] * (along[measured] + bent)
+    return np.asarray(np.bincount(cells[measured], shares, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+
+
+def interface_facets(
+    mesh: TetMesh,
+    coefficients: Coefficients,
+    inner: Sequence[Surface],
+    emission: float | FloatArray,
+    values: tuple[FloatArray, FloatArray],
+) -> FloatArray:
+    """Shares in the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
+    total = np.zeros(len(mesh.tetrahedra))
+    if len(inner) == 0:
+        return total
+    faces, pairs, cells = mesh.interfaces
+    distance = _interface_distances(mesh.points[faces].mean(axis=1), owners(pairs, inner), inner)
+    normals, areas = triangle_areas(mesh.points, faces)
+    diffusion, sigma_a, density = (
+        np.column_stack([at_cells(value, side) for side in cells.T])
+        for value in (coefficients.diffusion, coefficients.sigma_a, emission)
+    )
+    means, flows, tangents = [], [], []
+    for at_nodes in values:
+        slopes = np.einsum("fsij,fsi->fsj", mesh.hat_gradients[cells], at_nodes[mesh.tetrahedra[cells]])
+        across = np.einsum("fsj,fj->fs", slopes, normals)
+        means.append(at_nodes[faces].mean(axis=1))
+        flows.append((diffusion * across).mean(axis=1))
+        tangents.append((slopes - across[..., None] * normals[:, None]).mean(axis=1))
+    jumps = [np.abs(np.diff(each, axis=1)[:, 0]) for each in (diffusion, 1.0 / diffusion, sigma_a, density)]
+    bent = jumps[0] * np.abs(np.einsum("fj,fj->f", *tangents)) + jumps[1] * np.abs(flows[0] * flows[1])
+    bent += jumps[2] * np.abs(means[0] * means[1]) + jumps[3] * np.abs(means[1])
+    shares = 0.5 * MEAN_OVER_MIDDLE * distance * areas * bent
+    for side in cells.T:
+        total += np.bincount(side, shares, minlength=len(total))
+    return total
+
+
+def _interface_distances(middles: FloatArray, owner: IntArray, inner: Sequence[Surface]) -> FloatArray:
+    """Distances of points (f, 3) from the surfaces of the regions (f,) that own them, (f,)."""
+    distances = np.zeros(len(middles))
+    for region in np.unique(owner):
+        own = owner == region
+        distances[own] = np.linalg.norm(inner[region - 1].project(middles[own])[0] - middles[own], axis=1)
+    return distances

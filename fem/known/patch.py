@@ -1,0 +1,152 @@
+"""`Patch`: the tetrahedra on which charges are subtracted, where they are a good guess of the fluence."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tetlux.fem.known.charges import Charges
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.describe import one_line
+from tetlux.meshing.search.rays import OFFSET
+from tetlux.meshing.surface.surface import longest_sides
+from tetlux.meshing.tets.march import march
+from tetlux.meshing.tets.mesh import FACES, TetMesh
+
+# A charge that is nearer to a facet than this share of the facet's longest edge is too near for the integrals over it.
+RESOLVED = 3e-4
+# Longest edge of an inner face of a patch, over its distance from the charges: across such faces the fluence jumps by
+# the error of linear interpolation.
+COARSEST_INNER = 1.5
+# The charges are a good guess where they differ from the fluence by at most this share of themselves.
+GOOD_GUESS = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """The tetrahedra of a mesh on which charges are subtracted.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    charges : Charges
+    cells : (m,) ndarray of bool
+        Whether each tetrahedron belongs to the patch.
+    at_nodes : (n,) ndarray
+        Fluence of the charges at the nodes, W/unit².
+    """
+
+    mesh: TetMesh
+    charges: Charges
+    cells: BoolArray
+    at_nodes: FloatArray
+
+    @cached_property
+    def faces(self) -> tuple[IntArray, BoolArray]:
+        """Its outer faces (f, 3), oriented outward, and whether each is a facet of the body's boundary (f,)."""
+        mesh, inside = self.mesh, np.flatnonzero(self.cells)
+        if len(inside) == len(self.cells):
+            return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
+        neighbours = mesh.neighbours[inside]
+        # At the boundary the index -1 reads the last tetrahedron; the first condition overrides what it says.
+        places = np.flatnonzero((neighbours < 0) | ~self.cells[neighbours])
+        cells, faces = np.divmod(places, 4)
+        return mesh.tetrahedra[inside[cells, None], FACES[faces]], neighbours.reshape(-1)[places] < 0
+
+    __repr__ = one_line
+
+
+def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
+    """Whether the charges are a good guess of the fluence (n,) at each node, (n,)."""
+    good = np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes)
+    charges = patch.charges
+    negative = charges.positions[: charges.sources][charges.strengths[: charges.sources] < 0]
+    if len(negative):
+        # Around negative sources the fluence of the charges crosses zero, where a relative difference says nothing.
+        good |= cKDTree(negative).query(patch.mesh.points)[0] <= charges.medium.mean_free_path
+    return np.asarray(good)
+
+
+def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
+    """The patch of the tetrahedra whose four nodes are good (n,); an empty patch if its face integrals would fail."""
+    cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
+    if charges.region is not None:
+        cells &= mesh.regions == charges.region
+    patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
+    return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
+
+
+def _is_sound(patch: Patch) -> bool:
+    """Whether the integrals over the faces of a patch can be trusted, so that Gauss's theorem holds.
+
+    The sources must lie inside the patch, the images outside it, and neither too close to its faces. The ledger does
+    not reveal a violation, since it is made of the same integrals.
+    """
+    mesh, charges, cells = patch.mesh, patch.charges, patch.cells
+    places = charges.positions[: charges.sources]
+    foot, face, _ = mesh.closest_boundary(places)
+    cells_of = _point_cells(mesh, places, foot, face)
+    if (cells_of < 0).any() or not cells[cells_of].all():
+        return False
+    if (np.linalg.norm(foot - places, axis=1) < RESOLVED * _sizes(mesh, face)).any():
+        return False
+    images = charges.positions[charges.sources :]
+    foot, face, _ = mesh.closest_boundary(images)
+    close = np.linalg.norm(foot - images, axis=1) < RESOLVED * _sizes(mesh, face)
+    if (close & cells[mesh.boundary_cells[face]]).any() or _any_inside(patch, images):
+        return False
+    if cells.all():
+        return True
+    faces, on_boundary = patch.faces
+    inner = mesh.points[faces[~on_boundary]]
+    distances, _ = cKDTree(charges.positions).query(inner.mean(axis=1))
+    return bool((longest_sides(inner) <= COARSEST_INNER * distances).all())
+
+
+def _sizes(mesh: TetMesh, faces: IntArray) -> FloatArray:
+    """Longest sides of boundary triangles, (q,)."""
+    return longest_sides(mesh.points[mesh.boundary_faces[faces]])
+
+
+def _point_cells(mesh: TetMesh, places: FloatArray, foot: FloatArray, face: IntArray) -> IntArray:
+    """The tetrahedra that points (q, 3) lie in, (q,); -1 for points outside.
+
+    Found by marching from the nearest points `foot` (q, 3) of the boundary, in its triangles `face` (q,).
+    """
+    way, found = places - foot, np.full(len(places), -1)
+    lengths = np.linalg.norm(way, axis=1)
+    directions = way / np.where(lengths > 0, lengths, 1.0)[:, None]
+    for part in march(
+        mesh, foot, directions, lengths, np.where(lengths > 0, mesh.boundary_cells[face], -1), keep=False
+    ):
+        last = np.flatnonzero(part.leave == lengths[part.paths])
+        found[part.paths[last]] = part.cells[last]
+    return found
+
+
+def _any_inside(patch: Patch, places: FloatArray) -> bool:
+    """Whether any of the points (q, 3) lies in a patch.
+
+    A ray away from the charges rules out most points: those from which it does not leave the body through a facet.
+    """
+    mesh = patch.mesh
+    away = places - patch.charges.positions[0]
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    inside = np.zeros(len(places), dtype=bool)
+    # A ray misses a facet that it starts on: one ray starts at the point, another a little before it.
+    for begin in (0.0, -2.0 * OFFSET * mesh.diagonal):
+        _, met = mesh.rays.first(places + begin * away, away)
+        inside |= (met >= 0) & (np.einsum("ij,ij->i", mesh.surface.normals[met], away) > 0)
+    if not inside.any():
+        return False
+    found, _ = mesh.locate(places[inside])
+    return bool(patch.cells[found[found >= 0]].any())
+
+
+def inherit_good_nodes(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
+    """Good nodes of a refined mesh: old nodes `points` (n, 3) keep their value, a new one takes the nearest's."""
+    new = finer.points[len(points) :]
+    if good.all() or len(new) == 0:
+        return np.concatenate([good, np.ones(len(new), dtype=bool)])
+    return np.concatenate([good, good[cKDTree(points).query(new)[1]]])

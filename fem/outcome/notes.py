@@ -1,0 +1,142 @@
+"""What a user should know of a solution, as sentences with codes."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tetlux.fem.error.estimate import ROUNDING
+from tetlux.fem.known.split import Sources
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.validity.notes import warnings_for
+from tetlux.meshing.notes import Note
+
+# A fluence or exitance below zero by less than this share of the maximum is not reported.
+NEGLIGIBLE_DIP = 1e-6
+# Nor is power below zero, or moved, by less than this share of the incident power.
+NEGLIGIBLE_POWER = 1e-4
+# Change of the body's volume by curved triangles, as a share, from which on it is reported.
+LARGEST_BULGE = 0.015
+# Change of a source's depth by flat facets, as a share of the depth, from which on it is reported.
+SHALLOW = 0.1
+
+
+def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
+    """Notes on a solution.
+
+    Parameters
+    ----------
+    solution : Solution
+    sources : Sources
+        The lights that it is for.
+    tolerance : float
+    where : str
+        Where refinement stopped, for the sentence that the tolerance was not met.
+    """
+    notes = list(solution.surface.warnings)
+    if solution.validity is not None:
+        notes += warnings_for(solution.surface, solution.validity)
+    notes += [*sources.warnings, *solution.warnings]
+    notes += _on_tolerance(solution, tolerance, where)
+    notes += _on_bulge(solution)
+    notes += _on_power(solution)
+    notes += _on_fluence(solution, dips=sources.dips)
+    notes += _on_limited_power(solution)
+    notes += _on_shallow_sources(solution)
+    notes += _on_exitance(solution)
+    return list(dict.fromkeys(notes))
+
+
+def _on_tolerance(solution: Solution, tolerance: float, where: str) -> Iterator[Note]:
+    if not solution.error_estimate <= tolerance:
+        yield Note(
+            "tolerance-missed",
+            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g}, "
+            f"{where}.",
+            value=solution.error_estimate,
+        )
+
+
+def _on_bulge(solution: Solution) -> Iterator[Note]:
+    bulge = solution.surface.bulge
+    if abs(bulge) > LARGEST_BULGE:
+        yield Note(
+            "surface-bulges",
+            f"the body is taken as smooth, which changes its volume by about {bulge:+.1%}; give it more triangles, "
+            "or a crease_angle of 0 if they are meant to be flat.",
+            value=bulge,
+        )
+
+
+def _on_power(solution: Solution) -> Iterator[Note]:
+    power = solution.power
+    if min(power.absorbed, power.exited) < -NEGLIGIBLE_POWER * power.incident:
+        yield Note(
+            "power-negative",
+            "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
+            "tolerance, or give a finer mesh.",
+        )
+    if abs(power.exited) <= ROUNDING * power.incident:
+        yield Note(
+            "no-light-leaves",
+            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",
+        )
+
+
+def _on_fluence(solution: Solution, *, dips: bool) -> Iterator[Note]:
+    lowest, highest = float(solution.fluence.min()), float(solution.fluence.max())
+    if lowest < -NEGLIGIBLE_DIP * highest:
+        cause = (
+            "beside where a thin beam enters, as the diffusion equation itself has it; read it a mean free path away."
+            if dips
+            else "where tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
+        )
+        share = lowest / highest
+        yield Note(
+            "fluence-negative",
+            f"the fluence dips below zero, to {share:.1e} of its largest value, {cause}",
+            value=share,
+        )
+
+
+def _on_limited_power(solution: Solution) -> Iterator[Note]:
+    limited, incident = solution.limited_power, solution.power.incident
+    if limited > NEGLIGIBLE_POWER * incident:
+        yield Note(
+            "power-moved",
+            f"{limited / incident:.2%} of the power was moved between nodes to keep the fluence from "
+            "going below zero, where tetrahedra are too coarse or too flat for light that fades so fast; ask for a "
+            "smaller tolerance, or give a finer mesh.",
+            value=limited / incident,
+        )
+
+
+def _on_exitance(solution: Solution) -> Iterator[Note]:
+    brightest = float(np.max(solution.transmitted_irradiance))
+    if brightest > 0 and solution.exitance.min() < -NEGLIGIBLE_DIP * brightest:
+        shallowest = 1.0 / solution.validity.steepest if solution.validity else np.nan
+        yield Note(
+            "exitance-negative",
+            "the exitance is below zero in places: the layer in which diffuse light is absorbed, "
+            f"{shallowest:.2g} {solution.surface.unit} deep, is finer than the tetrahedra, or the "
+            "medium absorbs so much that light does not diffuse in it; do not rely on what leaves.",
+        )
+
+
+def _on_shallow_sources(solution: Solution) -> Iterator[Note]:
+    """At most one note: on the first patch with a source whose depth differs much between facets and surface."""
+    for patch in solution.patches:
+        sources = patch.charges.positions[: patch.charges.sources]
+        if len(sources) == 0:
+            continue
+        depths = np.linalg.norm(solution.surface.closest(sources)[0] - sources, axis=1)
+        below_facets = np.linalg.norm(solution.mesh.closest_boundary(sources)[0] - sources, axis=1)
+        off = np.abs(below_facets - depths)
+        worst = int(np.argmax(off / depths))
+        if off[worst] > SHALLOW * depths[worst]:
+            yield Note(
+                "source-depth-off",
+                f"a source {depths[worst]:.2g} {solution.mesh.unit} below the surface is {below_facets[worst]:.2g} "
+                "below the mesh's facets, and what leaves above it may be off by as much; give a finer mesh, or "
+                "put it deeper.",
+            )
+            return
