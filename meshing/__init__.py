@@ -9,8 +9,8 @@ from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.given import mesh_from_arrays
 from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.nesting import check_regions
 from tetlux.meshing.tets.refine import refine
-from tetlux.meshing.tets.regions import check_regions
 
 __all__ = [
     "InputError",

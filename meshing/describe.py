@@ -22,6 +22,11 @@ def size(points: FloatArray, unit: str) -> str:
     return f"{' x '.join(f'{length:.3g}' for length in lengths)} {unit}"
 
 
+def place_words(place: FloatArray, size: float) -> str:
+    """Coordinates as text, of a point of a body of that size; rounding errors about 0 are written as 0."""
+    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
+
+
 def one_line(self: Any) -> str:
     """A ``__repr__`` for dataclasses that hold arrays, of which it tells types and shapes; defaults are left out."""
     told = [f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if not _is_default(self, one)]

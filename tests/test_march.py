@@ -17,17 +17,17 @@ from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.deposit import Light, together
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.search.cell_tree import CellTree, Stretches
+from tetlux.meshing.search.cell_tree import CellTree, PathSegments
 from tetlux.meshing.tets import march as marching
 from tetlux.meshing.tets import path_cache as marched
 from tetlux.meshing.tets.march import march
-from tetlux.meshing.tets.path_cache import Marched
+from tetlux.meshing.tets.path_cache import TracedPaths
 
 
 class NoTree:
     """Stands for the tree where nothing should be left to it."""
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         raise AssertionError(f"{len(starts)} paths were left to the tree.")
 
 
@@ -38,7 +38,7 @@ class CountingTree:
         self.tree = tree
         self.count = 0
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         self.count += len(starts)
         return self.tree.cut(starts, directions, lengths)
 
@@ -273,7 +273,7 @@ def test_a_flat_tetrahedron_is_left_to_the_tree() -> None:
     flat = np.zeros((3, len(mesh.points)))
     lines = np.array([[0.1, 0.1, -0.1, 0.0, 0.0, -1.0, 1.0]]).T
     mesh.__dict__["points"] = flat.T
-    part = marching._marched(mesh, lines, np.array([0]), np.zeros(1))
+    part = marching._trace(mesh, lines, np.array([0]), np.zeros(1))
     assert part.lost.all()
     assert len(part.stretches.paths) == 0
 
@@ -287,13 +287,13 @@ def same_mesh(mesh: TetMesh) -> TetMesh:
 def marches(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many paths were marched at each time."""
     counts: list[int] = []
-    march_anew = marching._marched
+    march_anew = marching._trace
 
-    def counting(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:
+    def counting(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> TracedPaths:
         counts.append(len(cells))
         return march_anew(mesh, lines, cells, reached)
 
-    monkeypatch.setattr(marching, "_marched", counting)
+    monkeypatch.setattr(marching, "_trace", counting)
     return counts
 
 
@@ -352,12 +352,12 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     deposits = [from_facets(ball_mesh, 50, seed) for seed in (1, 2, 3)]
     mesh = same_mesh(ball_mesh)
     load_vector(mesh, coefficients_of(FORWARD), deposits[0])
-    held = sum(len(part.stretches.paths) for part in mesh.marched.parts)
+    held = sum(len(part.stretches.paths) for part in mesh.cache.paths.parts)
     # Room for two and a half.
     monkeypatch.setattr(marched, "MOST_KEPT", int(2.5 * held))
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert len(mesh.marched.parts) == 2
+    assert len(mesh.cache.paths.parts) == 2
     marches.clear()
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
@@ -371,7 +371,7 @@ def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], mon
     deposits = [from_facets(mesh, 20, seed) for seed in range(5)]
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert len(mesh.marched.parts) == 3
+    assert len(mesh.cache.paths.parts) == 3
     marches.clear()
     for deposit in deposits[::-1]:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
@@ -380,7 +380,7 @@ def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], mon
     system = System(mesh, TISSUE)
     for depth in (1.0, 2.0, 3.0):
         system.solve([PointSource((0.0, 0.0, 10.0 - depth))])
-    assert len(mesh.marched.parts) == 0
+    assert len(mesh.cache.paths.parts) == 0
 
 
 def chosen(deposit: Deposit, some: BoolArray) -> Deposit:
@@ -435,7 +435,7 @@ def test_beams_know_where_they_begin(
 
     def with_tree_alone(
         mesh: TetMesh, starts: FloatArray, directions: FloatArray, lengths: FloatArray, cells: IntArray
-    ) -> Iterator[Stretches]:
+    ) -> Iterator[PathSegments]:
         assert len(cells) == len(starts)
         return mesh.tree.cut(starts, directions, lengths)
 

@@ -7,7 +7,7 @@ from tests.test_assembly import random_mesh
 from tetlux.meshing import TetMesh, refine
 from tetlux.meshing.host import blocks
 from tetlux.meshing.host.blocks import grouped, in_blocks, once
-from tetlux.meshing.tets.mesh import EDGES
+from tetlux.meshing.tets.topology import EDGES
 
 
 @pytest.mark.parametrize("part", [7, 100, 1 << 20])

@@ -12,7 +12,7 @@ from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.search.cell_tree import Stretches
+from tetlux.meshing.search.cell_tree import PathSegments
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import triangle_areas
 from tetlux.meshing.tets.march import march
@@ -81,7 +81,7 @@ def entered(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
     return Rays(rays.starts, refracted, (1.0 - lost) * rays.powers, rays.cells)[passed], specular
 
 
-def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
+def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
     """Optical depth at which each stretch begins, on its own path, (s,)."""
     if np.ndim(extinction) == 0:
         return np.asarray(extinction * part.enter)
@@ -97,7 +97,7 @@ def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntAr
 
 
 def cells_of(
-    mesh: TetMesh, coefficients: Coefficients, part: Stretches, starts: FloatArray, directions: FloatArray
+    mesh: TetMesh, coefficients: Coefficients, part: PathSegments, starts: FloatArray, directions: FloatArray
 ) -> IntArray:
     """The tetrahedron whose coefficients each stretch has: the nearest one where the stretch is outside the mesh."""
     if coefficients.uniform:

@@ -19,7 +19,7 @@ from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.regions import check_regions
+from tetlux.meshing.tets.nesting import check_regions
 
 # Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
 NEAREST = 1e-3

@@ -35,7 +35,8 @@ from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.subdivide import quartered
 from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tets.march import march
-from tetlux.meshing.tets.mesh import FACES, TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import FACES
 
 # The line of sinks is cut into panels, each twice as long as what is below it, with this many Gauss points each,
 # as far as a share of exp(-REACH) of it.

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from tetlux.meshing.resolution import DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.regions import nesting
+from tetlux.meshing.tets.nesting import nesting
 
 # Default deviation of an inner surface: this share of its own diagonal, or of its region's mean thickness as above.
 # Seconds of the mesher and what the inner ball's volume lacks, until refinement puts more nodes onto it, at .02, .03

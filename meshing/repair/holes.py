@@ -5,12 +5,13 @@ from typing import Literal
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import place_words
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.caps import cap
 from tetlux.meshing.repair.rims import join_nested_rims
 from tetlux.meshing.repair.topology import Edges, boundary_loops
-from tetlux.meshing.surface.surface import place_words, triangle_areas
+from tetlux.meshing.surface.surface import triangle_areas
 
 Holes = Literal["small", "close", "refuse"]
 # A hole wider than this share of the diagonal is a missing part, and closing it would invent a shape.

@@ -3,9 +3,10 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.describe import place_words
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import body_sizes, place_words
+from tetlux.meshing.surface.surface import body_sizes
 
 # A body of a mean thickness 2 V/A below this many of the mesher's deviations is dropped. Balls and cubes beside a ball
 # of 20 were meshed down to .2 (seconds: 2 above 1; 3 at .45; 6 to 12 at .2, where the mesher needs its second attempt).

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.corners import cross, dot, over_corners
+from tetlux.meshing.host.corners import dot, face_normals, over_corners
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9
@@ -20,7 +20,7 @@ PORTION = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
+class PathSegments:
     """Paths cut where they pass from tetrahedron to tetrahedron.
 
     The stretches of a path cover it without overlap: where it runs along a face or an edge, the tetrahedron that it
@@ -85,7 +85,7 @@ class CellTree:
             low = np.minimum.reduce([low[:, :, part] for part in range(CHILDREN)])
             high = np.maximum.reduce([high[:, :, part] for part in range(CHILDREN)])
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         """Cut paths where they pass from tetrahedron to tetrahedron.
 
         Parameters
@@ -95,7 +95,7 @@ class CellTree:
 
         Yields
         ------
-        Stretches
+        PathSegments
             Of some paths, all that each has.
         """
         for some, near, cells in self._near(starts, directions, lengths):
@@ -119,7 +119,7 @@ class CellTree:
             # At the start, far from a small tetrahedron, they were huge, and their sum lost digits.
             weights[0] = 1.0 - weights[1:].sum(axis=0)
             none = np.zeros((len(outside), 4))
-            yield Stretches(
+            yield PathSegments(
                 np.concatenate([paths[inside], paths[outside]]),
                 np.concatenate([cells[chosen], np.full(len(outside), -1)]),
                 np.concatenate([begin, covered[outside]]),
@@ -195,7 +195,7 @@ class CellTree:
         """
         corners = self._coordinates[:, self._tetrahedra[cells].T]
         u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
-        gradients = np.stack([cross(v, w), cross(w, u), cross(u, v)], axis=1)
+        gradients = np.stack(face_normals(u, v, w), axis=1)
         gradients /= dot(u, gradients[:, 0])
         base, slopes = np.empty((2, 4, len(cells)))
         base[1:] = dot((starts.T - corners[:, 0])[:, None], gradients)

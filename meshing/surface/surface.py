@@ -26,11 +26,6 @@ def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
     return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
 
 
-def place_words(place: FloatArray, size: float) -> str:
-    """Coordinates to be read, of a place in a body of that size: what rounding left of 0 is 0."""
-    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
-
-
 def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
     """Volume and area of each body, (b,), whichever way it faces; `body` (m,) numbers the triangles' bodies from 0."""
     corners = points[faces]

@@ -8,7 +8,8 @@ from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import grouped
 from tetlux.meshing.notes import Note
-from tetlux.meshing.tets.mesh import FACES, TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import FACES, face_keys
 
 # How far outside the middle of a facet another tetrahedron is looked for, as a share of the facet's size; and of the
 # mesh's diagonal, since files round coordinates.
@@ -30,11 +31,8 @@ def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
         How many there are.
     """
     faces = corners[:, FACES].reshape(-1, 3)
-    low, high = faces.min(axis=1), faces.max(axis=1)
-    middle = faces.sum(axis=1) - low - high
-    pairs = grouped((low * nodes + middle).astype(np.uint64))[1].astype(np.uint64)
-    _, face = grouped(pairs * np.uint64(nodes) + high.astype(np.uint64))
-    # A face is seen the same way round from one side: the order of its corners is an even or an odd permutation.
+    _, face = grouped(face_keys(corners, nodes))
+    # Tetrahedra on one side of a face list its corners in the same orientation: an even or an odd permutation.
     first, second = faces[:, 0], faces[:, 1]
     even = ((first < second) & ((second < faces[:, 2]) | (faces[:, 2] < first))) | (
         (first > second) & (second < faces[:, 2]) & (faces[:, 2] < first)
@@ -77,7 +75,7 @@ def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
 
 def conformity_of(mesh: TetMesh) -> tuple[str, ...]:
     """`check_conformity`, once for each mesh."""
-    return mesh.remembered(check_conformity, lambda: check_conformity(mesh))
+    return mesh.cache.get(check_conformity, lambda: check_conformity(mesh))
 
 
 def check_facets(mesh: TetMesh, joined: bool = False) -> tuple[str, ...]:

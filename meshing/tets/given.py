@@ -13,7 +13,9 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.topology import distinct_rows
 from tetlux.meshing.tets.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
-from tetlux.meshing.tets.mesh import EDGES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import EDGES
 
 # The largest coordinate, in whatever unit.
 LONGEST = 1e30
@@ -141,7 +143,7 @@ def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
     if found:
         mesh = replace(mesh, warnings=(*given.warnings, *found))
     # So that it is not checked again when it is solved on.
-    mesh.remembered(check_conformity, lambda: found)
+    mesh.cache.get(check_conformity, lambda: found)
     return mesh, mended.nodes
 
 

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.host.corners import cross, dot
-from tetlux.meshing.search.cell_tree import SLACK, Stretches
+from tetlux.meshing.host.corners import dot, face_normals
+from tetlux.meshing.search.cell_tree import SLACK, PathSegments
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.path_cache import Marched, keys_of
+from tetlux.meshing.tets.path_cache import TracedPaths, keys_of
 
 # How far outside a tetrahedron, in barycentric coordinates, a stretch in it may begin. Where a path passes an edge
 # within `SLACK`, the next tetrahedron has it some times as far outside.
@@ -35,7 +35,7 @@ def march(
     cells: IntArray | None = None,
     *,
     keep: bool = True,
-) -> Iterator[Stretches]:
+) -> Iterator[PathSegments]:
     """Cut paths where they pass from tetrahedron to tetrahedron, each from where it begins.
 
     In a tetrahedron the path goes on until a coordinate is less than -`SLACK`, as in `CellTree.cut`, and then passes
@@ -54,7 +54,7 @@ def march(
 
     Yields
     ------
-    Stretches
+    PathSegments
         Of some paths, all that each has.
     """
     left = [np.arange(len(starts))]
@@ -70,10 +70,10 @@ def march(
             yield replace(stretches, paths=others[stretches.paths])
 
 
-def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, Marched]]:
+def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, TracedPaths]]:
     """Lines (7, p), their starts, directions and lengths, marched if they are not known: some of them at a time."""
     keys, unknown = keys_of(lines), np.arange(len(cells))
-    for part in list(mesh.marched.parts):
+    for part in list(mesh.cache.paths.parts):
         places = part.find(keys[unknown], lines[:, unknown], cells[unknown])
         found = places >= 0
         if not found.any():
@@ -84,22 +84,22 @@ def _kept(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[I
         whole = part
         if short.any():
             further = places[short]
-            whole = part.on(_marched(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further]), further)
-            mesh.marched.add(whole, instead=part)
+            whole = part.on(_trace(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further]), further)
+            mesh.cache.paths.add(whole, instead=part)
         yield some, whole.some(places).up_to(wanted)
     for some, part in _anew(mesh, lines[:, unknown], cells[unknown]):
-        mesh.marched.add(part)
+        mesh.cache.paths.add(part)
         yield unknown[some], part
 
 
-def _anew(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, Marched]]:
+def _anew(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, TracedPaths]]:
     """Lines (7, p) marched, some of them at a time."""
     for start in range(0, len(cells), PORTION):
         some = np.arange(start, min(start + PORTION, len(cells)))
-        yield some, _marched(mesh, lines[:, some], cells[some], np.zeros(len(some)))
+        yield some, _trace(mesh, lines[:, some], cells[some], np.zeros(len(some)))
 
 
-def _marched(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:
+def _trace(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> TracedPaths:
     """March lines (7, p) from where they are, by how far that is along them and the tetrahedron there, (p,) each."""
     coordinates, whole, ends = np.ascontiguousarray(mesh.points.T), lines, cells.copy()
     lost = np.zeros(len(cells), dtype=bool)
@@ -130,8 +130,8 @@ def _marched(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatAr
     lost[paths] = True
     every = [np.concatenate(column, axis=-1) for column in zip(*parts, strict=True)]
     owners, passed, enter, leave, weights, changes = _some(~lost[every[0]], *every)
-    stretches = Stretches(owners, passed, enter, leave, weights.T, changes.T)
-    return Marched(whole, begin, ends, lost, stretches)
+    stretches = PathSegments(owners, passed, enter, leave, weights.T, changes.T)
+    return TracedPaths(whole, begin, ends, lost, stretches)
 
 
 def _some(chosen: BoolArray, *arrays: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
@@ -169,10 +169,9 @@ def _coordinates(
     offsets = lines[:3] + reached * directions - origin
     base, slopes = np.empty((2, 4, len(reached)))
     with np.errstate(all="ignore"):
-        for corner, (a, b) in enumerate(((v, w), (w, u), (u, v)), 1):
-            normal = cross(a, b)
-            if corner == 1:
-                inverse = 1.0 / dot(u, normal)
+        normals = face_normals(u, v, w)
+        inverse = 1.0 / dot(u, normals[0])
+        for corner, normal in enumerate(normals, 1):
             base[corner] = dot(offsets, normal) * inverse
             slopes[corner] = dot(directions, normal) * inverse
         base[0] = 1.0 - (base[1] + base[2] + base[3])

@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.search.cell_tree import Stretches
+from tetlux.meshing.search.cell_tree import PathSegments
 
 # Stretches that are kept of one mesh: two hundred megabytes.
 MOST_KEPT = 1 << 21
@@ -19,7 +19,7 @@ MOST_PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Marched:
+class TracedPaths:
     """Paths that were marched.
 
     Parameters
@@ -30,7 +30,7 @@ class Marched:
         The tetrahedra in which they begin and end.
     lost : (p,) ndarray of bool
         Those that could not be marched.
-    stretches : Stretches
+    stretches : PathSegments
         Of the others.
     """
 
@@ -38,7 +38,7 @@ class Marched:
     cells: IntArray
     ends: IntArray
     lost: BoolArray
-    stretches: Stretches
+    stretches: PathSegments
 
     @cached_property
     def _by_key(self) -> tuple[FloatArray, IntArray]:
@@ -67,7 +67,7 @@ class Marched:
         found[alike[first]] = places[first]
         return found
 
-    def some(self, places: IntArray) -> "Marched":
+    def some(self, places: IntArray) -> "TracedPaths":
         """Some of the paths, in a given order."""
         if np.array_equal(places, np.arange(len(self.cells))):
             return self
@@ -75,9 +75,9 @@ class Marched:
         number[places] = np.arange(len(places))
         numbers = number[self.stretches.paths]
         stretches = some_of(replace(self.stretches, paths=numbers), numbers >= 0)
-        return Marched(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], stretches)
+        return TracedPaths(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], stretches)
 
-    def up_to(self, lengths: FloatArray) -> "Marched":
+    def up_to(self, lengths: FloatArray) -> "TracedPaths":
         """The same no further than some lengths (p,); where they end is not known any more."""
         if (self.lines[6] <= lengths).all():
             return self
@@ -85,12 +85,12 @@ class Marched:
         most = lengths[every.paths]
         return replace(self, stretches=some_of(replace(every, leave=np.minimum(every.leave, most)), every.enter < most))
 
-    def on(self, more: "Marched", further: IntArray) -> "Marched":
+    def on(self, more: "TracedPaths", further: IntArray) -> "TracedPaths":
         """Together with what some of its paths were marched from where they ended."""
         lines, ends, lost = self.lines.copy(), self.ends.copy(), self.lost.copy()
         lines[6, further], ends[further], lost[further] = more.lines[6], more.ends, more.lost
         one, other = self.stretches, more.stretches
-        stretches = Stretches(
+        stretches = PathSegments(
             np.concatenate([one.paths, further[other.paths]]),
             np.concatenate([one.cells, other.cells]),
             np.concatenate([one.enter, other.enter]),
@@ -98,17 +98,17 @@ class Marched:
             np.concatenate([one.weights, other.weights]),
             np.concatenate([one.slopes, other.slopes]),
         )
-        return Marched(lines, self.cells, ends, lost, some_of(stretches, ~lost[stretches.paths]))
+        return TracedPaths(lines, self.cells, ends, lost, some_of(stretches, ~lost[stretches.paths]))
 
     __repr__ = one_line
 
 
-def some_of(every: Stretches, chosen: BoolArray) -> Stretches:
+def some_of(every: PathSegments, chosen: BoolArray) -> PathSegments:
     """The chosen stretches."""
     if chosen.all():
         return every
     places = np.flatnonzero(chosen)
-    return Stretches(
+    return PathSegments(
         every.paths[places],
         every.cells[places],
         every.enter[places],
@@ -129,12 +129,12 @@ def keys_of(lines: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class PathCache:
     """What was marched through one mesh."""
 
-    parts: list[Marched] = field(default_factory=list)
+    parts: list[TracedPaths] = field(default_factory=list)
 
-    def add(self, part: Marched, instead: Marched | None = None) -> None:
+    def add(self, part: TracedPaths, instead: TracedPaths | None = None) -> None:
         """Keep paths, in the place of a part that they continue if there is one, unless they are too many."""
         others = [each for each in self.parts if each is not instead]
         if sum(len(each.stretches.paths) for each in [*others, part]) <= MOST_KEPT:

@@ -8,8 +8,10 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.mesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import nodes_of
+from tetlux.meshing.tets.topology import EDGES, EDGES_OF_FACES
 
 # When boundary nodes move, no tetrahedron may keep less than this share of its volume or of its quality; and
 # below this quality, no tetrahedron may get worse. Otherwise the move is shortened.
