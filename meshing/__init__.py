@@ -1,4 +1,4 @@
-"""Shapes and lengths: surfaces, tetrahedra, and nothing about light."""
+"""Geometry: surfaces, tetrahedral meshes and their files, independent of light."""
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
 from tetlux.meshing.files.meshes import read_mesh

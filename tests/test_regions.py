@@ -328,7 +328,7 @@ def test_the_mesher_runs_once_for_the_same_regions(tmp_path: Path, monkeypatch: 
         runs.append(given[-1])  # type: ignore[arg-type]
         return cubes()
 
-    monkeypatch.setattr(mesher, "_made", make)
+    monkeypatch.setattr(mesher, "_mesh_body", make)
     first = tetrahedralize(OUTER, [INNER], cache=tmp_path)
     second = tetrahedralize(OUTER, [INNER], cache=tmp_path)
     # Nor is what would have been refused taken for the same.

@@ -82,7 +82,7 @@ def entered(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
 
 
 def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
-    """Optical depth at which each stretch begins, on its own path, (s,)."""
+    """Optical depth at which each segment begins, on its own path, (s,)."""
     if np.ndim(extinction) == 0:
         return np.asarray(extinction * part.enter)
     depth = at_cells(extinction, cells) * (part.leave - part.enter)
@@ -99,7 +99,7 @@ def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: In
 def cells_of(
     mesh: TetMesh, coefficients: Coefficients, part: PathSegments, starts: FloatArray, directions: FloatArray
 ) -> IntArray:
-    """The tetrahedron whose coefficients each stretch has: the nearest one where the stretch is outside the mesh."""
+    """The tetrahedron whose coefficients each segment has: the nearest one where the segment is outside the mesh."""
     if coefficients.uniform:
         return part.cells
     cells = part.cells.copy()

@@ -1,4 +1,4 @@
-"""Arithmetic on the corners of many tetrahedra, in blocks and coordinate by coordinate."""
+"""Vector arithmetic on the corners of many tetrahedra, in blocks, by coordinate."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray
     Parameters
     ----------
     work : callable
-        Gets a slice of ``range(m)`` and the corners there: (4, 3, b), corner, coordinate, tetrahedron.
+        Takes a slice of ``range(m)`` and its corners, (4, 3, b): corner, coordinate, tetrahedron.
     points : (n, 3) ndarray
     tetrahedra : (m, 4) ndarray
     """
