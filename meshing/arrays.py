@@ -14,3 +14,8 @@ Vector = tuple[float, float, float]
 def summed(places: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
     """Sums (count,) of values by place; `places` and `values` have the same shape."""
     return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)
+
+
+def spread_indices(count: int, most: int) -> IntArray:
+    """Evenly spaced indices below `count`, at most `most` of them."""
+    return np.arange(min(count, most)) * count // max(min(count, most), 1)

@@ -58,7 +58,7 @@ class Rays:
     __repr__ = one_line
 
 
-def joined(parts: list[Rays]) -> Rays:
+def join_rays(parts: list[Rays]) -> Rays:
     """All rays of several parts."""
     return Rays(
         np.vstack([np.zeros((0, 3)), *(part.starts for part in parts)]),
@@ -174,7 +174,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         faint = rays.powers <= FAINTEST_AGAIN * average * share
         stopped.append(rays[faint])
         rays = rays[~faint]
-    every, left = joined(segments), joined([*stopped, rays])
+    every, left = join_rays(segments), join_rays([*stopped, rays])
     # What is stopped at a facet is in the tetrahedron behind it.
     scattered = at_cells(coefficients.scattering / coefficients.extinction, left.cells) * left.powers
     absorbed += float((left.powers - scattered).sum())
@@ -234,7 +234,7 @@ def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArr
     places = outer.starts + np.where(again, distances, 0.0)[:, None] * outer.directions
     met_again = Rays(places, outer.directions, outer.powers, mesh.boundary_cells[hit])[again]
     coming, specular = entered(met_again, normals[again], eta)
-    return joined([inner, coming]), float(outer.powers[~again].sum()), specular
+    return join_rays([inner, coming]), float(outer.powers[~again].sum()), specular
 
 
 def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Rays]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, spread_indices
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -37,12 +37,5 @@ def _farthest(source: Surface, target: Surface, samples: int) -> float:
 def _sample_points(surface: Surface, count: int) -> FloatArray:
     corners = surface.points[surface.faces]
     between = np.vstack([corners.mean(axis=1), *(0.5 * (corners[:, i] + corners[:, i - 1]) for i in range(3))])
-    vertices = _evenly(surface.points, count)
-    return np.vstack([vertices, _evenly(between, count - len(vertices))])
-
-
-def _evenly(points: FloatArray, count: int) -> FloatArray:
-    """`count` points, evenly spaced by index, or all if there are fewer."""
-    if len(points) <= count:
-        return points
-    return points[np.arange(count) * len(points) // max(count, 1)]
+    vertices = surface.points[spread_indices(len(surface.points), count)]
+    return np.vstack([vertices, between[spread_indices(len(between), count - len(vertices))]])

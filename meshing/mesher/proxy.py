@@ -97,7 +97,7 @@ def _decimate(surface: Surface, deviation: float) -> Surface:
     origin, size = surface.points.mean(axis=0), surface.diagonal
     fine: tuple[FloatArray, IntArray] = (surface.points - origin) / size, surface.faces
     # Do most of the decimation once instead of once per attempt.
-    base = _decimated(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
+    base = _decimate_to(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
     best = surface
     for _ in range(TRIES):
         count = int(max(wanted, FEWEST))
@@ -130,7 +130,7 @@ def _sound(
         target = int(count * (1.0 + 0.04 * attempt))
         if target >= len(base[1]):
             return None
-        p, f = _decimated(*base, target)
+        p, f = _decimate_to(*base, target)
         if len(f) < 4 or not _is_manifold(f):
             continue
         body = bodies(len(p), f)
@@ -142,7 +142,7 @@ def _sound(
     return None
 
 
-def _decimated(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
+def _decimate_to(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
     from fast_simplification import simplify  # noqa: PLC0415
 
     points, faces = simplify(points, faces.astype(np.int32), target_count=count, agg=HASTE)

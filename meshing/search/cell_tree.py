@@ -110,7 +110,7 @@ class CellTree:
             paths = np.concatenate([near[hit], np.arange(some.start, some.stop)])
             enter = np.concatenate([enter[hit], lengths[some]])
             leave = np.concatenate([leave[hit], lengths[some]])
-            order, covered = _covered(paths, enter, leave)
+            order, covered = _cover_paths(paths, enter, leave)
             paths, enter, leave = paths[order], enter[order], leave[order]
             inside, outside = np.flatnonzero(leave > np.maximum(enter, covered)), np.flatnonzero(enter > covered)
             chosen = hit[order[inside]]
@@ -204,7 +204,7 @@ class CellTree:
         return base, slopes
 
 
-def _covered(paths: IntArray, enter: FloatArray, leave: FloatArray) -> tuple[IntArray, FloatArray]:
+def _cover_paths(paths: IntArray, enter: FloatArray, leave: FloatArray) -> tuple[IntArray, FloatArray]:
     """The order of intervals by path and entry, and how far the earlier intervals of the path reach."""
     order = np.lexsort((enter, paths))
     # NumPy orders complex numbers by their real part first, so the running maximum restarts with each path.

@@ -1,4 +1,4 @@
-"""Results that are computed once per mesh and asked for again."""
+"""Cache results that are computed once per mesh."""
 
 from collections.abc import Callable, Hashable
 from contextlib import suppress

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, spread_indices
 from tetlux.meshing.describe import place_words
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
@@ -166,13 +166,13 @@ def _crossing(first: Surface, second: Surface, near: float) -> FloatArray | None
     for i, j in overlapping_boxes(corners.min(axis=1), corners.max(axis=1)):
         mixed = (i < count) != (j < count)
         for face, other in ((i[mixed], j[mixed]), (j[mixed], i[mixed])):
-            place = _pierced(corners[face], corners[other], near)
+            place = _find_pierced(corners[face], corners[other], near)
             if place is not None:
                 return place
     return None
 
 
-def _pierced(triangles: FloatArray, others: FloatArray, near: float) -> FloatArray | None:
+def _find_pierced(triangles: FloatArray, others: FloatArray, near: float) -> FloatArray | None:
     """A point where an edge of a triangle of `others` (p, 3, 3) passes through its partner in `triangles`, if any.
 
     Touching does not count: both ends must be off the triangle's plane, and the point off its rim, by `near`.
@@ -217,9 +217,9 @@ def _inside(first: Surface, second: Surface, near: float) -> _Sides:
     order = free[np.argsort(part[free], kind="stable")]
     starts = np.flatnonzero(np.diff(part[order], prepend=-1))
     each = max(1, SAMPLES // max(len(starts), 1))
-    chosen = np.concatenate([those[evenly_spaced(len(those), each)] for those in np.split(order, starts[1:])])
+    chosen = np.concatenate([those[spread_indices(len(those), each)] for those in np.split(order, starts[1:])])
     middles = first.points[first.faces[on[first.faces].any(axis=1)]].mean(axis=1)
-    middles = middles[evenly_spaced(len(middles), SAMPLES)]
+    middles = middles[spread_indices(len(middles), SAMPLES)]
     places = np.concatenate([first.points[chosen], middles[~lies_on(middles, second, near)]])
     return _Sides(places, second.contains(places), bool(on.any()))
 
@@ -230,8 +230,3 @@ def lies_on(points: FloatArray, surface: Surface, near: float) -> BoolArray:
     on = np.asarray(((points >= low - near) & (points <= high + near)).all(axis=1))
     on[on] = surface.near(points[on], near)
     return on
-
-
-def evenly_spaced(count: int, most: int) -> IntArray:
-    """Evenly spaced indices below `count`, at most `most` of them."""
-    return np.arange(min(count, most)) * count // max(min(count, most), 1)

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, spread_indices
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
-from tetlux.meshing.tets.nesting import evenly_spaced, lies_on
+from tetlux.meshing.tets.nesting import lies_on
 from tetlux.meshing.tets.regions import by_volume
 from tetlux.meshing.tets.topology import find_shared_faces
 
@@ -44,13 +44,13 @@ def tag_tetrahedra(
     shared = find_shared_faces(tetrahedra, len(points))
     centroids, volumes = points[tetrahedra].mean(axis=1), tetrahedron_volumes(points, tetrahedra)
 
-    def contained(by: Surface) -> BoolArray:
+    def is_inside(by: Surface) -> BoolArray:
         return _is_inside(points, centroids, volumes, shared, by, ROUNDING * envelope)
 
-    inside = contained(surface)
+    inside = is_inside(surface)
     result = np.where(inside, 0, -1)
     for i in by_volume(regions):
-        result[inside & contained(regions[i - 1])] = i
+        result[inside & is_inside(regions[i - 1])] = i
     return result
 
 
@@ -70,7 +70,7 @@ def _is_inside(
     compartment = connected_components(links, directed=False)[1]
     order = np.argsort(compartment, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(compartment[order])) + 1)
-    samples = np.concatenate([part[evenly_spaced(len(part), SAMPLES)] for part in parts])
+    samples = np.concatenate([part[spread_indices(len(part), SAMPLES)] for part in parts])
     answers, of_answers = surface.contains(centroids[samples]), compartment[samples]
     share = np.bincount(of_answers, answers) / np.bincount(of_answers)
     result = np.asarray((share > 0.5)[compartment])

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import IndexArray, IntArray
-from tetlux.meshing.host.blocks import grouped, in_blocks, once
+from tetlux.meshing.host.blocks import group_keys, in_blocks, once
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -41,7 +41,7 @@ def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray
             keys[edge, block] = low * nodes + high
 
     in_blocks(fill, len(tetrahedra))
-    unique, inverse = grouped(keys.reshape(-1))
+    unique, inverse = group_keys(keys.reshape(-1))
     return np.stack(np.divmod(unique.view(np.int64), nodes), axis=1), inverse.reshape(6, -1).T
 
 
@@ -65,13 +65,13 @@ def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
 
     in_blocks(fill, len(keys))
     if not short:
-        keys += (grouped(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
+        keys += (group_keys(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
     return keys.reshape(-1)
 
 
 def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
     """The tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
-    unique, face = grouped(face_keys(tetrahedra, nodes))
+    unique, face = group_keys(face_keys(tetrahedra, nodes))
     owners = np.repeat(np.arange(len(tetrahedra)), 4)
     both = np.bincount(face, minlength=len(unique)) == 2
     # The sum of both owners of a face minus this tetrahedron is the neighbour.
@@ -81,7 +81,7 @@ def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
 
 def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """The two tetrahedra at each inner face (p, 2), and the corners of that face (p, 3)."""
-    face = grouped(face_keys(tetrahedra, nodes))[1]
+    face = group_keys(face_keys(tetrahedra, nodes))[1]
     order = np.argsort(face, kind="stable")
     pair = np.flatnonzero(np.diff(face[order]) == 0)
     first = order[pair]
