@@ -44,9 +44,9 @@ def close_holes(
     name, unit : str
         Used in messages.
     holes : "small", "close" or "refuse"
-        Which holes are capped: those that leave no choice (narrow ones, slits, those of three edges), all, or none.
+        Which holes are capped: small ones (narrow ones, slits, those of three edges), all, or none.
     repairs, warnings : list of str
-        Sentences are added to them.
+        Sentences are appended.
 
     Returns
     -------

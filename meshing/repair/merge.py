@@ -53,8 +53,8 @@ def _same_places(points: FloatArray, tolerance: float) -> tuple[IntArray, IntArr
 def single_faces(points: FloatArray, faces: IntArray, repairs: list[str]) -> IntArray:
     """Keep one copy of each triangle, and remove walls inside the body.
 
-    A triangle that is given as often one way round as the other is a side of a two-sided export, or a wall between
-    two bodies that touch. The patches that such triangles form are kept where the surface is open without them.
+    A triangle that is given equally often in both orientations is part of a two-sided export, or of a wall between two
+    touching bodies. Patches of such triangles are kept if the surface is open without them.
     """
     if len(faces) == 0:
         return faces

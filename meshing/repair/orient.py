@@ -19,7 +19,7 @@ def wind_consistently(faces: IntArray, name: str, repairs: list[str]) -> IntArra
     Raises
     ------
     InputError
-        If there is no such way, as on a Klein bottle.
+        If the surface is not orientable, like a Klein bottle.
     """
     edges = Edges(faces)
     if edges.consistent:
@@ -40,7 +40,7 @@ def face_outward(
     -------
     faces : (m, 3) ndarray
     nested : bool
-        Whether a body lies within another.
+        Whether a body lies inside another.
 
     Raises
     ------
@@ -95,8 +95,8 @@ def _inner_bodies(points: FloatArray, parts: list[IntArray], inward: BoolArray, 
 def _to_flip(edges: Edges, count: int) -> BoolArray | None:
     """Triangles to flip, (m,), for a consistent orientation; None if there is none.
 
-    Each triangle stands in a graph twice, as it is and turned over, and is joined to its neighbours as they would go
-    with it. Where both are in one part there is a way round from one side of the surface to the other.
+    A graph has two nodes per triangle, one for each orientation, and links consistent orientations of neighbours. If
+    both nodes of a triangle are connected, the surface is not orientable.
     """
     between_two = np.flatnonzero(edges.triangles[edges.edge] == 2)
     pairs = between_two[np.argsort(edges.edge[between_two], kind="stable")].reshape(-1, 2)

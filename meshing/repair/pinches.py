@@ -1,8 +1,8 @@
 """Separate a surface at edges of more than two triangles and at vertices where fans of triangles touch.
 
-Where parts of a body touch along an edge or at a vertex, triangles meet that bound different parts. No light passes
-through an edge or a vertex, and quadric decimation cannot deal with either. Where each part has vertices of its own,
-the surface is manifold and still bounds the same body.
+Where parts of a body touch along an edge or at a vertex, triangles of different parts meet. No light passes through an
+edge or a vertex, and quadric decimation requires a manifold surface. With separate vertices for each part, the
+surface is manifold and bounds the same body.
 """
 
 import numpy as np
@@ -26,8 +26,8 @@ NOTHING = 1e-12
 def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray] | None:
     """Give each part of a body separate vertices where parts touch along edges or at vertices.
 
-    Edges of more than two triangles are split in the middle first: where both ends belong to one part only, the
-    edge itself is what has to come apart.
+    Edges of more than two triangles are first split at their midpoints, so that they can be separated where both ends
+    belong to one part.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArra
     Returns
     -------
     points : (k, 3) ndarray
-        The given places, repeated where parts touch, and the middles of split edges.
+        The given points, repeated where parts touch, and the midpoints of split edges.
     faces : (l, 3) ndarray
         Two triangles at each edge, one fan at each vertex.
         None instead of both if the surface is not consistently oriented.
@@ -83,7 +83,7 @@ def mend_parts(points: FloatArray, faces: IntArray, bodies: IntArray, repairs: l
     bodies : (m,) ndarray
         The body of each triangle, where shared vertices connect.
     repairs : list of str
-        What was done is added here.
+        Sentences on the repairs are appended.
 
     Returns
     -------
@@ -177,9 +177,9 @@ def _angles(points: FloatArray, faces: IntArray, ends: IntArray, sides: IntArray
 def _match(up: list[bool], gap: list[float], sides: list[int]) -> IntArray:
     """Pairs (k, 2) of the sides at one edge.
 
-    Going round, the body begins behind a triangle whose side runs down the edge, and ends at one whose side runs up:
-    they match as brackets do. Where one part is inside out, or within another, brackets are within brackets.
-    Triangles back to back are a wall between two parts: they match first, and what is left bounds both as one.
+    In order of angle, the body begins behind a triangle whose side runs down the edge and ends at one whose side runs
+    up. They match like brackets, which are nested where one part is inside out or inside another. Triangles back to
+    back are a wall between two parts: they match first, and the remaining triangles bound both parts as one.
 
     Parameters
     ----------

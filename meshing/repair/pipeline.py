@@ -47,13 +47,13 @@ def surface_from_arrays(
     name : str
         Used in messages.
     holes : "small", "close" or "refuse"
-        Which holes are capped: those that leave no choice (up to 5 % of the diagonal wide, slits, those of three
-        edges), all, or none.
+        Which holes are capped: small ones (up to 5 % of the diagonal wide, slits, those of three edges), all, or
+        none.
 
     Returns
     -------
     Surface
-        Closed and outward oriented; `repairs` and `warnings` tell what was found.
+        Closed and outward oriented; `repairs` and `warnings` list what was found.
 
     Raises
     ------

@@ -22,14 +22,14 @@ def join_nested_rims(
     points : (n, 3) ndarray
     faces : (m, 3) ndarray
     loops : sequence of ndarray
-        The rims, as the triangles along them walk them: the inner rim of a wall is walked the other way round.
+        The rims, in the direction of the triangles along them; the inner rim of a wall has the opposite direction.
 
     Returns
     -------
     loops : list of ndarray
-        In the order of the outer rims. A joined one runs along a bridge to the inner rim, round that, and back.
+        In the order of the outer rims. A joined loop runs along a bridge to the inner rim, around it, and back.
     overlapping : list of ndarray
-        Rims within others that are walked the same way round, so that their caps overlap.
+        Rims inside others in the same direction, so that their caps overlap.
     """
     if len(loops) < 2:
         return list(loops), []

@@ -27,12 +27,12 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     points : (n, 3) ndarray
     faces : (m, 3) ndarray
     repairs : list of str
-        A sentence is added to it.
+        A sentence is appended.
 
     Returns
     -------
     points, faces : ndarray
-        The same surface, of which no point has moved farther than ``ON_EDGE`` of the diagonal.
+        The same surface; no point has moved by more than ``ON_EDGE`` of the diagonal.
     """
     before = Edges(faces)
     if before.closed:
