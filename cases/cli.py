@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _be_interrupted_by_signals()
         return _main(arguments)
     except KeyboardInterrupt:
-        return _told("interrupted; finished cases are kept.", 130)
+        return _report("interrupted; finished cases are kept.", 130)
 
 
 def _main(arguments: Sequence[str] | None) -> int:
@@ -36,7 +36,7 @@ def _main(arguments: Sequence[str] | None) -> int:
             sys.stdout.flush()
     except OSError as error:
         # Most likely of what is printed to; but whoever reads it may have had enough of it.
-        return 1 if isinstance(error, BrokenPipeError) else _told(f"stopped: {error}; finished cases are kept.", 1)
+        return 1 if isinstance(error, BrokenPipeError) else _report(f"stopped: {error}; finished cases are kept.", 1)
     except Exception as error:
         return _failed(error)
     return code
@@ -47,13 +47,13 @@ def _failed(error: Exception) -> int:
     from tetlux.meshing.errors import TetluxError, memory_ran_out  # noqa: PLC0415
 
     if isinstance(error, TetluxError):
-        return _told(str(error), 2)
+        return _report(str(error), 2)
     if isinstance(error, MemoryError | RuntimeError) and memory_ran_out(error):
-        return _told("memory ran out; finished cases are kept.", 1)
+        return _report("memory ran out; finished cases are kept.", 1)
     raise error
 
 
-def _told(sentence: str, code: int) -> int:
+def _report(sentence: str, code: int) -> int:
     """An exit code, with a sentence that says why."""
     print(f"tetlux: {sentence}", file=sys.stderr)
     return code

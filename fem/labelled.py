@@ -143,7 +143,7 @@ def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:
 def warnings_for_cavities(solution: Solution) -> list[str]:
     """How much power leaves into cavities of a mesh, whose walls are boundaries to the outside."""
     mesh = solution.mesh
-    cavity = mesh.remembered(warnings_for_cavities, lambda: _cavities(mesh))
+    cavity = mesh.cache.get(warnings_for_cavities, lambda: _cavities(mesh))
     inside = np.flatnonzero(cavity >= 0)
     if len(inside) == 0:
         return []

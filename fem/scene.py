@@ -17,7 +17,7 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.conformity import conformity_of
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import check_regions
+from tetlux.meshing.tets.nesting import check_regions
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Shapes and lengths: surfaces, tetrahedra, and nothing about light."""
+"""Geometry: surfaces, tetrahedral meshes and their files, independent of light."""
 
 from tetlux.meshing.errors import InputError, RunError, TetluxError
 from tetlux.meshing.files.meshes import read_mesh
@@ -9,8 +9,8 @@ from tetlux.meshing.shapes import box, cylinder, slab, sphere, torus
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.given import mesh_from_arrays
 from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.nesting import check_regions
 from tetlux.meshing.tets.refine import refine
-from tetlux.meshing.tets.regions import check_regions
 
 __all__ = [
     "InputError",

@@ -1,16 +1,21 @@
-"""The array types that all signatures share, and the sum that all assemblies do."""
+"""Array types for all signatures, and the scatter-add that assembly uses."""
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-# Half the memory of an IntArray, for what there is a lot of.
+# Half the memory of an IntArray, for large tables.
 IndexArray = npt.NDArray[np.int32]
 BoolArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 
 def summed(places: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
-    """Sums (count,) of the values that belong to each place; arrays of one shape, whatever it is."""
+    """Sums (count,) of values by place; `places` and `values` have the same shape."""
     return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)
+
+
+def spread_indices(count: int, most: int) -> IntArray:
+    """Evenly spaced indices below `count`, at most `most` of them."""
+    return np.arange(min(count, most)) * count // max(min(count, most), 1)

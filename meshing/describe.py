@@ -1,4 +1,4 @@
-"""One line for an object that holds arrays: what it is, how large, with units."""
+"""Short texts for objects that contain arrays: counts, sizes with units, positions."""
 
 from dataclasses import MISSING, Field, fields
 from typing import Any
@@ -7,25 +7,30 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 
-# Letters of the text of one value, and of a whole line.
+# Largest number of characters of one value and of a line.
 LONGEST_VALUE, LONGEST_LINE = 90, 180
 
 
 def count(number: int, thing: str, several: str | None = None) -> str:
-    """A number of things, as in 1 node and 6,966 triangles."""
+    """A number with its noun, such as ``1 node`` or ``6,966 triangles``."""
     return f"{number:,} {thing if number == 1 else several or thing + 's'}"
 
 
 def size(points: FloatArray, unit: str) -> str:
-    """Lengths of the box round points (n, 3), as in 34.2 x 30 x 26 mm."""
+    """Side lengths of the bounding box of points (n, 3), such as ``34.2 x 30 x 26 mm``."""
     lengths = np.ptp(points, axis=0) if len(points) else np.zeros(3)
     return f"{' x '.join(f'{length:.3g}' for length in lengths)} {unit}"
 
 
+def place_words(place: FloatArray, size: float) -> str:
+    """Coordinates as text, of a point of a body of that size; rounding errors about 0 are written as 0."""
+    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
+
+
 def one_line(self: Any) -> str:
-    """A ``__repr__`` for dataclasses that hold arrays, of which it tells types and shapes; defaults are left out."""
-    told = [f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if not _is_default(self, one)]
-    return _cut(f"{type(self).__name__}({', '.join(told)})", LONGEST_LINE)
+    """A ``__repr__`` for dataclasses with arrays: types and shapes of arrays, other values, no defaults."""
+    shown = [f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if not _is_default(self, one)]
+    return _cut(f"{type(self).__name__}({', '.join(shown)})", LONGEST_LINE)
 
 
 def _is_default(self: Any, one: "Field[Any]") -> bool:

@@ -1,14 +1,14 @@
-"""What can go wrong, in two kinds: the request is wrong, or the run failed."""
+"""The two kinds of errors: the request is wrong, or the run failed."""
 
 from functools import partial
 from typing import Any
 
-# What is longer is cut in its middle: a sentence may quote a name of a megabyte.
+# Longer texts are shortened in the middle, since a quoted name can have any length.
 LONGEST = 900
 
 
 class TetluxError(Exception):
-    """Base of every error that tetlux raises on purpose; its text is one plain sentence, on one printable line."""
+    """Base of all errors that tetlux raises deliberately; the text is one sentence on one printable line."""
 
     def __init__(self, sentence: str) -> None:
         if len(sentence) > LONGEST:
@@ -26,7 +26,7 @@ class InputError(TetluxError, ValueError):
     text : str
         What is wrong: a whole sentence, or its first half if a remedy follows.
     field : str, optional
-        The argument or key that is wrong, as its caller knows it.
+        The wrong argument or key, by the caller's name for it.
     remedy : str, optional
         What to do about it.
     """
@@ -36,7 +36,7 @@ class InputError(TetluxError, ValueError):
         self.text, self.field, self.remedy = text, field, remedy
 
     def about(self, field: str) -> "InputError":
-        """The same error, of a field that what raised it does not know."""
+        """The same error with a field that the code that raised it does not know."""
         return InputError(self.text, field=field, remedy=self.remedy)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -48,5 +48,5 @@ class RunError(TetluxError, RuntimeError):
 
 
 def memory_ran_out(error: BaseException) -> bool:
-    """Whether that is what an error says: Python has another one for a thread that there is no memory for."""
+    """Whether an error means that memory ran out; for threads, Python raises another type than MemoryError."""
     return isinstance(error, MemoryError) or str(error) == "can't start new thread"

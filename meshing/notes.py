@@ -1,23 +1,23 @@
-"""`Note`: a sentence for the user that programs can tell apart by its code."""
+"""`Note`: a sentence for the user with a code for programs."""
 
 from collections.abc import Iterable
 
 
 class Note(str):
-    """A warning: a plain sentence, with a code that stays the same however the sentence is worded.
+    """A warning: a sentence with a code that does not depend on its wording.
 
-    It is a `str`, so that it prints, compares and is written to JSON as the sentence.
+    It is a `str`, so that it is printed, compared and written to JSON as the sentence.
 
     Parameters
     ----------
     code : str
-        What it is about, such as ``"tolerance-missed"``.
+        The kind of warning, such as ``"tolerance-missed"``.
     text : str
         The sentence.
     region : str, optional
-        The region that it is about; the sentence then begins with it.
+        The region concerned; the sentence then begins with it.
     value : float, optional
-        The figure that it is about.
+        The figure concerned.
 
     Examples
     --------
@@ -48,24 +48,24 @@ class Note(str):
         return self.code, self.text, self.region, self.value, self.prefix
 
     def in_region(self, name: str) -> "Note":
-        """The same note of a region of this name."""
+        """The same note for a region of this name."""
         return Note(self.code, self.text, name, self.value, self.prefix)
 
     def with_prefix(self, prefix: str) -> "Note":
-        """The same note, its sentence after some words more."""
+        """The same note, with a prefix to its sentence."""
         return Note(self.code, self.text, self.region, self.value, prefix + self.prefix)
 
 
 def codes_of(warnings: Iterable[str]) -> set[str]:
-    """Codes of those warnings that are notes."""
+    """The codes of the warnings that are notes."""
     return {warning.code for warning in warnings if isinstance(warning, Note)}
 
 
 def prefixed(warning: str, prefix: str) -> str:
-    """A warning after some words more; a note stays one."""
+    """A warning with a prefix; a note remains a note."""
     return warning.with_prefix(prefix) if isinstance(warning, Note) else prefix + warning
 
 
 def in_region(warning: str, name: str) -> str:
-    """A warning of a region of this name; a note stays one."""
+    """A warning for a region of this name; a note remains a note."""
     return warning.in_region(name) if isinstance(warning, Note) else f"{name}: {warning}"

@@ -23,7 +23,7 @@ def _positive(**lengths: float) -> None:
 def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm") -> Surface:
     """A sphere as an icosahedron subdivided `subdivisions` times, its vertices on the sphere.
 
-    Four subdivisions give 5,120 triangles, whose volume is 0.3 % small.
+    Four subdivisions give 5,120 triangles, whose volume is 0.3 % too small.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def cylinder(
         raise InputError(f"segments is {segments}; give 8 or more.")
     angle = 2.0 * np.pi * np.arange(segments) / segments
     ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    # Rows about as tall as a segment is wide: fTetWild is slow on needles.
+    # Rows are about as tall as segments are wide, since fTetWild is slow on needles.
     rows = max(1, round(height / (2.0 * np.pi * radius / segments)))
     levels = np.linspace(-0.5 * height, 0.5 * height, rows + 1)
     points = np.vstack(
@@ -111,17 +111,17 @@ def cylinder(
 def torus(
     major: float, minor: float, *, center: Vector = (0.0, 0.0, 0.0), segments: int = 96, unit: str = "mm"
 ) -> Surface:
-    """A torus round the z axis.
+    """A torus around the z axis.
 
     Parameters
     ----------
     major : float
-        Distance from the axis to the middle of the tube.
+        Distance from the axis to the centre of the tube.
     minor : float
         Radius of the tube, less than `major`.
     center : (3,) floats
     segments : int
-        Triangles' columns along the ring; as many rows round the tube as make them nearly square.
+        Columns of triangles along the ring; the number of rows around the tube makes cells nearly square.
     unit : str
 
     Raises
@@ -147,13 +147,13 @@ def torus(
 
 
 def _surface_of(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
-    """Check the triangles that stand for a shape, and keep the shape with them."""
+    """Make a checked surface of a shape's triangles that remembers the shape."""
     name = type(shape).__name__.lower()
     return replace(surface_from_arrays(points, faces, unit=unit, name=name), shape=shape)
 
 
 def _vector(values: Vector) -> Vector:
-    """Three floats, whatever numbers were given."""
+    """Convert three numbers to floats."""
     x, y, z = map(float, values)
     return x, y, z
 

@@ -14,7 +14,7 @@ from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.operators.assembly import Assembly, Mass, system_matrix
 from tetlux.fem.operators.forms import weak_form_matrix
 from tetlux.meshing import TetMesh
-from tetlux.meshing.tets.mesh import tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
 
 CLEAR = Medium(sigma_a=0.0, sigma_s_prime=9.0, eta=2.0)
 MASSES: tuple[Mass, ...] = ("lumped", "consistent")

@@ -195,7 +195,7 @@ def test_the_mesher_runs_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
         runs.append(surface)
         return cube
 
-    monkeypatch.setattr(mesher, "_made", make)
+    monkeypatch.setattr(mesher, "_mesh_body", make)
     surface = box((1.0, 1.0, 1.0))
     first = tetrahedralize(surface, cache=tmp_path)
     second = tetrahedralize(replace(surface, unit="cm"), cache=tmp_path)

@@ -30,7 +30,7 @@ from tetlux.fem.solve import solve_each
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.tets import mesh as tetmesh
+from tetlux.meshing.tets import cache as mesh_cache
 
 RED = Medium(sigma_a=0.01, sigma_s=4.0, g=0.75, eta=1.4)
 BLUE = Medium(sigma_a=0.3, sigma_s=6.0, g=0.7, eta=1.4)
@@ -143,7 +143,7 @@ def test_a_spot_of_ones_own_may_change() -> None:
 
 
 def test_a_mesh_remembers_the_latest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tetmesh, "MOST_REMEMBERED", 2)
+    monkeypatch.setattr(mesh_cache, "MOST_RESULTS", 2)
     mesh = TetMesh(CUBE.points, CUBE.tetrahedra)
     worked: list[str] = []
 
@@ -152,7 +152,7 @@ def test_a_mesh_remembers_the_latest(monkeypatch: pytest.MonkeyPatch) -> None:
             worked.append(key)
             return key
 
-        return mesh.remembered(key, working)
+        return mesh.cache.get(key, working)
 
     assert [work(key) for key in "aababcbac"] == list("aababcbac")
     # The third drives out the first, which then drives out the second.

@@ -392,7 +392,7 @@ def test_a_full_disk_for_temporary_files(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_for_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesher, "_made", lambda *_: block((9, 9, 9), (1.0, 1.0, 1.0)))
+    monkeypatch.setattr(mesher, "_mesh_body", lambda *_: block((9, 9, 9), (1.0, 1.0, 1.0)))
     with no_file_larger_than(10_000):
         assert len(tetrahedralize(sphere(10.0), cache=tmp_path).tetrahedra) == 6 * 9**3
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""That paths are marched as the box tree cuts them, and that it has those which cannot be."""
+"""Traced paths have the segments that the box tree cuts, and the tree cuts the paths that tracing gives up."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,17 +17,17 @@ from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.deposit import Light, together
 from tetlux.meshing import Surface, TetMesh, refine
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.search.cell_tree import CellTree, Stretches
+from tetlux.meshing.search.cell_tree import CellTree, PathSegments
 from tetlux.meshing.tets import march as marching
-from tetlux.meshing.tets import path_cache as marched
+from tetlux.meshing.tets import path_cache
 from tetlux.meshing.tets.march import march
-from tetlux.meshing.tets.path_cache import Marched
+from tetlux.meshing.tets.path_cache import TracedPaths
 
 
 class NoTree:
     """Stands for the tree where nothing should be left to it."""
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         raise AssertionError(f"{len(starts)} paths were left to the tree.")
 
 
@@ -38,7 +38,7 @@ class CountingTree:
         self.tree = tree
         self.count = 0
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         self.count += len(starts)
         return self.tree.cut(starts, directions, lengths)
 
@@ -68,7 +68,7 @@ def located(mesh: TetMesh, deposit: Deposit) -> Deposit:
     return replace(deposit, cells=mesh.locate(deposit.starts)[0])
 
 
-def check_stretches(mesh: TetMesh, deposit: Deposit, aside: float, rounding: float = 1e-9) -> None:
+def check_segments(mesh: TetMesh, deposit: Deposit, aside: float, rounding: float = 1e-9) -> None:
     """They cover every path once, without gaps, and have the coordinates that they should."""
     numbers = []
     for part in march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells):
@@ -118,7 +118,7 @@ def test_neighbours_in_a_ball_share_a_face(ball_mesh: TetMesh) -> None:
 def test_paths_through_a_ball_are_marched_as_the_tree_cuts_them(ball_mesh: TetMesh) -> None:
     # A ball's facets are not quite convex: one path in 1e5 leaves it for a while, all shorter than .09 of its diagonal.
     deposit = from_facets(ball_mesh, 3000, 1, shortest=0.2)
-    check_stretches(ball_mesh, deposit, 1e-8)
+    check_segments(ball_mesh, deposit, 1e-8)
     expected = load_vector(ball_mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
     # None needs the tree.
     load = load_vector(with_tree(ball_mesh, NoTree()), coefficients_of(FORWARD), deposit)
@@ -130,7 +130,7 @@ def test_paths_through_a_ball_are_marched_as_the_tree_cuts_them(ball_mesh: TetMe
 def test_paths_through_a_graded_mesh_are_marched_as_the_tree_cuts_them(power: float) -> None:
     mesh, _ = turned(pressed(block((8, 8, 8), (2.0, 2.0, 1.0)), power), 2)
     deposit = from_facets(mesh, 1000, 3)
-    check_stretches(mesh, deposit, 1e-7)
+    check_segments(mesh, deposit, 1e-7)
     expected = load_vector(mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
     assert expected.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
     tree = CountingTree(mesh.tree)
@@ -155,7 +155,7 @@ def test_awkward_paths_are_marched_as_one_by_one(name: str, seed: int | None) ->
     expected = careful_load(mesh, FORWARD, deposit)
     for cell in touched:
         from_it = replace(deposit, cells=np.array([cell]))
-        check_stretches(mesh, from_it, CLOSE)
+        check_segments(mesh, from_it, CLOSE)
         load = load_vector(mesh, coefficients_of(FORWARD), from_it)
         assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
         assert load == pytest.approx(expected, abs=CLOSE)
@@ -177,7 +177,7 @@ def test_paths_within_faces_are_covered() -> None:
     faces = mesh.tetrahedra[cells, :3]
     starts, ends = (np.einsum("ij,ijk->ik", random.dirichlet(np.ones(3), 500), mesh.points[faces]) for _ in range(2))
     deposit = replace(beams(starts, ends), cells=cells)
-    check_stretches(mesh, deposit, CLOSE)
+    check_segments(mesh, deposit, CLOSE)
     expected = load_vector(mesh, coefficients_of(FORWARD), replace(deposit, cells=None))
     assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(expected, abs=CLOSE)
 
@@ -197,7 +197,7 @@ def test_paths_through_the_thinnest_tetrahedra_are_covered() -> None:
     # Linear functions are integrated exactly, but for what their gradients lose there.
     assert load @ mesh.points == pytest.approx(first_moments(deposit, FORWARD), abs=1e-3)
     # 3e-7: the rounding of barycentric coordinates in these tetrahedra, whoever cuts.
-    check_stretches(mesh, deposit, 1e-7, 1e-6)
+    check_segments(mesh, deposit, 1e-7, 1e-6)
 
 
 def first_moments(deposit: Deposit, medium: Medium) -> FloatArray:
@@ -247,7 +247,7 @@ def test_paths_that_are_lost_are_left_to_the_tree(
 ) -> None:
     deposit = from_facets(ball_mesh, 100, 5)
     expected = load_vector(ball_mesh, coefficients_of(FORWARD), deposit)
-    # No step is short enough, and no stretch begins inside enough.
+    # No step is short enough, and no segment begins inside enough.
     monkeypatch.setattr(marching, name, -1)
     tree = CountingTree(ball_mesh.tree)
     load = load_vector(with_tree(ball_mesh, tree), coefficients_of(FORWARD), deposit)
@@ -273,9 +273,9 @@ def test_a_flat_tetrahedron_is_left_to_the_tree() -> None:
     flat = np.zeros((3, len(mesh.points)))
     lines = np.array([[0.1, 0.1, -0.1, 0.0, 0.0, -1.0, 1.0]]).T
     mesh.__dict__["points"] = flat.T
-    part = marching._marched(mesh, lines, np.array([0]), np.zeros(1))
+    part = marching._trace(mesh, lines, np.array([0]), np.zeros(1))
     assert part.lost.all()
-    assert len(part.stretches.paths) == 0
+    assert len(part.segments.paths) == 0
 
 
 def same_mesh(mesh: TetMesh) -> TetMesh:
@@ -287,13 +287,13 @@ def same_mesh(mesh: TetMesh) -> TetMesh:
 def marches(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many paths were marched at each time."""
     counts: list[int] = []
-    march_anew = marching._marched
+    march_anew = marching._trace
 
-    def counting(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> Marched:
+    def counting(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> TracedPaths:
         counts.append(len(cells))
         return march_anew(mesh, lines, cells, reached)
 
-    monkeypatch.setattr(marching, "_marched", counting)
+    monkeypatch.setattr(marching, "_trace", counting)
     return counts
 
 
@@ -311,7 +311,7 @@ def test_paths_are_marched_once_and_then_further(uniform: bool, ball_mesh: TetMe
         assert sum(marches) == anew
         expected = load_vector(same_mesh(mesh), coefficients, deposit)
         assert load == pytest.approx(expected, abs=1e-13 * expected.max())
-        check_stretches(mesh, deposit, 1e-7)
+        check_segments(mesh, deposit, 1e-7)
 
 
 def test_only_the_same_paths_are_known(ball_mesh: TetMesh, marches: list[int]) -> None:
@@ -352,12 +352,12 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     deposits = [from_facets(ball_mesh, 50, seed) for seed in (1, 2, 3)]
     mesh = same_mesh(ball_mesh)
     load_vector(mesh, coefficients_of(FORWARD), deposits[0])
-    held = sum(len(part.stretches.paths) for part in mesh.marched.parts)
+    held = sum(len(part.segments.paths) for part in mesh.cache.paths.parts)
     # Room for two and a half.
-    monkeypatch.setattr(marched, "MOST_KEPT", int(2.5 * held))
+    monkeypatch.setattr(path_cache, "MOST_SEGMENTS", int(2.5 * held))
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert len(mesh.marched.parts) == 2
+    assert len(mesh.cache.paths.parts) == 2
     marches.clear()
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
@@ -366,12 +366,12 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
 
 def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is looked through for every path; and what is marched to find a point is none."""
-    monkeypatch.setattr(marched, "MOST_PARTS", 3)
+    monkeypatch.setattr(path_cache, "MOST_PARTS", 3)
     mesh = same_mesh(ball_mesh)
     deposits = [from_facets(mesh, 20, seed) for seed in range(5)]
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert len(mesh.marched.parts) == 3
+    assert len(mesh.cache.paths.parts) == 3
     marches.clear()
     for deposit in deposits[::-1]:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
@@ -380,7 +380,7 @@ def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], mon
     system = System(mesh, TISSUE)
     for depth in (1.0, 2.0, 3.0):
         system.solve([PointSource((0.0, 0.0, 10.0 - depth))])
-    assert len(mesh.marched.parts) == 0
+    assert len(mesh.cache.paths.parts) == 0
 
 
 def chosen(deposit: Deposit, some: BoolArray) -> Deposit:
@@ -435,7 +435,7 @@ def test_beams_know_where_they_begin(
 
     def with_tree_alone(
         mesh: TetMesh, starts: FloatArray, directions: FloatArray, lengths: FloatArray, cells: IntArray
-    ) -> Iterator[Stretches]:
+    ) -> Iterator[PathSegments]:
         assert len(cells) == len(starts)
         return mesh.tree.cut(starts, directions, lengths)
 

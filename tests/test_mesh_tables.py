@@ -6,18 +6,18 @@ import pytest
 from tests.test_assembly import random_mesh
 from tetlux.meshing import TetMesh, refine
 from tetlux.meshing.host import blocks
-from tetlux.meshing.host.blocks import grouped, in_blocks, once
-from tetlux.meshing.tets.mesh import EDGES
+from tetlux.meshing.host.blocks import group_keys, in_blocks, once
+from tetlux.meshing.tets.topology import EDGES
 
 
 @pytest.mark.parametrize("part", [7, 100, 1 << 20])
 @pytest.mark.parametrize("most", [3, 1000, 2**40, 2**64 - 1])
-def test_grouped_is_unique_with_inverse(monkeypatch: pytest.MonkeyPatch, most: int, part: int) -> None:
+def test_group_keys_is_unique_with_inverse(monkeypatch: pytest.MonkeyPatch, most: int, part: int) -> None:
     """Keys that leave no room for their places are sorted another way, and must come out the same."""
     monkeypatch.setattr(blocks, "PART", part)
     keys = np.random.default_rng(0).integers(0, most, 900, dtype=np.uint64, endpoint=True)
     keys[::3] = keys[0]
-    unique, inverse = grouped(keys)
+    unique, inverse = group_keys(keys)
     expected, places = np.unique(keys, return_inverse=True)
     assert (unique == expected).all()
     assert (inverse == places).all()

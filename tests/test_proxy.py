@@ -99,10 +99,10 @@ def test_a_decimation_that_is_not_sound_is_not_used(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(proxy, "two_sided_distance", lambda *_: 0.0)
     for wrong, used in ((hole, False), (two, False), (turned, False), (crumpled, False), (open_one, True)):
         result = (wrong.points / ball.diagonal, wrong.faces)
-        monkeypatch.setattr(proxy, "_decimated", lambda *_, result=result: result)
+        monkeypatch.setattr(proxy, "_decimate_to", lambda *_, result=result: result)
         assert (proxy_of(ball, 0.02) is not ball) == used
     monkeypatch.undo()
-    monkeypatch.setattr(proxy, "_decimated", lambda *_: (far.points / ball.diagonal, far.faces))
+    monkeypatch.setattr(proxy, "_decimate_to", lambda *_: (far.points / ball.diagonal, far.faces))
     assert proxy_of(ball, 0.02) is ball
 
 

@@ -29,9 +29,9 @@ from tetlux.meshing.files.meshes import read_mesh, write_mesh
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import shells
 from tetlux.meshing.mesher.cache import mesh_key, remember_mesh, remembered_mesh
-from tetlux.meshing.tets import regions as regions_module
+from tetlux.meshing.tets.nesting import Nesting, nesting
 from tetlux.meshing.tets.refine import moved_to_surface
-from tetlux.meshing.tets.regions import nesting, tagged
+from tetlux.meshing.tets.tagging import tag_tetrahedra
 
 OUTER, INNER = sphere(10.0, subdivisions=3), sphere(5.0, subdivisions=3)
 LAYERS = [box((60.0, 60.0, 2.0), center=(0.0, 0.0, -1.0)), box((60.0, 60.0, 3.0), center=(0.0, 0.0, -3.5))]
@@ -293,11 +293,11 @@ def test_tetrahedra_in_the_envelope_follow_their_neighbours(kept: bool) -> None:
     # Those along the cube's edges, all of whose corners are on it, answer for themselves in any case.
     some = ~on[mesh.tetrahedra].all(axis=1)
     assert (alone != inside)[some].sum() > 40
-    tags = tagged(mesh.points, mesh.tetrahedra, body, [inner], 0.2 if kept else 0.01)
+    tags = tag_tetrahedra(mesh.points, mesh.tetrahedra, body, [inner], 0.2 if kept else 0.01)
     assert (tags == (inside if kept else alone))[some].all()
     # What is outside the body is in no region, though its surface as decimated may leave the body's.
     for regions, tag in (([], 0), ([body], 1)):
-        tags = tagged(mesh.points, mesh.tetrahedra, inner, regions, 0.2)
+        tags = tag_tetrahedra(mesh.points, mesh.tetrahedra, inner, regions, 0.2)
         assert (tags == np.where(inside, tag, -1))[some].all()
 
 
@@ -328,7 +328,7 @@ def test_the_mesher_runs_once_for_the_same_regions(tmp_path: Path, monkeypatch: 
         runs.append(given[-1])  # type: ignore[arg-type]
         return cubes()
 
-    monkeypatch.setattr(mesher, "_made", make)
+    monkeypatch.setattr(mesher, "_mesh_body", make)
     first = tetrahedralize(OUTER, [INNER], cache=tmp_path)
     second = tetrahedralize(OUTER, [INNER], cache=tmp_path)
     # Nor is what would have been refused taken for the same.
@@ -406,9 +406,7 @@ def test_surfaces_that_bound_regions() -> None:
     ):
         check_regions(BODY, inner)
     assert nesting(BODY, [cube, box((4, 4, 4))]).parents == (2, 0)
-    assert nesting(BODY, [cube, box((2, 2, 2), center=(2, 1, 0))]) == regions_module.Nesting(
-        (0, 0), (False, True, True)
-    )
+    assert nesting(BODY, [cube, box((2, 2, 2), center=(2, 1, 0))]) == Nesting((0, 0), (False, True, True))
     assert nesting(slab(60.0, 10.0), LAYERS).touching == (True, True, True)
 
 

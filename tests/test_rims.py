@@ -20,7 +20,7 @@ def wall(radius: float, count: int, height: float = 30.0, top: float | None = No
     return np.vstack([circle * radius, upper]), np.hstack(faces).T
 
 
-def joined(*parts: Arrays) -> Arrays:
+def join_arrays(*parts: Arrays) -> Arrays:
     """The first tube, and all others as bores."""
     first = np.cumsum([0, *(len(points) for points, _ in parts)])
     faces = [(faces if i == 0 else faces[:, ::-1]) + first[i] for i, (_, faces) in enumerate(parts)]
@@ -33,7 +33,7 @@ def disc(radius: float, count: int) -> float:
 
 @pytest.mark.parametrize(("count", "slope"), [(12, 0.0), (60, 0.4), (200, 0.0)])
 def test_a_thick_pipe_gets_a_ring_at_each_end(count: int, slope: float) -> None:
-    arrays = joined(wall(10.0, count, slope=slope), wall(6.0, count, slope=slope))
+    arrays = join_arrays(wall(10.0, count, slope=slope), wall(6.0, count, slope=slope))
     closed = surface_from_arrays(*arrays, holes="close")
     assert closed.volume == pytest.approx(30.0 * (disc(10.0, count) - disc(6.0, count)), rel=1e-6)
     assert closed.repairs[-1].startswith("capped 2 holes")
@@ -43,7 +43,7 @@ def test_a_thick_pipe_gets_a_ring_at_each_end(count: int, slope: float) -> None:
 def test_several_bores_and_a_rod_in_one_of_them() -> None:
     (narrow, faces), (wide, _), rod = wall(3.0, 40), wall(5.0, 40), wall(2.0, 40)
     left, right = np.array([-8.0, 0.0, 0.0]), np.array([6.0, 0.0, 0.0])
-    points, triangles = joined(wall(20.0, 40), (narrow + left, faces), (wide + right, faces))
+    points, triangles = join_arrays(wall(20.0, 40), (narrow + left, faces), (wide + right, faces))
     scene = np.vstack([points, rod[0] + right]), np.vstack([triangles, rod[1] + len(points)])
     closed = surface_from_arrays(*scene, holes="close")
     expected = 30.0 * (disc(20.0, 40) - disc(3.0, 40) - disc(5.0, 40) + disc(2.0, 40))
@@ -57,7 +57,7 @@ def test_a_shallow_funnel_gets_two_discs(top: float, height: float) -> None:
 
 
 def test_caps_that_overlap_are_said() -> None:
-    points, faces = joined(wall(10.0, 40), wall(6.0, 40))
+    points, faces = join_arrays(wall(10.0, 40), wall(6.0, 40))
     faces[80:] = faces[80:, ::-1]
     closed = surface_from_arrays(points, faces, holes="close")
     assert any("holes lie within holes around (0, 0, 0), (0, 0, 30)" in warning for warning in closed.warnings)

@@ -245,7 +245,7 @@ def test_the_envelope_follows_from_the_deviation_and_the_other_way(monkeypatch: 
         made.append((deviation, envelope))
         return cube
 
-    monkeypatch.setattr(mesher, "_made", make)
+    monkeypatch.setattr(mesher, "_mesh_body", make)
     unit, plate = box((1.0, 1.0, 1.0)), box((1.0, 1.0, 0.01))
     tetrahedralize(unit, cache=False)
     tetrahedralize(plate, cache=False)

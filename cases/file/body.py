@@ -21,7 +21,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import check_regions
+from tetlux.meshing.tets.nesting import check_regions
 
 
 @dataclass(frozen=True, eq=False)

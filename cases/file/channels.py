@@ -30,8 +30,8 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
         if length != first[1]:
             raise document.error(
                 key,
-                f"this makes {_told(length)}, and {dotted(first[0])} makes {_told(first[1])}; give one value for each "
-                "channel, or a single one for all.",
+                f"this makes {_describe(length)}, and {dotted(first[0])} makes {_describe(first[1])}; give one value "
+                "for each channel, or a single one for all.",
             )
     count = first[1] if first else 1
     if spec.channels is None:
@@ -54,7 +54,7 @@ def check_different(document: Document, section: str, names: list[str] | tuple[s
             raise document.error((section, i), f'the name "{name}" stands here twice; give another one.')
 
 
-def _told(length: int) -> str:
+def _describe(length: int) -> str:
     return "1 channel" if length == 1 else f"{length} channels"
 
 

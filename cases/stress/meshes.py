@@ -4,7 +4,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.shapes import sphere
-from tetlux.meshing.tets.mesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
 
 # Nodes that are moved, at most. None is next to another, so that each makes a bad tetrahedron of its own.
 MOST_DEGRADED = 60

@@ -12,7 +12,7 @@ from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.search.cell_tree import Stretches
+from tetlux.meshing.search.cell_tree import PathSegments
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import triangle_areas
 from tetlux.meshing.tets.march import march
@@ -58,7 +58,7 @@ class Rays:
     __repr__ = one_line
 
 
-def joined(parts: list[Rays]) -> Rays:
+def join_rays(parts: list[Rays]) -> Rays:
     """All rays of several parts."""
     return Rays(
         np.vstack([np.zeros((0, 3)), *(part.starts for part in parts)]),
@@ -81,8 +81,8 @@ def entered(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
     return Rays(rays.starts, refracted, (1.0 - lost) * rays.powers, rays.cells)[passed], specular
 
 
-def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
-    """Optical depth at which each stretch begins, on its own path, (s,)."""
+def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: IntArray) -> FloatArray:
+    """Optical depth at which each segment begins, on its own path, (s,)."""
     if np.ndim(extinction) == 0:
         return np.asarray(extinction * part.enter)
     depth = at_cells(extinction, cells) * (part.leave - part.enter)
@@ -97,9 +97,9 @@ def optical_depths(part: Stretches, extinction: float | FloatArray, cells: IntAr
 
 
 def cells_of(
-    mesh: TetMesh, coefficients: Coefficients, part: Stretches, starts: FloatArray, directions: FloatArray
+    mesh: TetMesh, coefficients: Coefficients, part: PathSegments, starts: FloatArray, directions: FloatArray
 ) -> IntArray:
-    """The tetrahedron whose coefficients each stretch has: the nearest one where the stretch is outside the mesh."""
+    """The tetrahedron whose coefficients each segment has: the nearest one where the segment is outside the mesh."""
     if coefficients.uniform:
         return part.cells
     cells = part.cells.copy()
@@ -174,7 +174,7 @@ def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:
         faint = rays.powers <= FAINTEST_AGAIN * average * share
         stopped.append(rays[faint])
         rays = rays[~faint]
-    every, left = joined(segments), joined([*stopped, rays])
+    every, left = join_rays(segments), join_rays([*stopped, rays])
     # What is stopped at a facet is in the tetrahedron behind it.
     scattered = at_cells(coefficients.scattering / coefficients.extinction, left.cells) * left.powers
     absorbed += float((left.powers - scattered).sum())
@@ -234,7 +234,7 @@ def beyond(mesh: TetMesh, coefficients: Coefficients, arrived: Rays, met: IntArr
     places = outer.starts + np.where(again, distances, 0.0)[:, None] * outer.directions
     met_again = Rays(places, outer.directions, outer.powers, mesh.boundary_cells[hit])[again]
     coming, specular = entered(met_again, normals[again], eta)
-    return joined([inner, coming]), float(outer.powers[~again].sum()), specular
+    return join_rays([inner, coming]), float(outer.powers[~again].sum()), specular
 
 
 def _at_boundary(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, Rays]:

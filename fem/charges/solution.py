@@ -22,7 +22,8 @@ from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.regions import nesting, region_at
+from tetlux.meshing.tets.nesting import nesting
+from tetlux.meshing.tets.regions import region_at
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import check_regions
+from tetlux.meshing.tets.nesting import check_regions
 
 # Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
 NEAREST = 1e-3

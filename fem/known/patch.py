@@ -12,7 +12,8 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import longest_sides
 from tetlux.meshing.tets.march import march
-from tetlux.meshing.tets.mesh import FACES, TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import FACES
 
 # A charge that is nearer to a facet than this share of the facet's longest edge is too near for the integrals over it.
 RESOLVED = 3e-4

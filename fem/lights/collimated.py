@@ -105,7 +105,7 @@ class CollimatedBeam:
         del surface
         if self.spot is None or isinstance(self.spot, UNCHANGING):
             key = (type(self), tuple(self.direction), self.spot, self.from_center)
-            rays, normals = mesh.remembered(key, lambda: self._falling(mesh))
+            rays, normals = mesh.cache.get(key, lambda: self._falling(mesh))
         else:
             rays, normals = self._falling(mesh)
         rays = replace(rays, powers=self.irradiance * rays.powers)

@@ -102,7 +102,7 @@ class EnvironmentLight:
     def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
         del surface
         eta = coefficients.outer.eta
-        return mesh.remembered((self, eta), lambda: self._seen_from(mesh, eta))
+        return mesh.cache.get((self, eta), lambda: self._seen_from(mesh, eta))
 
     def _seen_from(self, mesh: TetMesh, eta: float) -> Deposit:
         """What falls on a mesh, and what passes into refractive index eta."""

@@ -25,7 +25,8 @@ from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IndexArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import cross, dot, over_corners
-from tetlux.meshing.tets.mesh import EDGES, TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import EDGES
 
 Mass = Literal["lumped", "consistent"]
 

@@ -63,7 +63,7 @@ def media_under_facets(mesh: TetMesh, coefficients: Coefficients) -> tuple[Local
     thickness : (f,) ndarray
         `tetlux.meshing.tets.thickness`, as optical depth: in mean free paths of what is on the way.
     """
-    lengths = mesh.remembered(thickness, lambda: thickness(mesh))
+    lengths = mesh.cache.get(thickness, lambda: thickness(mesh))
     at_facet = media_in(coefficients, mesh.boundary_cells)
     if coefficients.uniform:
         return at_facet, lengths / at_facet.mean_free_path

@@ -1,6 +1,6 @@
-"""Gmsh's own files, versions 2.2 and 4.1, text and binary (Gmsh reference manual, section "Gmsh file formats").
+"""Read gmsh files, versions 2.2 and 4.1, text and binary (Gmsh reference manual, section "Gmsh file formats").
 
-Unlike meshio this reads files in which only some entities have a physical group.
+Unlike meshio, this reads files in which only some entities have a physical group.
 """
 
 from collections import Counter
@@ -19,7 +19,7 @@ from tetlux.meshing.notes import Note
 
 Numbers = TextNumbers | BinaryNumbers
 PHYSICAL, ENTITY = "gmsh:physical", "gmsh:geometrical"
-# Element types: what meshio calls them, and how many nodes they have. Corners come first in all of them.
+# Element types by number: meshio's name and number of nodes. Corners come first in all of them.
 _POINTS = {15: ("vertex", 1)}
 _LINES = {kind: ("line", nodes) for kind, nodes in {1: 2, 8: 3, 26: 4, 27: 5, 28: 6}.items()}
 _TRIANGLES = {
@@ -31,12 +31,12 @@ _HEXAHEDRA = {kind: ("hexahedron", nodes) for kind, nodes in {5: 8, 12: 27, 17: 
 _WEDGES = {kind: ("wedge", nodes) for kind, nodes in {6: 6, 13: 18, 18: 15, 90: 40, 91: 75}.items()}
 _PYRAMIDS = {kind: ("pyramid", nodes) for kind, nodes in {7: 5, 14: 14, 19: 13, 118: 30}.items()}
 _KINDS = {**_POINTS, **_LINES, **_TRIANGLES, **_QUADS, **_TETRAHEDRA, **_HEXAHEDRA, **_WEDGES, **_PYRAMIDS}
-# Node numbers up to this many times the number of nodes are looked up in a table, others by bisection.
+# Node numbers up to this many times the number of nodes use a lookup table, others bisection.
 SPARSE = 20
 
 
 def is_gmsh(path: Path) -> bool:
-    """Whether a file begins as gmsh's do."""
+    """Whether a file begins like a gmsh file."""
     with path.open("rb") as file:
         return file.read(256).lstrip().startswith((b"$MeshFormat", b"$Comments", b"$NOD"))
 
@@ -44,7 +44,7 @@ def is_gmsh(path: Path) -> bool:
 def read_gmsh(path: Path) -> RawMesh:
     """Read a gmsh file.
 
-    Physical groups are the array `PHYSICAL`; if there are none, the numbers of volumes are the array `ENTITY`.
+    The array `PHYSICAL` has the physical groups; if there are none, the array `ENTITY` has the numbers of volumes.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def read_gmsh(path: Path) -> RawMesh:
 
 
 def _sections(content: bytes) -> dict[str, bytes]:
-    """What stands between ``$Name`` and ``$EndName``, the first of each name."""
+    """The text between ``$Name`` and ``$EndName``, of the first section of each name."""
     found: dict[str, bytes] = {}
     place = 0
     while (start := content.find(b"$", place)) >= 0:
@@ -124,7 +124,7 @@ class _Elements:
 
 
 def _count(words: Numbers) -> int:
-    """The number of entries that version 2 begins a section with."""
+    """The number of entries at the start of a section of version 2."""
     return words.line() if isinstance(words, BinaryNumbers) else int(words.take(1, "i")[0])
 
 
@@ -138,7 +138,7 @@ def _entity_groups(words: Numbers, section: bytes | None) -> dict[tuple[int, int
         for _ in range(count):
             number = int(words.take(1, "i")[0])
             words.take(3 if dimension == 0 else 6, "d")
-            # A group is negative where the entity is turned round in it.
+            # A group is negative if it contains the entity with reversed orientation.
             found[dimension, number] = np.abs(words.take(int(words.take(1, "u")[0]), "i")).tolist()
             if dimension > 0:
                 words.take(int(words.take(1, "u")[0]), "i")
@@ -171,7 +171,7 @@ def _elements_4(words: Numbers, section: bytes, groups: dict[tuple[int, int], li
         sizes.update({(dimension, group): count for group in groups.get((dimension, entity), [])})
     found = []
     for dimension, entity, name, rows in blocks:
-        # Of groups that overlap, such as a whole and its part, the part says more.
+        # Of overlapping groups, such as a whole and its part, the part is more specific.
         of_entity = groups.get((dimension, entity), [])
         _, group = min(((sizes[dimension, each], each) for each in of_entity), default=(0, 0))
         count = len(rows)
@@ -180,7 +180,7 @@ def _elements_4(words: Numbers, section: bytes, groups: dict[tuple[int, int], li
 
 
 def _in_order(blocks: list[_Elements]) -> list[_Elements]:
-    """Elements of each kind together, by their numbers."""
+    """The elements of each kind in one block, in the order of their numbers."""
     kinds: dict[tuple[str, int], list[_Elements]] = {}
     for block in blocks:
         kinds.setdefault((block.kind, block.nodes.shape[1]), []).append(block)
@@ -202,7 +202,7 @@ def _nodes_2(words: Numbers, section: bytes) -> tuple[IntArray, FloatArray]:
 
 
 def _elements_2(words: Numbers, section: bytes) -> list[_Elements]:
-    """Elements of version 2, each with a head of its own in text, and with one for several in binary."""
+    """Elements of version 2: each has a header in text, several share one in binary."""
     words.start(section)
     count = _count(words)
     flat = words.rest
@@ -220,7 +220,7 @@ def _elements_2(words: Numbers, section: bytes) -> list[_Elements]:
         width = tags + _kind(kind)[1] + (1 if binary else 0)
         if follow < 1 or tags < 0 or place + width * follow > len(numbers):
             raise ValueError("a block of no elements, or of more than there are")
-        # Where the tags begin.
+        # Position of the first tag.
         first = place + (1 if binary else 0)
         places.setdefault((kind, tags), []).extend(range(first, first + width * follow, width))
         place += width * follow
@@ -246,7 +246,7 @@ def _kind(number: int) -> tuple[str, int]:
 
 
 def _numbering(tags: IntArray) -> Any:
-    """From numbers of nodes to their places, -1 for those that do not exist."""
+    """A function from node numbers to indices, -1 for numbers that do not exist."""
     if tags.min(initial=0) < 0:
         raise ValueError("a negative number of a node")
     most = int(tags.max(initial=0))

@@ -1,4 +1,4 @@
-"""Gmsh's files of version 4.1, binary (Gmsh reference manual, section "MSH file format")."""
+"""Write gmsh files of version 4.1, binary (Gmsh reference manual, section "MSH file format")."""
 
 import struct
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Gmsh's number of straight tetrahedra, and the dimension of their entities.
+# Gmsh's type number of linear tetrahedra, and the dimension of their entities.
 TETRAHEDRON, SOLID = 4, 3
 
 
@@ -27,7 +27,7 @@ def write_gmsh(mesh: TetMesh, path: Path, values: Mapping[str, FloatArray]) -> N
     Raises
     ------
     InputError
-        If a label is negative, which gmsh takes for a group turned round.
+        If a label is negative, which means reversed orientation in gmsh.
     """
     labels = np.unique(mesh.regions).tolist()
     if labels[0] < 0:
@@ -46,7 +46,7 @@ def write_gmsh(mesh: TetMesh, path: Path, values: Mapping[str, FloatArray]) -> N
         _write_mesh(mesh, labels, file.write)
         for name, each in values.items():
             head = f'$NodeData\n1\n"{name}"\n1\n0\n3\n0\n1\n{len(each)}\n'
-            file.write(head.encode() + _numbered(each).tobytes() + b"\n$EndNodeData\n")
+            file.write(head.encode() + _number_values(each).tobytes() + b"\n$EndNodeData\n")
 
 
 def _write_mesh(mesh: TetMesh, labels: list[int], write: Callable[[bytes], object]) -> None:
@@ -61,8 +61,8 @@ def _write_mesh(mesh: TetMesh, labels: list[int], write: Callable[[bytes], objec
     write(b"\n$EndElements\n")
 
 
-def _numbered(values: FloatArray) -> npt.NDArray[np.void]:
-    """Values with the numbers of their nodes, from 1."""
+def _number_values(values: FloatArray) -> npt.NDArray[np.void]:
+    """Values with their node numbers, from 1."""
     rows = np.empty(len(values), dtype=[("node", "<i4"), ("value", "<f8")])
     rows["node"], rows["value"] = np.arange(1, len(values) + 1), values
     return rows

@@ -1,4 +1,4 @@
-"""Which values of a file's cells are the labels of its tetrahedra."""
+"""Find the labels of tetrahedra among the cell values of a file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.given import whole_numbers
 
 REGION = "region"
-# What programs call labels, the likeliest first.
+# Names of labels in various programs, the likeliest first.
 KNOWN = (
     REGION,
     PHYSICAL,
@@ -41,13 +41,13 @@ KNOWN = (
     ENTITY,
 )
 ORDER = {name.lower(): i for i, name in enumerate(KNOWN)}
-# An array of an unknown name that holds more different numbers than this numbers the cells, or the like.
+# An array of an unknown name with more distinct values is no label array but, for example, numbers the cells.
 MOST_LABELS = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """Labels of tetrahedra (m,), if there are any, their names, and how they were chosen."""
+    """Labels of tetrahedra (m,), if any, their names, and notes on the choice."""
 
     values: IntArray | None = None
     names: Mapping[int, str] = field(default_factory=dict)
@@ -61,12 +61,12 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
     ----------
     raw : RawMesh
     name : str, optional
-        Of the array that holds them; else the likeliest one does, or the only one of whole numbers.
+        Name of the label array. If not given, the likeliest known array or the only one of integers is used.
 
     Raises
     ------
     InputError
-        If there is no such array, or its values are no whole numbers.
+        If there is no such array, or its values are not integers.
     """
     if name is not None:
         if name not in raw.arrays:
@@ -97,7 +97,7 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
 
 
 def _notes(chosen: str, values: IntArray, candidates: list[str]) -> tuple[str, ...]:
-    """What to say of a choice."""
+    """Notes on a choice."""
     if chosen == ENTITY:
         return (Note("labels-chosen", "it has no physical groups of volumes; labels are the numbers of its volumes."),)
     if chosen == PHYSICAL:
@@ -111,7 +111,7 @@ def _notes(chosen: str, values: IntArray, candidates: list[str]) -> tuple[str, .
 
 
 def _candidates(raw: RawMesh) -> dict[str, IntArray]:
-    """Arrays that may be labels, with their values: those that hold few different whole numbers, or are known."""
+    """Possible label arrays and their values: arrays of a known name, or with few distinct integers."""
     found = {}
     for name in raw.arrays:
         values = _whole(raw, name)
@@ -121,7 +121,7 @@ def _candidates(raw: RawMesh) -> dict[str, IntArray]:
 
 
 def _whole(raw: RawMesh, name: str) -> IntArray | None:
-    """Values of an array if they are whole numbers, one for each tetrahedron."""
+    """Values of an array if they are integers, one per tetrahedron."""
     values = raw.values(name)
     return whole_numbers(values, len(values))
 
@@ -132,12 +132,12 @@ def _names(raw: RawMesh, name: str, values: IntArray) -> dict[int, str]:
 
 
 def _labels_of_sets(raw: RawMesh) -> Labels:
-    """Labels by named sets of cells, numbered from 1 in their order; of several the smallest set counts."""
+    """Labels by named sets of cells, numbered from 1 in their order; a cell in several belongs to the smallest."""
     sizes = [len(raw.blocks[i][1]) for i in raw.tetrahedra]
     members = {name: _members(parts, raw.tetrahedra, sizes) for name, parts in raw.sets.items()}
     solid: dict[str, BoolArray] = {}
     for name, inside in sorted(members.items(), key=lambda item: _made_up(item[0])):
-        # A set by another name is no other set.
+        # Ignore sets that repeat another under a different name.
         if inside.any() and not any((inside == other).all() for other in solid.values()):
             solid[name] = inside
     if not solid:
@@ -159,12 +159,12 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
 
 
 def _made_up(name: str) -> bool:
-    """Whether gmsh called a set so by itself; of two names for one set it is the worse."""
+    """Whether gmsh generated the name of a set; the user's name of the same set is preferred."""
     return name.startswith("Volume") and name[len("Volume") :].isdecimal()
 
 
 def _members(parts: object, blocks: list[int], sizes: list[int]) -> BoolArray:
-    """Which tetrahedra are in a set, given as meshio does: the numbers of its cells in each block."""
+    """Whether each tetrahedron is in a set, given in meshio's form: cell numbers in each block."""
     inside = []
     for block, size in zip(blocks, sizes, strict=True):
         mask = np.zeros(size, dtype=bool)

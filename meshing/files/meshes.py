@@ -1,4 +1,4 @@
-"""Volume meshes on disk: gmsh's and NIRFAST's by readers of our own, all others through meshio."""
+"""Read and write volume meshes: gmsh and NIRFAST by tetlux's own readers, other formats through meshio."""
 
 import contextlib
 import io
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["oriented", "read_mesh", "read_with_meshio", "write_mesh"]
 
 WRITTEN = (".vtu", ".msh")
-# What is read, by suffixes in lower case: meshio knows more of them, but not of tetrahedra, or not well.
+# Formats by lower-case suffix. Other formats of meshio have no tetrahedra or are not read reliably.
 NAMED = (".vtu", ".vtk", ".msh", ".mesh", ".inp", ".node")
 MESHIO = {
     ".vtu": "vtu",
@@ -58,7 +58,7 @@ MESHIO = {
 
 
 def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels: str | None = None) -> TetMesh:
-    """Read a tetrahedral mesh made elsewhere, mend what can be mended safely, and check it.
+    """Read a tetrahedral mesh, repair what can be repaired safely, and check it.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels:
         VTU, VTK, gmsh (2.2 and 4.1, text or binary), Medit, Abaqus, NIRFAST (any of its .node, .elem and .region
         files, or their name without a suffix), TetGen, Nastran and what else meshio reads.
     unit : str
-        Unit of the coordinates once multiplied by `scale`: nm, um, mm, cm, m or in.
+        Unit of the coordinates after multiplication by `scale`: nm, um, mm, cm, m or in.
     scale : float
-        Factor on the file's coordinates.
+        Factor applied to the file's coordinates.
     labels : str, optional
         The array of cell values that holds the labels, where the file has several: physical groups of gmsh
         ("gmsh:physical"), or an array called region, label, material or the like, unless another one is given here.
@@ -131,7 +131,7 @@ def _read(path: Path) -> RawMesh:
         raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
-    except Exception as error:  # whatever a damaged file makes its reader run into
+    except Exception as error:  # a damaged file can make its reader raise anything
         raise InputError(f"{path} is not a readable {suffix[1:].upper()} mesh; export it again.") from error
     data = read_with_meshio(path, MESHIO[suffix])
     arrays = {name: list(values) for name, values in data.cell_data.items()}
@@ -140,7 +140,7 @@ def _read(path: Path) -> RawMesh:
 
 
 def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":
-    """What meshio reads of a file, without a word of its own on the terminal.
+    """Read a file with meshio, without meshio's output on the terminal.
 
     Raises
     ------
@@ -156,14 +156,14 @@ def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":
     except ImportError as error:
         package = error.name or "another package"
         raise InputError(f"{path} needs {package}, which is not installed; save it as .vtu or .msh.") from error
-    except (Exception, SystemExit) as error:  # meshio's readers raise whatever they ran into, or exit
+    except (Exception, SystemExit) as error:  # meshio's readers can raise anything, or exit
         raise InputError(
             f"{path} is not a readable {path.suffix[1:].upper()} mesh; export it again, or as .msh or .vtu."
         ) from error
 
 
 def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray] | None = None) -> None:
-    """Write a tetrahedral mesh, with named values at its nodes, and with the labels of its tetrahedra if it has any.
+    """Write a tetrahedral mesh with named values at its nodes, and the labels of its tetrahedra if any.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray]
     Raises
     ------
     InputError
-        If the ending is another one.
+        If the suffix is not supported.
     """
     path = Path(path)
     suffix = path.suffix.lower()

@@ -1,4 +1,4 @@
-"""NIRFAST's text files: ``NAME.node``, ``NAME.elem`` and, if there are regions, ``NAME.region``."""
+"""Read NIRFAST's text files: ``NAME.node``, ``NAME.elem`` and, if there are regions, ``NAME.region``."""
 
 import re
 from pathlib import Path
@@ -16,12 +16,12 @@ REGION = "region"
 
 
 def nirfast_files(path: Path) -> dict[str, Path]:
-    """The files of a mesh by their suffixes, if any one of them is given, or what they have in common."""
+    """The files of a mesh by suffix, given the path of any one of them or their common stem."""
     stem = path.name[: -len(path.suffix)] if path.suffix.lower() in SUFFIXES else path.name
     wanted = {f"{stem}{suffix}".lower(): suffix for suffix in SUFFIXES}
     try:
         beside = sorted(path.parent.iterdir())
-    except (OSError, ValueError):  # a name may be none that a folder can have
+    except (OSError, ValueError):  # the name may be invalid for a folder
         return {}
     found = {wanted[file.name.lower()]: file for file in beside if file.name.lower() in wanted and is_file(file)}
     exact = {suffix: path.parent / f"{stem}{suffix}" for suffix in SUFFIXES}
@@ -37,7 +37,7 @@ def read_nirfast(files: dict[str, Path]) -> RawMesh:
     Raises
     ------
     InputError
-        If a file is missing, is no table of numbers, or does not go with the others.
+        If a file is missing, is no table of numbers, or does not match the others.
     """
     for suffix in SUFFIXES[:2]:
         if suffix not in files:
@@ -52,7 +52,7 @@ def read_nirfast(files: dict[str, Path]) -> RawMesh:
             "mark and three coordinates for each node, and four node numbers for each tetrahedron."
         )
     cells = elements[:, :4].astype(np.int64)
-    # NIRFAST counts from 1; some who write its files count from 0.
+    # NIRFAST counts from 1; some programs write its files counting from 0.
     cells -= 0 if (cells == 0).any() else 1
     cells[cells >= len(nodes)] = -1
     arrays: dict[str, list[FloatArray]] = {}
@@ -64,7 +64,7 @@ def read_nirfast(files: dict[str, Path]) -> RawMesh:
 
 
 def _table(path: Path) -> FloatArray:
-    """The numbers of a text file, a row for each line."""
+    """The numbers of a text file, one row per line."""
     text = path.read_text(encoding="utf-8", errors="replace")
     rows = [line for line in re.sub(r"[%#].*|,", " ", text).splitlines() if line.strip()]
     if not rows:
@@ -77,13 +77,13 @@ def _table(path: Path) -> FloatArray:
 
 
 def _regions(values: FloatArray, cells: IntArray, nodes: int) -> tuple[FloatArray, tuple[str, ...]]:
-    """The region of each tetrahedron, by those of tetrahedra or of nodes."""
+    """The region of each tetrahedron, from regions of tetrahedra or of nodes."""
     if len(values) == len(cells) != nodes:
         return values, ()
     if len(values) != nodes:
         raise InputError(f"there are {len(values):,} regions for {nodes:,} nodes and {len(cells):,} tetrahedra.")
     corners = np.sort(values[cells], axis=1)
-    # Of the sorted four the second or third is among the most frequent, whatever they are; of ties the lower one.
+    # The most frequent of four sorted values is always the second or the third; the lower one in ties.
     low, high = corners[:, 1], corners[:, 2]
     more = (corners == high[:, None]).sum(axis=1) > (corners == low[:, None]).sum(axis=1)
     mixed = int((corners[:, 0] != corners[:, 3]).sum())

@@ -1,4 +1,4 @@
-"""What a volume mesh file holds, before it is a mesh: nodes, cells by kind, and values of cells."""
+"""Contents of a volume mesh file before checks: nodes, cells by kind, and cell values."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,14 +9,14 @@ import numpy.typing as npt
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 
-# What the names of solid cells contain in meshio, and what these are called in messages.
+# Substrings of meshio's names of solid cells, and the names in messages.
 TETRAHEDRON = "tetra"
 SOLIDS = {"hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids", "polyhedron": "polyhedra"}
 
 
 @dataclass(frozen=True, eq=False)
 class RawMesh:
-    """Cells of a file.
+    """Nodes and cells of a file.
 
     Attributes
     ----------
@@ -26,11 +26,11 @@ class RawMesh:
     arrays : mapping of str to sequence of ndarray
         Values of the cells of each block, by name.
     names : mapping of str to mapping of int to str
-        What the values of an array are called, by the array's name.
+        Names of the values of an array, by the array's name.
     notes : tuple of str
-        What was decided in reading it.
+        Notes on decisions of the reader.
     sets : mapping of str to object
-        Named sets of cells, as meshio has them: their numbers in each block.
+        Named sets of cells in meshio's form: cell numbers in each block.
     """
 
     points: FloatArray
@@ -42,11 +42,11 @@ class RawMesh:
 
     @property
     def tetrahedra(self) -> list[int]:
-        """The blocks that hold tetrahedra, straight or curved."""
+        """The blocks of linear or curved tetrahedra."""
         return [i for i, (kind, cells) in enumerate(self.blocks) if TETRAHEDRON in kind.lower() and len(cells)]
 
     def corners(self) -> tuple[IntArray, tuple[str, ...]]:
-        """Corners of all tetrahedra, (m, 4), and a sentence on curved ones.
+        """Corners of all tetrahedra, (m, 4), and a note on curved ones.
 
         Raises
         ------

@@ -25,22 +25,22 @@ READERS: dict[str, Callable[[bytes], tuple[FloatArray, IntArray]]] = {
     ".ply": read_ply,
     ".off": read_off,
 }
-# Units whose ratio differs from 1 by less than this are one unit.
+# Units are equal if their ratio differs from 1 by less than this.
 UNIT_ROUNDING = 1e-9
 SUFFIXES = (*READERS, ".glb", ".gltf", ".3mf")
 
 
 def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, holes: Holes = "small") -> Surface:
-    """Read a closed triangle mesh from a file, check it, and mend what can be mended safely.
+    """Read a closed triangle mesh from a file, check it, and repair what can be repaired safely.
 
     Parameters
     ----------
     path : str or Path
         STL (text or binary), OBJ, PLY, OFF, GLB, GLTF or 3MF.
     unit : str
-        Unit of the coordinates once multiplied by `scale`: nm, um, mm, cm, m or in.
+        Unit of the coordinates after multiplication by `scale`: nm, um, mm, cm, m or in.
     scale : float
-        Factor on the file's coordinates.
+        Factor applied to the file's coordinates.
     holes : "small", "close" or "refuse"
         Which holes are capped: see `surface_from_arrays`.
 
@@ -74,7 +74,7 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
         points, faces = _load(path)
     except InputError:
         raise
-    except Exception as error:  # the readers raise whatever their parsing ran into
+    except Exception as error:  # a damaged file can make its reader raise anything
         beside = ", or a file that it names is not there" if path.suffix.lower() == ".gltf" else ""
         raise InputError(
             f"{path} is not a readable {path.suffix.lstrip('.').upper()} mesh{beside}; export it again."
@@ -85,7 +85,7 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
 
 
 def _other_unit(path: Path, unit: str) -> tuple[str, ...]:
-    """A sentence if a 3MF file says that it is in another unit than the one that it is read in."""
+    """A warning if a 3MF file declares another unit than the one that it is read in."""
     of_file, millimetres = unit_of_3mf(path)
     factor = millimetres / MILLIMETRES[unit]
     if abs(factor - 1.0) < UNIT_ROUNDING:

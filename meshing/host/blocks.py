@@ -1,4 +1,4 @@
-"""Work on long arrays in blocks that stay in the processor's cache, on all cores."""
+"""Process long arrays in cache-sized blocks on all cores."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from tetlux.meshing.arrays import IntArray
 
-# Fresh memory costs more than the arithmetic on it: blocks of this many rows are handed out again and again.
+# Rows per block. Fresh memory costs more than the arithmetic on it, and blocks of this size reuse memory.
 BLOCK = 8192
-# Keys that are sorted at once, unless that makes more parts than these: each part has to look at all keys.
+# Keys sorted at once, and the largest number of parts, since each part scans all keys.
 PART = 1 << 20
 MOST_PARTS = 8
 
@@ -35,11 +35,11 @@ def in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) ->
     at_once(work, [slice(start, min(start + size, count)) for start in range(0, count, size)])
 
 
-def grouped(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.int32]]:
-    """``numpy.unique(keys, return_inverse=True)``, some ten times quicker for many keys.
+def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.int32]]:
+    """``numpy.unique(keys, return_inverse=True)``, about ten times faster for many keys.
 
-    NumPy sorts numbers several times faster than it finds their order, so every key carries its own place in its
-    low digits through the sort.
+    NumPy sorts numbers several times faster than it finds their order, so every key is sorted with its index as
+    its low digits.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def grouped(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.N
         inside = keys >= limits[part]
         if part + 1 < parts:
             inside &= keys < limits[part + 1]
-        found[part] = _grouped_part(keys, np.flatnonzero(inside), limits[part])
+        found[part] = _group_part(keys, np.flatnonzero(inside), limits[part])
 
     in_blocks(sort_part, parts, 1)
     first = np.concatenate([[0], np.cumsum([len(unique) for unique, _, _ in found])])
@@ -78,10 +78,10 @@ def grouped(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.N
 _NOTHING = (np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros(0, np.int32))
 
 
-def _grouped_part(
+def _group_part(
     keys: npt.NDArray[np.uint64], places: IntArray, least: np.uint64
 ) -> tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]:
-    """Unique keys of those at `places`, the places in the order of their keys, and the rank of each."""
+    """The unique keys at `places`, the places in ascending order of keys, and the rank of each key."""
     if len(places) == 0:
         return _NOTHING
     key = keys[places] - least
@@ -105,20 +105,20 @@ def _grouped_part(
 
 
 def once(keys: npt.NDArray[np.uint64]) -> IntArray:
-    """Places (o,), ascending, of the keys (k,) that occur once."""
+    """Indices (o,), ascending, of the keys (k,) that occur once."""
     ordered = np.sort(keys)
     differs = ordered[1:] != ordered[:-1]
     alone = np.ones(len(keys), dtype=bool)
     alone[1:] &= differs
     alone[:-1] &= differs
     single = ordered[alone]
-    # Few keys occur once, so a table that knows only their hashes leaves few places to look them up from.
+    # Few keys occur once, so a table of their hashes excludes most indices before the binary search.
     table = np.zeros(1 << _HASH_BITS, dtype=bool)
-    table[_hashed(single)] = True
+    table[_hash(single)] = True
     maybe = np.empty(len(keys), dtype=bool)
 
     def mark(block: slice) -> None:
-        maybe[block] = table[_hashed(keys[block])]
+        maybe[block] = table[_hash(keys[block])]
 
     in_blocks(mark, len(keys), 16 * BLOCK)
     places = np.flatnonzero(maybe)
@@ -131,6 +131,6 @@ def once(keys: npt.NDArray[np.uint64]) -> IntArray:
 _HASH_BITS = 20
 
 
-def _hashed(keys: npt.NDArray[np.uint64]) -> IntArray:
+def _hash(keys: npt.NDArray[np.uint64]) -> IntArray:
     # Fibonacci hashing (Knuth, The Art of Computer Programming, vol. 3, 6.4).
     return (keys * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(64 - _HASH_BITS)).view(np.int64)

@@ -1,4 +1,4 @@
-"""Arithmetic on the corners of many tetrahedra, in blocks and coordinate by coordinate."""
+"""Vector arithmetic on the corners of many tetrahedra, in blocks, by coordinate."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray
     Parameters
     ----------
     work : callable
-        Gets a slice of ``range(m)`` and the corners there: (4, 3, b), corner, coordinate, tetrahedron.
+        Takes a slice of ``range(m)`` and its corners, (4, 3, b): corner, coordinate, tetrahedron.
     points : (n, 3) ndarray
     tetrahedra : (m, 4) ndarray
     """
@@ -35,3 +35,12 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:
     """Dot products (b,) of vectors (3, b)."""
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def face_normals(u: FloatArray, v: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Normals of the faces opposite corners 1, 2 and 3 of tetrahedra whose edges from corner 0 are u, v, w (3, b).
+
+    Each points into the tetrahedron and is twice as long as the area of its face; divided by six volumes it is the
+    gradient of the barycentric coordinate of its corner.
+    """
+    return cross(v, w), cross(w, u), cross(u, v)

@@ -1,4 +1,4 @@
-"""Other libraries say nothing to the user's terminal: what matters of it is said here in a sentence."""
+"""Keep other libraries' messages off the terminal; tetlux reports in its own sentences."""
 
 import contextlib
 import io
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Nothing is logged, warned or printed within, by any library or its child loggers."""
+    """Suppress logging, warnings and printing of all libraries in this context."""
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:

@@ -1,4 +1,4 @@
-"""Work that other processes do, each in a temporary folder, where it gets and leaves its files."""
+"""Run child processes, each in a temporary folder for its input and output files."""
 
 import shutil
 import subprocess
@@ -8,20 +8,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-# Seconds after which what is unfinished was left by a process that was killed.
+# Seconds after which unfinished files count as left by a killed process.
 ABANDONED = 86_400.0
 
 
 def abandoned(path: Path) -> bool:
-    """Whether a file or folder of a process that is at work would be newer than this one is."""
+    """Whether a file or folder is too old to belong to a running process."""
     return path.stat().st_mtime < time.time() - ABANDONED
 
 
 @contextmanager
 def scratch(kind: str) -> Iterator[Path]:
-    """A folder ``tetlux-<kind>-...`` where the system keeps temporary files, gone afterwards.
+    """A folder ``tetlux-<kind>-...`` among the system's temporary files, removed at exit.
 
-    What killed processes left of the same kind is removed after a day.
+    Folders of the same kind that killed processes left are removed after a day.
 
     Raises
     ------
@@ -38,12 +38,12 @@ def scratch(kind: str) -> Iterator[Path]:
 def run_child(
     command: Sequence[str], folder: Path, seconds: float, environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command in a folder; it ends with this call, however that ends.
+    """Run a command in a folder; it never outlives this call.
 
     Raises
     ------
     subprocess.TimeoutExpired
-        If it takes longer than so many seconds.
+        If it exceeds the time limit.
     OSError
         If it cannot be started.
     """
@@ -60,7 +60,7 @@ def run_child(
         try:
             output, messages = process.communicate(timeout=max(seconds, 0.0))
         except BaseException:
-            # subprocess.run would not wait for the end of what Ctrl-C makes it kill.
+            # subprocess.run kills the child on Ctrl-C without waiting for its end.
             process.kill()
             process.wait()
             raise

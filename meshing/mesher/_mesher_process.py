@@ -1,8 +1,8 @@
-"""What runs in the mesher's own process: pytetwild can crash, hang and write into its working directory.
+"""The script of the mesher's process: pytetwild can crash, hang and write into its working directory.
 
-It is run as a script without Python's site packages, and imports nothing of tetlux: starting up is a third of
-the time that a small body takes. Its argument is a JSON object: `paths`, where modules are; `pytetwild`, the
-folder of that package; `parent`, the process that it works for.
+It runs without Python's site packages and imports nothing of tetlux, since start-up takes a third of the time of a
+small body. Its argument is a JSON object: `paths`, the module paths; `pytetwild`, the folder of that package;
+`parent`, the id of the parent process.
 """
 
 import ctypes
@@ -23,7 +23,7 @@ def main() -> None:
     """Tetrahedralize ``input.npz`` of the working directory into ``output.npz``."""
     setting = json.loads(sys.argv[1])
     die_with(setting["parent"])
-    # Also without this script's own folder, whose modules have everyday names.
+    # This also drops the script's own folder, whose module names could shadow others.
     sys.path[:] = setting["paths"]
     import numpy as np  # noqa: PLC0415
 
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def die_with(parent: int) -> None:
-    """On Linux, be killed when the parent is: this process would go on for minutes."""
+    """On Linux, have this process killed when its parent dies; it could run on for minutes."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
@@ -51,9 +51,9 @@ def die_with(parent: int) -> None:
 
 
 def _without_package(folder: str) -> Callable[..., Any]:
-    """The function of pytetwild without its package's ``__init__``, which imports PyVista for .3 s.
+    """Import pytetwild's function without the package's ``__init__``, which takes .3 s to import PyVista.
 
-    Where that does not work (a Windows wheel finds its libraries there), the ordinary way.
+    Where that fails (``__init__`` of a Windows wheel locates its libraries), import the package as usual.
     """
     package = types.ModuleType("pytetwild")
     package.__path__ = [folder]

@@ -1,4 +1,4 @@
-"""Is a mesh the body of its surfaces? What is refused, and in which words."""
+"""Check that a mesh represents its surfaces."""
 
 import numpy as np
 
@@ -10,23 +10,23 @@ from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# A mesh whose boundary is farther from the surface than so many deviations has lost a part.
+# A mesh whose boundary is more than this many deviations from the surface has lost a part.
 LOST = 2.5
-# Places at which that is looked for: a lost part is larger than a triangle.
-LOOKS = 3_000
+# Sample points that look for a lost part, which is larger than a triangle.
+SAMPLES = 3_000
 
 
 class NotTheBodyError(RunError):
-    """The mesher's mesh is another body than the surface's; a closer one may not be."""
+    """The mesh does not represent the surface; one of a smaller deviation may."""
 
 
 def has_lost_a_part(mesh: TetMesh, shell: Shell) -> bool:
-    """Whether the mesh is so far from a surface somewhere that a part is missing."""
-    return surface_deviation(part_of(mesh, shell), shell.surface, LOOKS) > LOST * shell.deviation
+    """Whether the mesh is anywhere so far from a surface that a part must be missing."""
+    return surface_deviation(part_of(mesh, shell), shell.surface, SAMPLES) > LOST * shell.deviation
 
 
 def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:
-    """What a surface bounds of the mesh."""
+    """The part of the mesh inside a shell."""
     if 0 in shell.regions or not shell.regions:
         return mesh
     tetrahedra = mesh.tetrahedra[np.isin(mesh.regions, shell.regions)]
@@ -39,11 +39,10 @@ def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:
 
 
 def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
-    """Refuse a mesh that is not the body of the surface."""
-    # Boundary nodes are on the surface, but for those few that could not get there; chords cut through what is
-    # thin and round, by the deviation at most.
+    """Refuse a mesh that does not represent the surface."""
+    # Nearly all boundary nodes are on the surface; facets cut off thin round parts, by at most the deviation.
     slack = 0.02 + deviation * surface.area / surface.volume
-    # A surface that crosses itself counts what overlaps more than once, and the mesh is of the union.
+    # The volume of a surface that crosses itself counts overlaps repeatedly; the mesh is of their union.
     lowest = -0.9 if surface.overlaps else -slack
     for quantity, change in (
         ("volume", mesh.volume / surface.volume - 1.0),
@@ -54,12 +53,12 @@ def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
                 f"{surface.name}: the mesh's {quantity} is {change:+.1%} off the surface's; parts are thinner than "
                 f"{deviation:.3g} {surface.unit}: make them thicker, or leave them out."
             )
-    of_surface = bodies(len(surface.points), surface.faces)
-    # The first vertices of each body: a small one may be gone without a trace in the sums.
-    _, first = np.unique(of_surface, return_index=True)
+    body_of = bodies(len(surface.points), surface.faces)
+    # Sample one triangle per body, since the sums do not show that a small body is missing.
+    _, first = np.unique(body_of, return_index=True)
     vertices = surface.points[surface.faces[first]].reshape(-1, 3)
-    astray = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
-    if not surface.overlaps and (astray > LOST * deviation).any():
+    distances = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
+    if not surface.overlaps and (distances > LOST * deviation).any():
         raise NotTheBodyError(
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
             "others; leave it out, or make it larger."

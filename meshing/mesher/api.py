@@ -1,4 +1,4 @@
-"""From a closed surface to tetrahedra: pytetwild (fTetWild) behind a guard."""
+"""Mesh a closed surface with tetrahedra by pytetwild (fTetWild), with checks of its input and its result."""
 
 import importlib.util
 import math
@@ -20,13 +20,14 @@ from tetlux.meshing.mesher.shells import shells_of
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface.surface import Surface, body_sizes
-from tetlux.meshing.tets.mesh import TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import moved_to_surface
-from tetlux.meshing.tets.regions import tagged
+from tetlux.meshing.tets.tagging import tag_tetrahedra
 
-# Measured with what follows on 2 cores, from surface to mesh, without the cache. Seconds are of the quietest of four
-# runs; the rest is over ten. Volume is against the surface's; deviation is of the mesh whose boundary was moved back,
-# as a share of the diagonal.
+# Measured with the settings below on 2 cores, without the cache. Seconds are the least of four runs; the other columns
+# are ranges over ten. Volume is relative to the surface's; deviation is a share of the diagonal, measured after
+# boundary nodes were moved back onto the surface.
 #
 #   surface      faces    proxy    proxy / mesher / rest   tetrahedra   worst quality    volume   deviation
 #   sphere       5,120      466      .09 /  .31 / .03       2.5k        .28 - .29        -2.4 %     .005
@@ -35,27 +36,26 @@ from tetlux.meshing.tets.regions import tagged
 #   rocker-arm  20,088    1,272      .08 / 2.1  / .05       3.3 - 4.3k  .10 - .21        -1.1 %     .005 - .007
 #   nefertiti   99,938    1,548      .28 / 1.65 / .11       2.3 - 3.5k  .10 - .17        -1.5 %     .008 - .013
 #
-# It does not follow from tolerance or mean free path: boundary nodes are put back onto the surface, new ones are
-# put there, and what facets are still off is part of the error that is estimated. On spot, rocker-arm and nefertiti, 60
-# mean free paths across and at tolerances from .05 to .005, half to 2.5 times this deviation take the same time within
-# a fifth and end with as many nodes.
+# The deviation depends on neither the tolerance nor the mean free path: old and new boundary nodes are moved onto the
+# surface, and the error estimate includes the remaining distance of facets. On spot, rocker-arm and nefertiti, 60 mean
+# free paths across and at tolerances from .05 to .005, deviations from 0.5 to 2.5 times this one take the same time
+# within 20 % and end with as many nodes.
 #
-# What fTetWild's envelope gets of the deviation; the proxy gets the rest. Time goes with the proxy's triangles
-# and with the inverse of the envelope: from .45 to .7 it is the same within a fifth.
+# Share of the deviation for fTetWild's envelope; the rest is for the proxy. Time grows with the proxy's triangles and
+# with the inverse of the envelope; between .45 and .7 it is constant within 20 %.
 ENVELOPE = 0.55
-# Default edge length, as a share of the diagonal: at an eighth there are a fifth fewer tetrahedra, in as much time.
+# Default edge length, as a share of the diagonal. An eighth gives 20 % fewer tetrahedra in the same time.
 EDGE_LENGTH = 1.0 / 12.0
-# Worst quality of six runs of spot, rocker-arm and nefertiti, and the mesher's seconds: at 8 .13 and 1.4, 2.4, 2.0;
-# at 9 .12 and 1.5, 2.3, 1.9; at 10 .08 and 1.1, 1.8, 1.8. At 14 the worst was .03; at 30, which is three times
-# quicker than 10, .01.
+# Default stop energy. Worst quality in six runs of spot, rocker-arm and nefertiti, and the mesher's seconds for each:
+# 8: .13; 1.4, 2.4, 2.0. 9: .12; 1.5, 2.3, 1.9. 10: .08; 1.1, 1.8, 1.8. 14: .03. 30: .01, three times faster than 10.
 STOP_ENERGY = 9.5
-# Seconds after which the mesher is stopped, if nothing else is said: ten times what slow ones take.
+# Default seconds after which the mesher is stopped: ten times the time of slow bodies.
 TIME_LIMIT = 300.0
-# How much finer the second attempt is, if the first one's mesh is not the body of the surface.
+# Factor on the deviation in the second attempt, made if the first mesh does not match the surface.
 SECOND = 0.3
-# Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. Seconds of the mesher and tetrahedra
-# at .011, .0058 and .0029 (a plate 60 wide; 1, .5 and .25 thick): 2 and 2k, 5 and 8k, over 60 s; a needle of 100 widths
-# (.005) takes 2 s, one of 1000 (.0005) over 60.
+# Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. A plate 60 wide and 1, .5 or .25
+# thick (.011, .0058, .0029) takes the mesher 2, 5 and over 60 s, with 2k and 8k tetrahedra in the first two; a needle
+# 100 widths long (.005) takes 2 s, one of 1000 (.0005) over 60 s.
 THINNEST = 0.002
 NOT_INSTALLED = (
     "pytetwild, which fills surfaces with tetrahedra, is not installed, and pip has no wheel of it for Intel Macs; "
@@ -74,34 +74,33 @@ def tetrahedralize(
     time_limit: float = TIME_LIMIT,
     cache: bool | str | Path = True,
 ) -> TetMesh:
-    """Fill a closed surface with tetrahedra that fit the closed surfaces within.
+    """Mesh the inside of a closed surface with tetrahedra that conform to inner closed surfaces.
 
-    The surfaces are decimated within a measured distance, pytetwild fills that in a process of its own, and the
-    nodes on them are moved onto the given ones. Meshes are remembered.
+    The surfaces are decimated within a measured distance, pytetwild meshes the result in a separate process, and the
+    nodes on surfaces are moved onto the given ones. Meshes are cached on disk.
 
     Parameters
     ----------
     surface : Surface
     regions : sequence of Surface
-        Closed surfaces inside the body or inside each other, in any order; see `check_regions`. A tetrahedron is of
-        region i if the i-th of them, counted from 1, is the innermost that it lies in, and of region 0 otherwise.
+        Closed surfaces inside the body or inside each other, in any order; see `check_regions`. A tetrahedron is in
+        region i if the i-th surface, counted from 1, is the innermost around it, and in region 0 if none is.
     edge_length : float, optional
-        Wanted edge length, unit; a twelfth of the bounding box's diagonal if not given. Thin parts get
-        shorter edges where the shape needs them.
+        Target edge length, unit; a twelfth of the bounding box's diagonal if not given. Edges are shorter where
+        thin parts need it.
     deviation : float, optional
-        How far the mesher's boundary may stray from `surface` before its nodes are moved back, unit. If not
-        given, what follows from `epsilon`, or else a hundredth of the diagonal, and less for thin bodies. Inner
-        surfaces have less where their size or their region's thickness asks for it, and what is thinner than that
-        between two surfaces may be closed.
+        Largest distance of the mesher's boundary from `surface` before its nodes are moved back, unit. If not
+        given, it follows from `epsilon`, or else is a hundredth of the diagonal, and less for thin bodies. It is
+        smaller for small inner surfaces and thin regions. Gaps between surfaces that are thinner may be closed.
     epsilon : float, optional
-        fTetWild's share of that: the largest distance between the surface that it is given and its boundary,
-        as a share of the diagonal. 0.55 of `deviation` if not given.
+        fTetWild's envelope: the largest distance between its input surface and its boundary, as a share of the
+        diagonal; 0.55 of `deviation` if not given.
     stop_energy : float
         fTetWild's AMIPS energy at which a tetrahedron is good enough; 3 is a regular one.
     time_limit : float
         Seconds until the mesher is stopped; 300 if not given.
     cache : bool, str or Path
-        Whether meshes are looked up and kept in the user's cache directory, or another directory for them.
+        Whether to use the mesh cache in the user's cache directory, or another directory for it.
 
     Returns
     -------
@@ -113,11 +112,11 @@ def tetrahedralize(
         If `edge_length`, `deviation`, `epsilon`, `stop_energy` or `time_limit` is not positive, or an inner surface
         bounds no region of the body, see `check_regions`.
     RunError
-        If the mesher is not installed, crashes, takes too long, or returns something that is not this body.
+        If the mesher is not installed, crashes, exceeds the time limit, or returns a mesh of another body.
 
     Notes
     -----
-    fTetWild (Hu et al. 2020) is not deterministic: two runs differ in the last per cent of the nodes.
+    fTetWild (Hu et al. 2020) is not deterministic: the number of nodes varies by about a per cent between runs.
     """
     for name, value in (
         ("edge_length", edge_length),
@@ -135,7 +134,7 @@ def tetrahedralize(
     size = surface.diagonal
     wanted = EDGE_LENGTH * size if edge_length is None else edge_length
     if deviation is None:
-        # What a surface that crosses itself holds, and so how thick it is, nobody knows before it is meshed.
+        # The volume of a surface that crosses itself, and so its thickness, is unknown before it is meshed.
         thickness = math.inf if surface.overlaps else 2.0 * surface.volume / surface.area
         by_default = min(DEVIATION * size, DEVIATION_OF_THICKNESS * thickness)
         deviation = by_default if epsilon is None else epsilon * size / ENVELOPE
@@ -156,14 +155,14 @@ def tetrahedralize(
         known = remembered_mesh(key, directory, surface.unit)
         if known is not None:
             return known
-    mesh = _made(surface, wanted, deviation, envelope, stop_energy, time_limit, regions)
+    mesh = _mesh_body(surface, wanted, deviation, envelope, stop_energy, time_limit, regions)
     if directory is not None:
         remember_mesh(key, directory, mesh)
     return mesh
 
 
 def check_thickness(surface: Surface) -> None:
-    """Refuse a body that is too thin for the mesher to be done with it in minutes.
+    """Refuse a body that is so thin that the mesher would take minutes.
 
     Raises
     ------
@@ -178,7 +177,7 @@ def check_thickness(surface: Surface) -> None:
         )
 
 
-def _made(
+def _mesh_body(
     surface: Surface,
     edge_length: float,
     deviation: float,
@@ -187,12 +186,12 @@ def _made(
     time_limit: float,
     regions: Sequence[Surface] = (),
 ) -> TetMesh:
-    """A mesh that is the body of the surface; if the first one is not, a second one, closer to the surface."""
+    """Mesh the body; if the first mesh does not match the surface, mesh again within a smaller deviation."""
     end = time.monotonic() + time_limit
     shells = shells_of(surface, regions, deviation)
     if len(regions) > 0:
         envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells))
-    # Where two surfaces touch fTetWild forgets which way their triangles face, and then what is inside.
+    # Where two surfaces touch, fTetWild loses the orientation of their triangles, so its inside test fails.
     filtered = not any(shell.touching for shell in shells)
 
     def attempt(share: float) -> TetMesh:
@@ -201,7 +200,7 @@ def _made(
             for shell in shells
         ]
         seconds = end - time.monotonic()
-        mesh = _filled(
+        mesh = _fill(
             surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit, filtered
         )
         for shell in shells:
@@ -216,7 +215,7 @@ def _made(
     return attempt(SECOND) if lost else mesh
 
 
-def _filled(
+def _fill(
     surface: Surface,
     regions: Sequence[Surface],
     coarse: Sequence[Surface],
@@ -227,15 +226,15 @@ def _filled(
     time_limit: float,
     filtered: bool,
 ) -> TetMesh:
-    """Tetrahedra in proxies of the surfaces, their nodes there on the surfaces themselves."""
-    # Unit size, about the origin: fTetWild's tolerances are absolute in places.
+    """Mesh the proxies of the surfaces, and move the nodes on them onto the surfaces themselves."""
+    # Scaled to unit size about the origin, since some of fTetWild's tolerances are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     first = np.cumsum([0, *(len(each.points) for each in coarse)])
     points, tetrahedra = run_pytetwild(
         (np.concatenate([each.points for each in coarse]) - origin) / size,
         np.concatenate([each.faces + start for each, start in zip(coarse, first, strict=False)]),
         edge_length=edge_length / size,
-        # fTetWild measures by the diagonal of what it is given.
+        # fTetWild takes epsilon relative to the diagonal of its input.
         epsilon=envelope / coarse[0].diagonal,
         stop_energy=stop_energy,
         seconds=seconds,
@@ -244,15 +243,15 @@ def _filled(
         filtered=filtered,
     )
     points = points * size + origin
-    tags = tagged(points, tetrahedra, coarse[0], coarse[1:], envelope) if len(regions) > 0 else None
-    mesh = _cleaned(points, tetrahedra, surface, tags)
+    tags = tag_tetrahedra(points, tetrahedra, coarse[0], coarse[1:], envelope) if len(regions) > 0 else None
+    mesh = _clean(points, tetrahedra, surface, tags)
     return moved_to_surface(mesh, surface, regions)
 
 
-def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
-    """Positive tetrahedra only, without the crumbs that an envelope can leave, and without unused nodes.
+def _clean(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
+    """A mesh without flat tetrahedra, small debris, unused nodes and tetrahedra tagged as outside (-1).
 
-    Those that are tagged as outside are left out too.
+    Debris is what fTetWild's envelope can leave beside the body.
     """
     if tags is not None:
         tetrahedra, tags = tetrahedra[tags >= 0], tags[tags >= 0]
@@ -270,7 +269,7 @@ def _cleaned(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: I
 
 
 def _largest_debris(surface: Surface) -> float:
-    """The share of the volume below which a lump is debris: no body of the surface is, however small."""
+    """The share of the volume below which a separate lump is debris; smaller than every body of the surface."""
     if surface.overlaps:
         return DEBRIS
     volume, _ = body_sizes(surface.points, surface.faces, bodies(len(surface.points), surface.faces))

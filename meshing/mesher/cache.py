@@ -1,4 +1,4 @@
-"""Meshes remembered: files in the user's cache directory, named by all that shapes a mesh."""
+"""The mesh cache: files in the user's cache directory, keyed by a hash of surfaces and settings."""
 
 import contextlib
 import hashlib
@@ -15,16 +15,16 @@ from tetlux.meshing.host.scratch import abandoned
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# To be raised whenever the code makes other meshes of the same settings, or writes them otherwise.
+# Raise it when the code makes other meshes for the same settings, or writes them differently.
 FORMAT = 2
-# Bytes; the entries that were used longest ago go first.
+# Largest cache size, bytes; the least recently used entries are removed first.
 LIMIT = 1_000_000_000
 
 
 def cache_directory() -> Path | None:
-    """Where meshes are kept: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's place for caches.
+    """The directory of the mesh cache: ``$TETLUX_CACHE_DIR``, or else ``tetlux`` in the system's cache directory.
 
-    None if there is no such place: a container's user may have no home.
+    None if there is none, as for a container's user without a home.
     """
     own = os.environ.get("TETLUX_CACHE_DIR")
     if own:
@@ -41,7 +41,7 @@ def cache_directory() -> Path | None:
 
 
 def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: float | str) -> str:
-    """A name for the mesh that these settings make of a surface and those in it: a hash of all that."""
+    """The cache key of a mesh: a hash of its surfaces and settings."""
     surfaces = [surface, *regions]
     shapes = [[s.points.shape, s.faces.shape, s.crease_angle, s.overlaps, s.unit == surface.unit] for s in surfaces]
     digest = hashlib.blake2b(json.dumps([FORMAT, shapes, sorted(settings.items())]).encode(), digest_size=20)
@@ -52,17 +52,17 @@ def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: floa
 
 
 def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
-    """The mesh of that name, or None if there is none, or none that can be used."""
+    """The cached mesh of a key, or None if there is none or its file is unusable."""
     path = _entry(key, directory)
     try:
-        # Opened here: np.load leaves a file that is cut off open.
+        # Opened here, since np.load does not close a truncated file.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             points, tetrahedra, regions = data["points"], data["tetrahedra"], data["regions"]
             types = points.dtype, tetrahedra.dtype, regions.dtype
             if str(data["key"]) != key or types != (np.float64, np.int64, np.int64) or regions.min() < 0:
                 return None
         mesh = TetMesh(points, tetrahedra, unit, regions)
-    except Exception:  # whatever a foreign, cut or damaged file can make its reader raise: it is a miss
+    except Exception:  # a foreign, truncated or damaged file is a cache miss, whatever its reader raises
         return None
     with contextlib.suppress(OSError):
         os.utime(path)
@@ -70,13 +70,13 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
 
 
 def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
-    """Keep a mesh under that name; do nothing where files cannot be written."""
+    """Cache a mesh under a key; do nothing if files cannot be written."""
     with contextlib.suppress(OSError, MemoryError):
         directory.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=directory, suffix=".part")
         part = Path(name)
         try:
-            # A full disk may show only as the file is closed.
+            # A full disk may be reported only when the file is closed.
             with os.fdopen(handle, "wb") as file:
                 np.savez(
                     file,
@@ -85,7 +85,7 @@ def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
                     regions=mesh.regions,
                     key=np.array(key),
                 )
-            # Other processes see the whole entry or none.
+            # An atomic rename, so that other processes see the whole entry or none.
             part.replace(_entry(key, directory))
         except BaseException:
             part.unlink()
@@ -98,7 +98,7 @@ def _entry(key: str, directory: Path) -> Path:
 
 
 def _make_room(directory: Path) -> None:
-    """Remove what was used longest ago beyond the limit, and what dead processes left half-written."""
+    """Remove the least recently used entries beyond the limit, and files that dead processes left unfinished."""
     found = []
     for path in directory.iterdir():
         with contextlib.suppress(OSError):  # another process may be removing it too

@@ -1,4 +1,4 @@
-"""pytetwild in a process of its own, with a time limit: it can crash, hang and take all memory."""
+"""Run pytetwild in a separate process with a time limit, since it can crash, hang or exhaust memory."""
 
 import importlib.util
 import json
@@ -13,7 +13,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
 
-# The command that fills input.npz of its working directory; -S, since it is told where modules are.
+# Meshes input.npz of its working directory. With -S (no site packages), since module paths are passed to it.
 MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
 MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
 
@@ -30,7 +30,7 @@ def run_pytetwild(
     name: str,
     filtered: bool = True,
 ) -> tuple[FloatArray, IntArray]:
-    """Points and tetrahedra; if not filtered, also those round the body."""
+    """Mesh a surface: points and tetrahedra; if not filtered, including tetrahedra outside the body."""
     try:
         with scratch("mesher") as folder:
             np.savez(
@@ -42,12 +42,12 @@ def run_pytetwild(
                 stop_energy=stop_energy,
                 filtered=filtered,
             )
-            # NumPy starts a thread a core for its linear algebra, which nobody here asks for.
+            # The process needs no linear algebra, and so none of the threads that NumPy would start for it.
             environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-            done = run_child([*MESHER, _whereabouts()], folder, seconds, environment)
+            done = run_child([*MESHER, _module_paths()], folder, seconds, environment)
             result = folder / "output.npz"
             if done.returncode != 0 or not result.exists():
-                raise _failed(name, done)
+                raise _failure(name, done)
             with np.load(result) as data:
                 return data["points"].astype(np.float64), data["tetrahedra"].astype(np.int64)
     except subprocess.TimeoutExpired as error:
@@ -59,8 +59,8 @@ def run_pytetwild(
         raise RunError(f"{name}: the mesher could not be run ({error.strerror or error}); {MAKE_ROOM}") from error
 
 
-def _failed(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
-    """What to say of a mesher that ended without a mesh."""
+def _failure(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
+    """The error for a mesher that ended without a mesh."""
     last = (done.stderr.strip().splitlines() or ["no message"])[-1]
     cause = f"signal {-done.returncode}" if done.returncode < 0 else last
     remedy = "repair or simplify the surface in a mesh editor and try again."
@@ -71,11 +71,11 @@ def _failed(name: str, done: subprocess.CompletedProcess[str]) -> RunError:
     return RunError(f"{name}: the mesher failed ({cause}); {remedy}")
 
 
-def _whereabouts() -> str:
-    """What `_mesher_process` is told: where modules are (an editable install may know it by a hook only)."""
+def _module_paths() -> str:
+    """Module paths for `_mesher_process`, as JSON. An editable install may know them by an import hook only."""
     spec = importlib.util.find_spec("pytetwild")
     folder = (spec.submodule_search_locations or [""])[0] if spec else ""
     places = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
-    # Relative ones are relative to another working directory.
+    # Drop relative paths: the process has another working directory.
     paths = [place for place in dict.fromkeys(places) if Path(place).is_absolute()]
     return json.dumps({"paths": paths, "pytetwild": folder, "parent": os.getpid()})

@@ -1,13 +1,13 @@
-"""How far two surfaces are from each other, and a mesh's boundary from the surface it stands for."""
+"""Sampled distances between two surfaces, and between a mesh's boundary and a surface."""
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, spread_indices
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Places of a surface at which the distance to another is measured, at 4 µs each. Surfaces that have more
-# vertices than this are far finer than what they are compared with, and a part of them tells as much.
+# Sample points per surface, at 4 µs each. A surface with more vertices is far finer than the other one, so a subset of
+# its vertices gives the same distance.
 SAMPLES = 6_000
 
 
@@ -18,8 +18,8 @@ def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) 
     ----------
     first, second : Surface
     samples : int
-        How many places of each surface are looked at, at most: vertices first, then the middles of edges and
-        of triangles; evenly chosen where there are more.
+        Largest number of sample points per surface: vertices first, then midpoints of edges and centroids of
+        triangles, evenly chosen.
     """
     return max(_farthest(first, second, samples), _farthest(second, first, samples))
 
@@ -30,19 +30,12 @@ def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = SAMPLES) -
 
 
 def _farthest(source: Surface, target: Surface, samples: int) -> float:
-    queries = _places(source, samples)
+    queries = _sample_points(source, samples)
     return float(np.linalg.norm(target.closest(queries)[0] - queries, axis=1).max())
 
 
-def _places(surface: Surface, count: int) -> FloatArray:
+def _sample_points(surface: Surface, count: int) -> FloatArray:
     corners = surface.points[surface.faces]
     between = np.vstack([corners.mean(axis=1), *(0.5 * (corners[:, i] + corners[:, i - 1]) for i in range(3))])
-    vertices = _evenly(surface.points, count)
-    return np.vstack([vertices, _evenly(between, count - len(vertices))])
-
-
-def _evenly(points: FloatArray, count: int) -> FloatArray:
-    """`count` of the points at even steps of their numbers, or all if there are no more."""
-    if len(points) <= count:
-        return points
-    return points[np.arange(count) * len(points) // max(count, 1)]
+    vertices = surface.points[spread_indices(len(surface.points), count)]
+    return np.vstack([vertices, between[spread_indices(len(between), count - len(vertices))]])

@@ -1,4 +1,4 @@
-"""A coarser surface within a measured distance: fTetWild's time goes with the triangles it is given."""
+"""Decimate a surface within a measured distance, since fTetWild's time grows with its input triangles."""
 
 from dataclasses import replace
 
@@ -19,22 +19,22 @@ TRIANGLES = 6.0
 # fast-simplification's `agg`: at its default, 7, it collapses in haste and needs twice the triangles for the
 # same distance; at 3 and below it stops short of the count wanted.
 HASTE = 4.0
-# Decimations that are measured, and counts that are tried for each until one is closed and manifold: quadric
-# decimation joins sheets now and then, and a few triangles more or less do not.
+# Decimations that are measured, and triangle counts tried for each until one is closed and manifold: quadric
+# decimation occasionally merges sheets, and a slightly different count does not.
 TRIES = 6
 COUNTS = 4
-# Places at which a try is measured first; one that is near there is measured at more.
+# Sample points of the first measurement; a decimation that passes it is measured at more.
 ROUGHLY = 1_500
-# A proxy that uses less than this share of the deviation has more triangles than it needs.
+# A proxy with less than this share of the allowed deviation has more triangles than needed.
 GOOD_USE = 0.6
-# A part of no more triangles, joined to the rest by an edge of four, is a crumb.
+# A part of at most this many triangles, attached by an edge of four triangles, is removed as a flap.
 CRUMB = 8
-# Below this there is nothing to gain.
+# Surfaces of fewer triangles are not decimated.
 FEWEST = 300
 
 
 def proxy(surface: Surface, deviation: float) -> Surface:
-    """Decimate a surface, no farther than `deviation` from it anywhere, in both directions.
+    """Decimate a surface within a two-sided distance of `deviation`.
 
     Parameters
     ----------
@@ -62,22 +62,22 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     apart = pull_apart(surface.points, surface.faces)
     if apart is None or len(apart[0]) == len(surface.points):
         return _decimate(surface, deviation)
-    return _together([_decimate(part, deviation) for part in _parts(surface, *apart)], surface)
+    return _merge([_decimate(part, deviation) for part in _parts(surface, *apart)], surface)
 
 
 def _parts(surface: Surface, points: FloatArray, faces: IntArray) -> list[Surface]:
-    """The connected parts of a surface that was pulled apart, without walls between bodies, which bound nothing."""
+    """The connected parts of a surface separated at pinches, without walls between bodies, which bound no volume."""
     body = bodies(len(points), faces)
     parts = []
     for number in range(int(body.max()) + 1):
         own = compact(points, faces[body == number])
         if abs(signed_volume(*own)) > FLAT * surface.diagonal * triangle_areas(*own)[1].sum():
-            # It may touch itself, and its proxy cross itself there.
+            # Where a surface touches itself, its proxy may cross itself.
             parts.append(replace(surface, points=own[0], faces=own[1], overlaps=True))
     return parts
 
 
-def _together(parts: list[Surface], surface: Surface) -> Surface:
+def _merge(parts: list[Surface], surface: Surface) -> Surface:
     first = np.cumsum([0, *(len(part.points) for part in parts)])
     return replace(
         surface,
@@ -89,15 +89,15 @@ def _together(parts: list[Surface], surface: Surface) -> Surface:
 
 
 def _decimate(surface: Surface, deviation: float) -> Surface:
-    """A surface of two triangles at each edge, decimated; itself if nothing coarser is near and sound."""
+    """Decimate a manifold surface; the surface itself if no coarser one is close enough and sound."""
     if len(surface.faces) <= FEWEST:
         return surface
     wanted = min(TRIANGLES * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
-    # Unit size, about the origin: fast-simplification's thresholds are absolute.
+    # Scaled to unit size about the origin, since fast-simplification's thresholds are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     fine: tuple[FloatArray, IntArray] = (surface.points - origin) / size, surface.faces
-    # Most of the work once, and not once for each try.
-    base = _decimated(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
+    # Do most of the decimation once instead of once per attempt.
+    base = _decimate_to(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
     best = surface
     for _ in range(TRIES):
         count = int(max(wanted, FEWEST))
@@ -116,7 +116,7 @@ def _decimate(surface: Surface, deviation: float) -> Surface:
             best = coarse
             if distance > GOOD_USE * deviation or count <= FEWEST:
                 break
-        # The distance goes with the inverse of the count: that of a chord from its arc goes with the edge squared.
+        # The distance of a chord from its arc grows with the edge squared, and so with the inverse of the count.
         wanted = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
     return best
 
@@ -124,13 +124,13 @@ def _decimate(surface: Surface, deviation: float) -> Surface:
 def _sound(
     surface: Surface, base: tuple[FloatArray, IntArray], count: int, origin: FloatArray, size: float
 ) -> Surface | None:
-    """A decimation to about `count` triangles that bounds as many bodies as the surface, if there is one."""
+    """Decimate to about `count` triangles with as many bodies as the surface; None if no attempt has."""
     wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
     for attempt in range(COUNTS):
         target = int(count * (1.0 + 0.04 * attempt))
         if target >= len(base[1]):
             return None
-        p, f = _decimated(*base, target)
+        p, f = _decimate_to(*base, target)
         if len(f) < 4 or not _is_manifold(f):
             continue
         body = bodies(len(p), f)
@@ -142,7 +142,7 @@ def _sound(
     return None
 
 
-def _decimated(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
+def _decimate_to(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
     from fast_simplification import simplify  # noqa: PLC0415
 
     points, faces = simplify(points, faces.astype(np.int32), target_count=count, agg=HASTE)
@@ -150,9 +150,9 @@ def _decimated(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatAr
 
 
 def _without_flaps(faces: IntArray) -> IntArray:
-    """Without what quadric decimation leaves of thin places: a few triangles that hang on the rest by edges of four.
+    """Remove flaps that quadric decimation leaves at thin places: a few triangles attached by edges of four triangles.
 
-    Most are two, back to back; some are a tetrahedron.
+    Most are two triangles back to back; some are a tetrahedron.
     """
     from scipy.sparse import coo_matrix  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
@@ -168,6 +168,6 @@ def _without_flaps(faces: IntArray) -> IntArray:
 
 
 def _is_manifold(faces: IntArray) -> bool:
-    """Whether two triangles meet at each edge, each walking it its own way."""
+    """Whether two triangles of opposite direction meet at each edge."""
     edges = Edges(faces)
     return bool((edges.triangles == 2).all() and (edges.balance == 0).all())

@@ -1,7 +1,7 @@
-"""A cap over a hole: a triangulated rim, refined to the rim's own density and stretched like a membrane.
+"""Cap a hole: triangulate its rim, refine to the density of the rim, and relax the cap like a membrane.
 
-Liepa, Filling holes in meshes, SGP 2003; with the harmonic surface in place of his thin plate, since that stays within
-the convex hull of the rim: a flat rim gets a flat cap.
+Liepa, Filling holes in meshes, SGP 2003, with a harmonic surface in place of his thin plate. It stays within the convex
+hull of the rim, so the cap of a flat rim is flat.
 """
 
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.repair.merge import without_collapsed
 from tetlux.meshing.repair.topology import Edges
 
-# Longer rims are triangulated over every second, third, ... vertex first: time goes with the cube (.3 s).
+# Longer rims are first triangulated over every k-th vertex, since time grows with the cube (.3 s at this length).
 LONGEST_RIM = 300
-# Weight of squared sides beside area: of the triangulations of a flat rim, which have one area, it picks a compact one.
+# Weight of squared sides relative to area. All triangulations of a flat rim have one area; this prefers compact ones.
 COMPACT = 1e-3
-# A triangle is split until its sides are this many times as long as the rim's edges (Liepa's alpha).
+# Triangles are split until their sides are this many rim edges long (Liepa's alpha).
 DENSITY = 2.0
-# Rounds of splitting and flipping: each halves the lengths at least.
+# Rounds of splitting and flipping; each at least halves the lengths.
 ROUNDS = 12
-# Triangles of one cap. A rim of n edges needs about n squared / 10.
+# Largest number of triangles of one cap. A rim of n edges needs about n squared / 10.
 MOST = 20_000
-# What is gained by turning over the edge a-b of triangles abc and bad, (e,), from the corners (e, 3).
+# Gain (e,) of flipping the edge a-b of triangles abc and bad, from their corners (e, 3).
 Gain = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
 
@@ -33,7 +33,7 @@ def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, Int
     ----------
     points : (n, 3) ndarray
     loop : (k,) ndarray
-        The vertices of the rim, as the triangles along it walk them.
+        The vertices of the rim, in the direction of the triangles along it.
     first : int
         The number of the first new vertex.
 
@@ -42,19 +42,19 @@ def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, Int
     added : (a, 3) ndarray
         New vertices.
     faces : (f, 3) ndarray
-        Turned as the triangles along the rim.
+        Oriented like the triangles along the rim.
     """
     faces = triangulate_polygon(points[loop])[:, ::-1]
-    # A loop that joins rims names the ends of its bridge twice: these are one vertex, and the bridge is an inner edge.
+    # A loop through several rims contains the ends of its bridge twice. Merged, the bridge is an inner edge.
     names, place = np.unique(loop, return_inverse=True)
     faces, rim = without_collapsed(place.reshape(-1)[faces])[0], points[names]
-    inner, faces = _refined(rim, _spacing(points, loop, names), faces) if len(loop) > 4 else (rim[:0], faces)
+    inner, faces = _refine(rim, _spacing(points, loop, names), faces) if len(loop) > 4 else (rim[:0], faces)
     inner = _membrane(rim, inner, faces)
     return inner, np.concatenate([names, first + np.arange(len(inner))])[faces]
 
 
 def _spacing(points: FloatArray, loop: IntArray, names: IntArray) -> FloatArray:
-    """How long the edges of the rims are about each of the vertices `names` (r,), bridges left out."""
+    """Mean length of the rim edges at each of the vertices `names` (r,), without bridges."""
     following = np.roll(loop, -1)
     bridge = np.isin(loop * len(points) + following, following * len(points) + loop)
     start, end = np.searchsorted(names, loop[~bridge]), np.searchsorted(names, following[~bridge])
@@ -64,7 +64,7 @@ def _spacing(points: FloatArray, loop: IntArray, names: IntArray) -> FloatArray:
 
 
 def triangulate_polygon(corners: FloatArray) -> IntArray:
-    """Triangles (k - 2, 3) of a polygon in space (k, 3), turned as it is: those of least area."""
+    """The triangulation (k - 2, 3) of least area of a polygon in space (k, 3), in its orientation."""
     count = len(corners)
     if count <= LONGEST_RIM:
         return _least_area(corners)
@@ -75,16 +75,16 @@ def triangulate_polygon(corners: FloatArray) -> IntArray:
             chain = np.arange(start, end + 1) % count
             parts.append(chain[_least_area(corners[chain])])
     faces = np.vstack(parts)
-    # Where the rim is hollow a chain's triangles are folded onto the others; flips unfold them.
+    # Where the rim is concave, triangles of a chain overlap others; flips unfold them.
     for _ in range(ROUNDS):
-        faces, flips = _flipped(corners, faces, _area_saved)
+        faces, flips = _flip(corners, faces, _area_saved)
         if not flips:
             break
     return faces
 
 
 def _least_area(corners: FloatArray) -> IntArray:
-    """By dynamic programming over chains of the rim (Barequet & Sharir 1995), all chains of one length at a time."""
+    """Triangulate by dynamic programming (Barequet & Sharir 1995) over all chains of one length at a time."""
     count = len(corners)
     if count == 3:
         return np.arange(3).reshape(1, 3)
@@ -96,7 +96,7 @@ def _least_area(corners: FloatArray) -> IntArray:
         k = i + np.arange(1, gap)
         j = i + gap
         a, b, c = squares[i, k], squares[k, j], squares[i, j]
-        # Heron, by squares of sides: cross products take three times as long.
+        # Heron's formula in squared sides; cross products take three times as long.
         area = 0.25 * np.sqrt(np.maximum(4.0 * a * b - (a + b - c) ** 2, 0.0))
         weight = best[i, k] + best[k, j] + area + COMPACT * (a + b + c)
         least = weight.argmin(axis=1)
@@ -113,8 +113,8 @@ def _least_area(corners: FloatArray) -> IntArray:
     return np.array(faces, dtype=np.int64)
 
 
-def _refined(rim: FloatArray, size: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """New vertices within, as dense as those of the rim beside them, and the triangles of rim and new ones."""
+def _refine(rim: FloatArray, size: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Insert vertices as dense as the nearby rim; return them and the triangles of all vertices."""
     points = rim
     for _ in range(ROUNDS):
         corners, wanted = points[faces], size[faces]
@@ -129,14 +129,14 @@ def _refined(rim: FloatArray, size: FloatArray, faces: IntArray) -> tuple[FloatA
         faces = np.vstack([faces[~large], *pieces])
         points, size = np.vstack([points, middle[large]]), np.concatenate([size, wanted[large].mean(axis=1)])
         for _ in range(ROUNDS):
-            faces, flips = _flipped(points, faces, _angles_beyond)
+            faces, flips = _flip(points, faces, _angles_beyond)
             if not flips:
                 break
     return points[len(rim) :], faces
 
 
-def _flipped(points: FloatArray, faces: IntArray, gain: Gain) -> tuple[IntArray, int]:
-    """Inner edges a-b between triangles with apexes c and d, made edges c-d where that gains; no two of a triangle."""
+def _flip(points: FloatArray, faces: IntArray, gain: Gain) -> tuple[IntArray, int]:
+    """Flip inner edges where that gains, at most one per triangle; return triangles and the number of flips."""
     edges = Edges(faces)
     count = len(faces)
     inner = edges.sides((edges.triangles == 2) & (edges.balance == 0))
@@ -165,7 +165,7 @@ def _flipped(points: FloatArray, faces: IntArray, gain: Gain) -> tuple[IntArray,
 
 
 def _angles_beyond(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """By how much the angles at c and d exceed two right ones together: the Delaunay criterion."""
+    """The sum of the angles at c and d minus pi: positive where the Delaunay criterion is violated."""
 
     def angle(apex: FloatArray) -> FloatArray:
         u, v = a - apex, b - apex
@@ -175,7 +175,7 @@ def _angles_beyond(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -
 
 
 def _area_saved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> FloatArray:
-    """How much less area two triangles have that were folded onto each other."""
+    """Area saved by flipping two triangles that overlap each other."""
 
     def area(p: FloatArray, q: FloatArray, r: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.norm(np.cross(q - p, r - p), axis=1))
@@ -185,7 +185,7 @@ def _area_saved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> F
 
 
 def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:
-    """Inner vertices, each in the middle of its neighbours, weighted by the inverse of their distances."""
+    """Move each inner vertex to the mean of its neighbours, weighted by their inverse distances."""
     if len(inner) == 0:
         return inner
     from scipy.sparse import coo_matrix  # noqa: PLC0415
@@ -197,7 +197,7 @@ def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray
     length = np.linalg.norm(points[sides[:, 0]] - points[sides[:, 1]], axis=1)
     weight = 1.0 / np.maximum(length, 1e-12 * length.max())
     rows, columns = np.concatenate([sides, sides[:, ::-1]]).T
-    joined = coo_matrix((np.tile(weight, 2), (rows, columns)), shape=(count, count)).tocsr()[fixed:]
-    degree = np.asarray(joined.sum(axis=1)).ravel()
+    links = coo_matrix((np.tile(weight, 2), (rows, columns)), shape=(count, count)).tocsr()[fixed:]
+    degree = np.asarray(links.sum(axis=1)).ravel()
     system = coo_matrix((degree, (np.arange(len(inner)), np.arange(len(inner)))), shape=(len(inner),) * 2).tocsc()
-    return np.asarray(spsolve(system - joined[:, fixed:].tocsc(), joined[:, :fixed] @ rim)).reshape(-1, 3)
+    return np.asarray(spsolve(system - links[:, fixed:].tocsc(), links[:, :fixed] @ rim)).reshape(-1, 3)

@@ -1,14 +1,14 @@
-"""Where does a closed surface cross itself? Counted, for a warning."""
+"""Count the self-intersections of a closed surface."""
 
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 
-# An edge whose end is this share of its length from a triangle touches it and does not pierce it.
+# An edge that ends within this share of its length of a triangle touches it and does not pierce it.
 TOUCH = 1e-6
-# Pairs of triangles whose boxes overlap that are looked at: of each triangle, and besides. An even surface has ten of
-# each; needles side by side, such as ten thousand that meet in one vertex, have as many as their number squared.
+# Largest number of pairs with overlapping boxes that are tested: per triangle, plus a constant. A surface of even
+# triangles has ten pairs per triangle; n needles that meet in one vertex have n squared.
 PAIRS = (30, 40_000_000)
 
 
@@ -24,7 +24,7 @@ def count_self_intersections(points: FloatArray, faces: IntArray) -> int | None:
     Returns
     -------
     int or None
-        None if there are too many triangles side by side for all to be looked at, and none was found among the first.
+        None if there are too many pairs to test, and the tested ones do not intersect.
     """
     left = PAIRS[0] * len(faces) + PAIRS[1]
     corners = points[faces]
@@ -40,20 +40,20 @@ def count_self_intersections(points: FloatArray, faces: IntArray) -> int | None:
         for a in faces.T:
             for b in faces.T:
                 shared += a[i] == b[j]
-        # Neighbours overlap as boxes, and round a flat fan they meet at their vertex only.
+        # The boxes of neighbours always overlap, but triangles of a flat fan meet only at their vertex.
         suspect = (shared == 0) | ((shared == 1) & folded[i] & folded[j])
         first, second = i[suspect], j[suspect]
         for face, other in ((first, second), (second, first)):
             side = np.einsum("ij,ikj->ik", normals[face], corners[other]) - heights[face][:, None]
             for a, b in ((0, 1), (1, 2), (2, 0)):
                 start, end = faces[other, a], faces[other, b]
-                # Of the two triangles at an edge one walks it up the vertex numbers: once is enough.
+                # Each edge is tested once: from the triangle that traverses it in ascending order of vertices.
                 crosses = (start < end) & (side[:, a] * side[:, b] < 0)
                 target, start, end = face[crosses], start[crosses], end[crosses]
                 apart = (faces[target] != start[:, None]).all(axis=1) & (faces[target] != end[:, None]).all(axis=1)
                 target, start, end = target[apart], points[start[apart]], points[end[apart]]
                 t, _ = cross_segments(start, end - start, corners[target], slack=1e-9)
-                # An edge that ends on a triangle touches it; one that passes through its rim crosses the surface.
+                # An edge that ends on a triangle only touches it; one that passes through its rim crosses the surface.
                 pierced[target[(t > TOUCH) & (t < 1.0 - TOUCH)]] = True
     return int(pierced.sum())
 

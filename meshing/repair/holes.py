@@ -1,27 +1,28 @@
-"""Holes of a surface: which are closed, which are refused, and with what words."""
+"""Close the holes of a surface, or refuse it."""
 
 from typing import Literal
 
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.describe import place_words
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.caps import cap
 from tetlux.meshing.repair.rims import join_nested_rims
 from tetlux.meshing.repair.topology import Edges, boundary_loops
-from tetlux.meshing.surface.surface import place_words, triangle_areas
+from tetlux.meshing.surface.surface import triangle_areas
 
 Holes = Literal["small", "close", "refuse"]
-# A hole wider than this share of the diagonal is a missing part, and closing it would invent a shape.
+# A hole wider than this share of the diagonal is a missing part; closing it would invent a shape.
 LARGEST_HOLE = 0.05
-# A wider one is closed all the same if its cap is smaller than this share of the diagonal's square: a slit.
+# A wider hole is still closed if its cap is below this share of the squared diagonal: a slit.
 SLIT = 1e-4
-# Triangles do not join if more edges than both of these belong to one triangle only: in all, and per triangle.
+# A surface is unconnected triangles if more edges than this belong to one triangle only: in all, and per triangle.
 MOST_RIMS = (300, 0.25)
-# Unless they form rims of this many edges on average, as those of a tube of long triangles do.
+# Unless these edges form rims of this many edges on average, as at the ends of a tube of long triangles.
 LONG_RIM = 12
-# Caps that are described one by one.
+# Caps that a message describes one by one.
 DESCRIBED = 5
 
 
@@ -34,7 +35,7 @@ def close_holes(
     repairs: list[str],
     warnings: list[str],
 ) -> tuple[FloatArray, IntArray]:
-    """Cap holes, small ones or all, and say so.
+    """Cap small holes or all, and report each in `repairs`.
 
     Parameters
     ----------
@@ -43,9 +44,9 @@ def close_holes(
     name, unit : str
         Used in messages.
     holes : "small", "close" or "refuse"
-        Which holes are capped: those that leave no choice (narrow ones, slits, those of three edges), all, or none.
+        Which holes are capped: small ones (narrow ones, slits, those of three edges), all, or none.
     repairs, warnings : list of str
-        Sentences are added to them.
+        Sentences are appended.
 
     Returns
     -------
@@ -58,7 +59,7 @@ def close_holes(
     """
     edges = Edges(faces)
     loops = boundary_loops(edges)
-    _check_joined(edges, loops, len(faces), name)
+    _check_connected(edges, loops, len(faces), name)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     small = [_is_small(points[loop], diagonal) for loop in loops]
     if holes == "refuse" and loops:
@@ -116,7 +117,7 @@ def check_closed(faces: IntArray, name: str) -> None:
         )
 
 
-def _check_joined(edges: Edges, loops: list[IntArray], count: int, name: str) -> None:
+def _check_connected(edges: Edges, loops: list[IntArray], count: int, name: str) -> None:
     rims = int((edges.triangles == 1).sum())
     if rims > max(MOST_RIMS[0], MOST_RIMS[1] * count) and rims < LONG_RIM * len(loops):
         raise InputError(
@@ -126,7 +127,7 @@ def _check_joined(edges: Edges, loops: list[IntArray], count: int, name: str) ->
 
 
 def _is_small(rim: FloatArray, diagonal: float) -> bool:
-    """Whether closing a hole leaves no choice: narrow or of three edges."""
+    """Whether a hole is narrow or has three edges, so that its cap is nearly unique."""
     if len(rim) == 3 or np.linalg.norm(np.ptp(rim, axis=0)) <= LARGEST_HOLE * diagonal:
         return True
     spokes = rim - rim.mean(axis=0)
@@ -135,7 +136,7 @@ def _is_small(rim: FloatArray, diagonal: float) -> bool:
 
 
 def _largest(name: str, points: FloatArray, loops: list[IntArray]) -> str:
-    """The first half of a refusal: how many edges and how wide the widest hole is, and where."""
+    """The first half of a refusal: edges, width and position of the widest hole."""
     widths = [float(np.linalg.norm(np.ptp(points[loop], axis=0))) for loop in loops]
     widest = int(np.argmax(widths))
     loop = loops[widest]
@@ -147,7 +148,7 @@ def _largest(name: str, points: FloatArray, loops: list[IntArray]) -> str:
 
 
 def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
-    """What was capped: number, area and place of each, the largest first."""
+    """A sentence with the number of caps, and the area and position of each, the largest first."""
     order = np.argsort(areas)[::-1]
     each = [f"{areas[i]:.4g} {unit}² around {places[i]}" for i in order[:DESCRIBED]]
     more = f" and {len(areas) - DESCRIBED} smaller ones" if len(areas) > DESCRIBED else ""
@@ -155,5 +156,5 @@ def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
 
 
 def _middle(points: FloatArray, loop: IntArray) -> str:
-    """Where a hole is."""
+    """The centre of a rim, as text."""
     return place_words(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))

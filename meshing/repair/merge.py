@@ -1,4 +1,4 @@
-"""Corners that are one, and triangles that are given more than once."""
+"""Merge coincident vertices and remove duplicate triangles."""
 
 import numpy as np
 
@@ -6,16 +6,16 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.repair.topology import Edges, compact, components, distinct_rows
 from tetlux.meshing.search.proximity import winding_number
 
-# Vertices nearer than this share of the diagonal are one: text formats round at about 1e-7.
+# Vertices closer than this share of the diagonal are merged; text formats round at about 1e-7.
 MERGE_TOLERANCE = 1e-7
 
 
 def merge_vertices(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[FloatArray, IntArray]:
-    """Make coincident vertices one and remove the triangles that collapse."""
+    """Merge coincident vertices and remove the triangles that collapse."""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     first, kind = _same_places(points, max(MERGE_TOLERANCE * diagonal, np.finfo(float).tiny))
     if len(first) < len(points):
-        # Formats that give every triangle vertices of its own are no flaw of the surface.
+        # Separate vertices for each triangle are a property of the format, so they are not reported.
         if len(points) != 3 * len(faces):
             repairs.append(f"merged {len(points) - len(first)} vertices that coincide with another.")
         points, faces = points[first], kind[faces]
@@ -26,7 +26,7 @@ def merge_vertices(points: FloatArray, faces: IntArray, repairs: list[str]) -> t
 
 
 def without_collapsed(faces: IntArray) -> tuple[IntArray, int]:
-    """The triangles of three different corners, and how many others there were."""
+    """The triangles with three different corners, and the number of others."""
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return faces[distinct], int((~distinct).sum())
 
@@ -39,8 +39,8 @@ def near_pairs(points: FloatArray, tolerance: float) -> IntArray:
 
 
 def _same_places(points: FloatArray, tolerance: float) -> tuple[IntArray, IntArray]:
-    """The first vertex of each place, and for every vertex the number of its place."""
-    # Exact copies first: a file of loose triangles has six a place, and their pairs are many.
+    """The first vertex at each place, and the index of each vertex's place."""
+    # Merge exact copies first: with six copies per place, as in files of loose triangles, near pairs are too many.
     first, kind = distinct_rows(points)
     pairs = near_pairs(points[first], tolerance)
     if len(pairs) == 0:
@@ -51,10 +51,10 @@ def _same_places(points: FloatArray, tolerance: float) -> tuple[IntArray, IntArr
 
 
 def single_faces(points: FloatArray, faces: IntArray, repairs: list[str]) -> IntArray:
-    """Keep each triangle once, and drop walls inside the body.
+    """Keep one copy of each triangle, and remove walls inside the body.
 
-    A triangle that is given as often one way round as the other is a side of a two-sided export, or a wall between
-    two bodies that touch. The patches that such triangles form are kept where the surface is open without them.
+    A triangle that is given equally often in both orientations is part of a two-sided export, or of a wall between two
+    touching bodies. Patches of such triangles are kept if the surface is open without them.
     """
     if len(faces) == 0:
         return faces
@@ -65,7 +65,7 @@ def single_faces(points: FloatArray, faces: IntArray, repairs: list[str]) -> Int
     if len(first) == len(faces):
         return faces
     facing = np.bincount(kind, way)
-    # Of each kind, the first that is turned as most of them are.
+    # Of equal triangles, keep the first with the majority's orientation.
     usual = np.flatnonzero(way * facing[kind] >= 0)[::-1]
     first[kind[usual]] = usual
     both = facing == 0
@@ -81,7 +81,7 @@ def single_faces(points: FloatArray, faces: IntArray, repairs: list[str]) -> Int
 
 
 def without_pairs(faces: IntArray) -> IntArray:
-    """Of triangles given an even number of times none, of others one: each edge stays as even or odd as it was."""
+    """No copy of triangles given an even number of times, one of others: the parity at each edge is unchanged."""
     first, kind = distinct_rows(np.sort(faces, axis=1))
     return np.asarray(faces[np.sort(first[np.bincount(kind) % 2 == 1])])
 
@@ -109,10 +109,10 @@ def _bounding(points: FloatArray, plain: IntArray, double: IntArray) -> BoolArra
     keep = votes > 0
     _, member = np.unique(patch, return_index=True)
     for one in np.flatnonzero(closed):
-        # A core that fills its shell is a wall.
+        # The surface of a core that fills its shell is a wall.
         middle = points[double[member[one]]].mean(axis=0, keepdims=True)
         keep[one] = len(plain) == 0 or abs(winding_number(points, plain, middle)[0]) < 0.25
     if len(plain) == 0 and not keep.any():
-        # An open body with two sides. Beside a closed one it would be a fin.
+        # An open body given on both sides; beside a closed one it would be a fin.
         keep = loose
     return np.asarray(keep[patch])

@@ -1,4 +1,4 @@
-"""Which way triangles face: alike within each body, and out of it."""
+"""Orient the triangles of each body consistently and outward."""
 
 import numpy as np
 
@@ -9,22 +9,22 @@ from tetlux.meshing.repair.topology import Edges, bodies, components
 from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.surface import signed_volume
 
-# More separate bodies than these are a surface that fell to pieces.
+# A surface with more separate bodies is refused as fragmented.
 MOST_BODIES = 1000
 
 
 def wind_consistently(faces: IntArray, name: str, repairs: list[str]) -> IntArray:
-    """Turn triangles so that each edge between two is walked once each way.
+    """Orient triangles so that the two at each edge traverse it in opposite directions.
 
     Raises
     ------
     InputError
-        If there is no such way, as on a Klein bottle.
+        If the surface is not orientable, like a Klein bottle.
     """
     edges = Edges(faces)
     if edges.consistent:
         return faces
-    turned = _to_turn(edges, len(faces))
+    turned = _to_flip(edges, len(faces))
     if turned is None:
         raise InputError(f"{name}: the surface has no inside and outside (like a Klein bottle); repair it.")
     repairs.append("made the winding of the triangles consistent.")
@@ -34,13 +34,13 @@ def wind_consistently(faces: IntArray, name: str, repairs: list[str]) -> IntArra
 def face_outward(
     points: FloatArray, faces: IntArray, name: str, repairs: list[str], warnings: list[str]
 ) -> tuple[IntArray, bool]:
-    """Turn every body outward.
+    """Orient every body outward.
 
     Returns
     -------
     faces : (m, 3) ndarray
     nested : bool
-        Whether a body lies within another.
+        Whether a body lies inside another.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def face_outward(
 
 
 def _inner_bodies(points: FloatArray, parts: list[IntArray], inward: BoolArray, name: str) -> list[int]:
-    """Numbers, from 1, of the bodies that lie within others; cavities are refused."""
+    """Numbers, from 1, of the bodies inside others; cavities are refused."""
     low = np.array([points[part].min(axis=(0, 1)) for part in parts])
     high = np.array([points[part].max(axis=(0, 1)) for part in parts])
     inner = []
@@ -92,11 +92,11 @@ def _inner_bodies(points: FloatArray, parts: list[IntArray], inward: BoolArray, 
     return inner
 
 
-def _to_turn(edges: Edges, count: int) -> BoolArray | None:
-    """Which triangles to turn over, (m,), for each edge between two to be walked once each way; None if nothing helps.
+def _to_flip(edges: Edges, count: int) -> BoolArray | None:
+    """Triangles to flip, (m,), for a consistent orientation; None if there is none.
 
-    Each triangle stands in a graph twice, as it is and turned over, and is joined to its neighbours as they would go
-    with it. Where both are in one part there is a way round from one side of the surface to the other.
+    A graph has two nodes per triangle, one for each orientation, and links consistent orientations of neighbours. If
+    both nodes of a triangle are connected, the surface is not orientable.
     """
     between_two = np.flatnonzero(edges.triangles[edges.edge] == 2)
     pairs = between_two[np.argsort(edges.edge[between_two], kind="stable")].reshape(-1, 2)
@@ -109,5 +109,5 @@ def _to_turn(edges: Edges, count: int) -> BoolArray | None:
 
 
 def _volume_of(corners: FloatArray) -> float:
-    """Signed volume within triangles (f, 3, 3)."""
+    """Signed volume enclosed by triangles (f, 3, 3)."""
     return signed_volume(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))

@@ -1,8 +1,8 @@
-"""Edges of more than two triangles, and vertices at which fans of triangles touch: the surface pulled apart there.
+"""Separate a surface at edges of more than two triangles and at vertices where fans of triangles touch.
 
-Where parts of a body touch along an edge or at a vertex, triangles meet that bound different parts. No light passes
-through an edge or a vertex, and quadric decimation cannot deal with either. Where each part has vertices of its own,
-the surface is manifold and still bounds the same body.
+Where parts of a body touch along an edge or at a vertex, triangles of different parts meet. No light passes through an
+edge or a vertex, and quadric decimation requires a manifold surface. With separate vertices for each part, the
+surface is manifold and bounds the same body.
 """
 
 import numpy as np
@@ -14,20 +14,20 @@ from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
 from tetlux.meshing.surface.surface import signed_volume
 
-# Triangles at one edge at less than this angle, radians, lie on each other.
+# Triangles at one edge with less than this angle between them, radians, coincide.
 SAME_PLANE = 1e-4
-# A part that hangs on the rest by an edge or a vertex is left out below this share of the volume, if all such parts
-# are no more than the second share: the mesher loses such lumps, and no light reaches them through the body.
+# A part attached by an edge or a vertex only is removed below the first share of the volume, if all such parts together
+# are below the second: the mesher loses such parts, and no light reaches them through the body.
 CRUMB = (1e-3, 5e-2)
-# Below this share of the volume what triangles enclose is a wall, and no part.
+# Triangles that enclose less than this share of the volume are a wall and no part.
 NOTHING = 1e-12
 
 
 def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray] | None:
-    """Give each part of a body vertices of its own where parts touch along edges or at vertices.
+    """Give each part of a body separate vertices where parts touch along edges or at vertices.
 
-    Edges of more than two triangles are split in the middle first: where both ends belong to one part only, the
-    edge itself is what has to come apart.
+    Edges of more than two triangles are first split at their midpoints, so that they can be separated where both ends
+    belong to one part.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArra
     Returns
     -------
     points : (k, 3) ndarray
-        The given places, repeated where parts touch, and the middles of split edges.
+        The given points, repeated where parts touch, and the midpoints of split edges.
     faces : (l, 3) ndarray
         Two triangles at each edge, one fan at each vertex.
         None instead of both if the surface is not consistently oriented.
@@ -50,7 +50,7 @@ def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArra
     pairs = _pairs(points, faces)
     if pairs is None:
         return None
-    # Sides are numbered as corners are; each starts where its partner ends.
+    # Sides are numbered like the corners where they start; each starts where its partner ends.
     one, other = pairs
     rows, columns = np.concatenate([one, _following(one)]), np.concatenate([_following(other), other])
     graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(faces.size, faces.size))
@@ -73,7 +73,7 @@ def parts_of(points: FloatArray, faces: IntArray) -> IntArray | None:
 
 
 def mend_parts(points: FloatArray, faces: IntArray, bodies: IntArray, repairs: list[str]) -> IntArray:
-    """Turn parts outward that hang on others inside out, and leave out those too small to be meshed.
+    """Turn inside-out parts outward, and remove attached parts that are too small to be meshed.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def mend_parts(points: FloatArray, faces: IntArray, bodies: IntArray, repairs: l
     bodies : (m,) ndarray
         The body of each triangle, where shared vertices connect.
     repairs : list of str
-        What was done is added here.
+        Sentences on the repairs are appended.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def mend_parts(points: FloatArray, faces: IntArray, bodies: IntArray, repairs: l
     for i in np.flatnonzero(volumes < 0):
         others = faces[(bodies == body[i]) & (part != i)]
         middle = points[faces[part == i][:1]].mean(axis=1)
-        # Inside the others it is a cavity that touches the surface.
+        # An inward part inside the others is a cavity that touches the surface.
         turned[i] = len(others) > 0 and abs(winding_number(points, others, middle)[0]) < 0.5
     if turned.any():
         repairs.append(f"turned {_parts_are(int(turned.sum()))} inside out outward.")
@@ -108,7 +108,7 @@ def mend_parts(points: FloatArray, faces: IntArray, bodies: IntArray, repairs: l
     volumes = np.abs(volumes)
     largest = np.zeros(int(body.max()) + 1)
     np.maximum.at(largest, body, volumes)
-    # The largest part of a body hangs on nothing, and walls without volume are no parts.
+    # The largest part of a body is the body itself, and walls without volume are no parts.
     shares = volumes / volumes.sum()
     small = (shares < CRUMB[0]) & (volumes < largest[body]) & (shares > NOTHING)
     if shares[small].sum() > CRUMB[1]:
@@ -135,7 +135,7 @@ def _following(side: IntArray) -> IntArray:
 
 
 def _pairs(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray] | None:
-    """Sides of triangles that belong together, each pair once; side 3 f + k of face f starts at its corner k."""
+    """Pairs of sides that meet at an edge of one part, each once; side 3 f + k of face f starts at its corner k."""
     ends, number = edges_of(faces)
     number = number.ravel()
     up = faces.ravel() == ends[number, 0]
@@ -157,12 +157,12 @@ def _pairs(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray] | N
     gap = angle - angle[before]
     gap[first] += 2.0 * np.pi
     each = zip(*(np.split(values, first[1:]) for values in (up[sides], gap, sides)), strict=True)
-    pairs = np.concatenate([_matched(*(values.tolist() for values in at_one)) for at_one in each])
+    pairs = np.concatenate([_match(*(values.tolist() for values in at_one)) for at_one in each])
     return np.concatenate([one, pairs[:, 0]]), np.concatenate([other, pairs[:, 1]])
 
 
 def _angles(points: FloatArray, faces: IntArray, ends: IntArray, sides: IntArray, edge: IntArray) -> FloatArray:
-    """The angle of each side's triangle round its edge, radians, right-handed about the way from end to end."""
+    """The angle of each side's triangle around its edge, radians, right-handed about the direction of the edge."""
     along = points[ends[:, 1]] - points[ends[:, 0]]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     reach = points[faces.ravel()[_following(_following(sides))]] - points[ends[:, 0]]
@@ -174,12 +174,12 @@ def _angles(points: FloatArray, faces: IntArray, ends: IntArray, sides: IntArray
     return np.asarray(turn % (2.0 * np.pi))
 
 
-def _matched(up: list[bool], gap: list[float], sides: list[int]) -> IntArray:
+def _match(up: list[bool], gap: list[float], sides: list[int]) -> IntArray:
     """Pairs (k, 2) of the sides at one edge.
 
-    Going round, the body begins behind a triangle whose side runs down the edge, and ends at one whose side runs up:
-    they match as brackets do. Where one part is inside out, or within another, brackets are within brackets.
-    Triangles back to back are a wall between two parts: they match first, and what is left bounds both as one.
+    In order of angle, the body begins behind a triangle whose side runs down the edge and ends at one whose side runs
+    up. They match like brackets, which are nested where one part is inside out or inside another. Triangles back to
+    back are a wall between two parts: they match first, and the remaining triangles bound both parts as one.
 
     Parameters
     ----------
@@ -191,14 +191,14 @@ def _matched(up: list[bool], gap: list[float], sides: list[int]) -> IntArray:
     """
     pairs: list[tuple[int, int]] = []
     left: list[tuple[bool, int]] = []
-    # From the widest gap on, so that no wall is between the last and the first.
+    # Start at the widest gap, so that no wall lies between the last and the first.
     start = gap.index(max(gap))
     for i in [*range(start, len(sides)), *range(start)]:
         if left and gap[i] < SAME_PLANE and left[-1][0] != up[i]:
             pairs.append((left.pop()[1], sides[i]))
         else:
             left.append((up[i], sides[i]))
-    # Those that end what began before the first angle wait for the second time round.
+    # Sides whose partner comes before the first angle are matched in a second round.
     begun: list[int] = []
     done: set[int] = set()
     for ends, side in 2 * left:

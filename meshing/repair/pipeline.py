@@ -1,4 +1,4 @@
-"""What is wrong with a triangle mesh, what can be mended safely, and words for both."""
+"""Check a triangle mesh, repair what can be repaired safely, and report both."""
 
 from typing import get_args
 
@@ -19,12 +19,12 @@ from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
 from tetlux.meshing.surface.surface import UNITS, Surface, signed_volume, triangle_areas
 
-# In whatever unit.
+# Bounds on coordinates, in any unit.
 LONGEST = 1e30
-# A surface that crosses itself at more triangles than these, and at more than this share of them, is a tangle: the
-# mesher would be at it for minutes.
+# A surface that crosses itself at more than this number and this share of triangles is refused: the mesher would take
+# minutes.
 TANGLE = (100, 0.75)
-# Coordinates that are rounded to more than this share of the diagonal are worth a sentence.
+# Coordinates rounded to more than this share of the diagonal cause a warning.
 COARSE = 1e-4
 
 
@@ -36,7 +36,7 @@ def surface_from_arrays(
     name: str = "surface",
     holes: Holes = "small",
 ) -> Surface:
-    """Check a triangle mesh, mend what can be mended safely, and say what was done.
+    """Check a triangle mesh, repair what can be repaired safely, and report the repairs.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ def surface_from_arrays(
     name : str
         Used in messages.
     holes : "small", "close" or "refuse"
-        Which holes are capped: those that leave no choice (up to 5 % of the diagonal wide, slits, those of three
-        edges), all, or none.
+        Which holes are capped: small ones (up to 5 % of the diagonal wide, slits, those of three edges), all, or
+        none.
 
     Returns
     -------
     Surface
-        Closed and outward oriented; `repairs` and `warnings` tell what was found.
+        Closed and outward oriented; `repairs` and `warnings` list what was found.
 
     Raises
     ------
@@ -71,13 +71,13 @@ def surface_from_arrays(
         raise InputError(f'unit "{unit}" is not known; give one of {", ".join(UNITS)}.')
     if holes not in get_args(Holes):
         raise InputError(f'holes is "{holes}"; give one of {", ".join(get_args(Holes))}.')
-    points, faces = _checked_arrays(points, faces, name)
+    points, faces = _check_arrays(points, faces, name)
     repairs: list[str] = []
     warnings: list[str] = []
     rounding = _rounding(points)
-    points, faces = _joined(points, faces, name, rounding, repairs)
+    points, faces = _connect(points, faces, name, rounding, repairs)
     points, faces = close_holes(points, faces, name, unit, holes, repairs, warnings)
-    # A triangle that hangs loose was closed by itself turned over.
+    # A loose triangle was closed by its own reversed copy.
     points, faces = compact(points, without_pairs(faces))
     _check_solid(points, faces, name, rounding, least=4)
     check_closed(faces, name)
@@ -108,15 +108,15 @@ def surface_from_arrays(
                 value=rounding,
             )
         )
-    # Walls between bodies that touch count on both sides.
+    # Walls between touching bodies count twice.
     overlaps = nested or crossing or crowded > 0
     return Surface(points, faces, unit, name, tuple(repairs), tuple(warnings), overlaps)
 
 
-def _joined(
+def _connect(
     points: FloatArray, faces: IntArray, name: str, rounding: float, repairs: list[str]
 ) -> tuple[FloatArray, IntArray]:
-    """Triangles that share their corners and edges, each once."""
+    """Merge vertices, stitch seams and remove duplicate triangles."""
     points, faces = merge_vertices(points, faces, repairs)
     points, faces = compact(points, single_faces(points, faces, repairs))
     _check_solid(points, faces, name, rounding, least=1)
@@ -124,7 +124,7 @@ def _joined(
 
 
 def _check_solid(points: FloatArray, faces: IntArray, name: str, rounding: float, least: int) -> None:
-    """Refuse what is too little or too flat for a body."""
+    """Refuse a surface with too few triangles or without volume."""
     if len(faces) < least and rounding > MERGE_TOLERANCE:
         raise InputError(
             f"{name}: the surface lies so far from the origin that its vertices are not told apart; move it to the "
@@ -137,7 +137,7 @@ def _check_solid(points: FloatArray, faces: IntArray, name: str, rounding: float
 
 
 def _check_crossings(points: FloatArray, faces: IntArray, name: str, warnings: list[str]) -> bool:
-    """Whether the surface crosses itself; a tangle is refused."""
+    """Whether the surface crosses itself; one with too many crossings is refused."""
     crossing = count_self_intersections(points, faces)
     if crossing is None:
         warnings.append(
@@ -163,8 +163,8 @@ def _check_crossings(points: FloatArray, faces: IntArray, name: str, warnings: l
     return bool(crossing)
 
 
-def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
-    """Arrays of the right shape that hold finite vertices, all of them used."""
+def _check_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> tuple[FloatArray, IntArray]:
+    """Check shapes and values; return finite vertices, all of them used, and triangles."""
     try:
         vertices = np.array(points, dtype=np.float64)
         triangles = np.array(faces, dtype=np.int64)
@@ -181,7 +181,7 @@ def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> t
         )
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise InputError(f"{name}: a triangle names a vertex that does not exist; the file is damaged.")
-    # Vertices that no triangle uses are no part of the surface, wherever they are.
+    # Unused vertices are no part of the surface and may have any coordinates.
     vertices, triangles = compact(vertices, triangles)
     bad = int((~np.isfinite(vertices)).any(axis=1).sum())
     if bad:
@@ -200,7 +200,7 @@ def _checked_arrays(points: npt.ArrayLike, faces: npt.ArrayLike, name: str) -> t
 
 
 def _rounding(points: FloatArray) -> float:
-    """To what share of the diagonal coordinates are rounded, by how far from the origin they are."""
+    """Rounding of coordinates as a share of the diagonal, from their distance to the origin."""
     single = np.asarray(points, dtype=np.float32)
     largest = np.abs(points).max()
     unit = float(np.spacing(np.float32(largest)) if (single == points).all() else np.spacing(largest))

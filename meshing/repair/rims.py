@@ -1,4 +1,4 @@
-"""Rims within rims: a thick wall that is cut through has two, and one ring between them closes it."""
+"""Join nested rims: a cut through a thick wall leaves two, and a ring between them closes it."""
 
 from collections.abc import Sequence
 
@@ -7,29 +7,29 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.repair.topology import components
 
-# A rim lies in the plane of another one if it is nearer to it than this share of the gap between the two. The two rims
-# of a shallow funnel lie nearly so too, but are of one part; a scan's ragged rims of two parts may be farther apart.
+# A rim lies in the plane of another if its distance from it is below this share of the gap between the two. For
+# rims of one part the share is small, to exclude shallow funnels; ragged rims of two parts in a scan need a larger one.
 LEVEL, LEVEL_OF_PARTS = 0.1, 0.5
 
 
 def join_nested_rims(
     points: FloatArray, faces: IntArray, loops: Sequence[IntArray]
 ) -> tuple[list[IntArray], list[IntArray]]:
-    """Join each rim that lies within another one with it, so that the cap of both is the ring between them.
+    """Join each rim to the rim around it, so that the cap of both is the ring between them.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     faces : (m, 3) ndarray
     loops : sequence of ndarray
-        The rims, as the triangles along them walk them: the inner rim of a wall is walked the other way round.
+        The rims, in the direction of the triangles along them; the inner rim of a wall has the opposite direction.
 
     Returns
     -------
     loops : list of ndarray
-        In the order of the outer rims. A joined one runs along a bridge to the inner rim, round that, and back.
+        In the order of the outer rims. A joined loop runs along a bridge to the inner rim, around it, and back.
     overlapping : list of ndarray
-        Rims within others that are walked the same way round, so that their caps overlap.
+        Rims inside others in the same direction, so that their caps overlap.
     """
     if len(loops) < 2:
         return list(loops), []
@@ -52,12 +52,12 @@ def join_nested_rims(
     result = []
     for i, loop in enumerate(loops):
         if i not in joined:
-            result.append(_bridged(points, loop, [loops[j] for j in inner.get(i, [])]))
+            result.append(_bridge(points, loop, [loops[j] for j in inner.get(i, [])]))
     return result, overlapping
 
 
 def _around(points: FloatArray, loops: Sequence[IntArray], vectors: FloatArray, parts: list[int], i: int) -> list[int]:
-    """The rims that lie round a rim, in its plane."""
+    """The rims around a rim, in its plane."""
     rim = points[loops[i]]
     low, high = rim.min(axis=0), rim.max(axis=0)
     found = []
@@ -72,7 +72,7 @@ def _around(points: FloatArray, loops: Sequence[IntArray], vectors: FloatArray, 
 
 
 def _within(rim: FloatArray, outer: FloatArray, vector: FloatArray, level: float) -> bool:
-    """Whether a rim lies within another one, seen along that one's area vector, and in its plane."""
+    """Whether a rim lies in the plane of an outer rim and, along that rim's area vector, inside it."""
     length = np.linalg.norm(vector)
     if length == 0.0:
         return False
@@ -87,7 +87,7 @@ def _within(rim: FloatArray, outer: FloatArray, vector: FloatArray, level: float
 
 
 def _inside(queries: FloatArray, polygon: FloatArray) -> BoolArray:
-    """Which queries (q, 2) a polygon (k, 2) winds round."""
+    """Whether each query (q, 2) is inside a polygon (k, 2)."""
     spokes = polygon - queries[:, None]
     following = np.roll(spokes, -1, axis=1)
     cross = spokes[..., 0] * following[..., 1] - spokes[..., 1] * following[..., 0]
@@ -100,8 +100,8 @@ def _area_vector(rim: FloatArray) -> FloatArray:
     return np.asarray(0.5 * np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0))
 
 
-def _bridged(points: FloatArray, loop: IntArray, inner: list[IntArray]) -> IntArray:
-    """One loop along an outer rim and all inner ones, the nearest first: its bridge crosses none of the others."""
+def _bridge(points: FloatArray, loop: IntArray, inner: list[IntArray]) -> IntArray:
+    """One loop along an outer rim and all inner ones, the nearest first, so that no bridge crosses another."""
     rest = list(inner)
     while rest:
         gaps = [np.linalg.norm(points[loop][:, None] - points[other], axis=2) for other in rest]

@@ -1,4 +1,4 @@
-"""Seams whose two sides do not share their vertices: T-junctions, as CAD programs export them, and hair cracks."""
+"""Close seams whose two sides do not share vertices: T-junctions, as CAD programs export them, and hair cracks."""
 
 from itertools import pairwise
 
@@ -9,13 +9,13 @@ from tetlux.meshing.repair.merge import near_pairs, without_collapsed
 from tetlux.meshing.repair.topology import Edges, compact, components
 from tetlux.meshing.search.proximity import overlapping_boxes
 
-# A vertex of a rim nearer to an edge of a rim than this share of the diagonal lies on it: text of six digits rounds
-# at 1e-6. A vertex is no nearer to another than this share of the rim's edges there, or they are one.
+# A rim vertex within the first share of the diagonal of a rim edge lies on it (text of six digits rounds at 1e-6). Rim
+# vertices closer than the second share of their rim edges are merged.
 ON_EDGE = 1e-5
 NEAR = 0.1
-# A triangle lower than this share of the diagonal, and of its longest side, only fills a seam.
+# A triangle whose height is below this share of the diagonal and of its longest side only fills a seam.
 SLIVER = 1e-6
-# Vertices that are put on edges make new edges; chains of them end after a few rounds.
+# Inserted vertices make new edges, so insertion is repeated; chains end after a few rounds.
 ROUNDS = 4
 
 
@@ -27,12 +27,12 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     points : (n, 3) ndarray
     faces : (m, 3) ndarray
     repairs : list of str
-        A sentence is added to it.
+        A sentence is appended.
 
     Returns
     -------
     points, faces : ndarray
-        The same surface, of which no point has moved farther than ``ON_EDGE`` of the diagonal.
+        The same surface; no point has moved by more than ``ON_EDGE`` of the diagonal.
     """
     before = Edges(faces)
     if before.closed:
@@ -40,14 +40,14 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     tolerance = ON_EDGE * float(np.linalg.norm(np.ptp(points, axis=0)))
     stitched, inserted, joined = faces, 0, 0
     for _ in range(ROUNDS):
-        same = _joined_rims(points, Edges(stitched), tolerance)
+        same = _merge_rims(points, Edges(stitched), tolerance)
         stitched = _without_slivers(points, without_collapsed(same[stitched])[0], SLIVER / ON_EDGE * tolerance)
         stitched, added = _with_vertices_on_edges(points, stitched, tolerance)
         merged = int((same != np.arange(len(points))).sum())
         inserted, joined = inserted + added, joined + merged
         if added == merged == 0:
             break
-    # Of triangles that do not join at all some would, here and there.
+    # A few of entirely unconnected triangles could be stitched by chance.
     if len(stitched) == 0 or (Edges(stitched).triangles % 2).sum() >= (before.triangles % 2).sum():
         return points, faces
     if joined:
@@ -57,8 +57,8 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     return compact(points, stitched)
 
 
-def _joined_rims(points: FloatArray, edges: Edges, tolerance: float) -> IntArray:
-    """For every vertex the one that it is joined to, (n,): on rims, those nearer than rims have corners."""
+def _merge_rims(points: FloatArray, edges: Edges, tolerance: float) -> IntArray:
+    """The vertex that each vertex is merged into, (n,): on rims, vertices much closer than the length of rim edges."""
     same = np.arange(len(points))
     sides = edges.sides(edges.triangles % 2 == 1)
     start, end = edges.start[sides], edges.end[sides]
@@ -77,7 +77,7 @@ def _joined_rims(points: FloatArray, edges: Edges, tolerance: float) -> IntArray
 
 
 def _without_slivers(points: FloatArray, faces: IntArray, height: float) -> IntArray:
-    """Without the triangles of no area that have a corner in the middle of their longest side."""
+    """Remove flat triangles with a corner on their longest side."""
     corners = points[faces]
     sides = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2)
     longest = sides.max(axis=1)
@@ -88,7 +88,7 @@ def _without_slivers(points: FloatArray, faces: IntArray, height: float) -> IntA
 
 
 def _with_vertices_on_edges(points: FloatArray, faces: IntArray, tolerance: float) -> tuple[IntArray, int]:
-    """Triangles split at the rim vertices that lie on their open edges; how many splits that took."""
+    """Split triangles at rim vertices on their open edges; return triangles and the number of splits."""
     edges = Edges(faces)
     sides = edges.sides(edges.triangles % 2 == 1)
     if len(sides) == 0:
@@ -111,7 +111,7 @@ def _with_vertices_on_edges(points: FloatArray, faces: IntArray, tolerance: floa
 
 
 def _split(a: int, b: int, c: int, on: dict[tuple[int, int], list[int]]) -> list[tuple[int, int, int]]:
-    """Triangles in place of one whose sides bear vertices: a fan from the corner opposite each such side."""
+    """Split a triangle with vertices on its sides: a fan from the corner opposite each such side."""
     for start, end, apex in ((a, b, c), (b, c, a), (c, a, b)):
         inner = [vertex for vertex in on.get((start, end), []) if vertex != apex]
         if inner:
@@ -123,7 +123,7 @@ def _split(a: int, b: int, c: int, on: dict[tuple[int, int], list[int]]) -> list
 def _on_sides(
     points: FloatArray, start: IntArray, end: IntArray, rim: IntArray, tolerance: float
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Which sides bear which vertices in between, and at what share of the side's length."""
+    """Sides and the vertices on them, with the relative position of each along its side."""
     a, b, v = points[start], points[end], points[rim]
     low = np.vstack([np.minimum(a, b) - tolerance, v])
     high = np.vstack([np.maximum(a, b) + tolerance, v])

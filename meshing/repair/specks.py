@@ -1,21 +1,22 @@
-"""Specks: separate bodies so small that the mesher would lose them."""
+"""Remove specks: separate bodies so small that the mesher would lose them."""
 
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.describe import place_words
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import body_sizes, place_words
+from tetlux.meshing.surface.surface import body_sizes
 
-# A body of a mean thickness 2 V/A below this many of the mesher's deviations is dropped. Balls and cubes beside a ball
-# of 20 were meshed down to .2 (seconds: 2 above 1; 3 at .45; 6 to 12 at .2, where the mesher needs its second attempt).
+# A body with a mean thickness 2 V/A below this many deviations of the mesher is dropped. Balls and cubes beside a ball
+# of 20 were meshed down to .2: in 2 s above 1, 3 s at .45, 6 to 12 s at .2, where a second attempt is needed.
 SPECK = 0.5
-# Specks whose places are told.
+# Specks whose positions a message lists.
 DESCRIBED = 3
 
 
 def drop_specks(points: FloatArray, faces: IntArray, unit: str, repairs: list[str]) -> tuple[FloatArray, IntArray]:
-    """Remove bodies below the mesher's resolution that are a small part of the whole, and say so.
+    """Remove bodies below the mesher's resolution that are a small part of the volume, and report them in `repairs`.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def drop_specks(points: FloatArray, faces: IntArray, unit: str, repairs: list[st
         return points, faces
     kept = large
     speck = ~large & (2.0 * volume < SPECK * _deviation(points, faces, body, kept, volume, area) * area)
-    # What is kept widens the box, and so the mesher's deviation.
+    # Each kept body enlarges the bounding box, and so the mesher's deviation.
     while (~speck != kept).any():
         kept = ~speck
         speck |= ~large & (2.0 * volume < SPECK * _deviation(points, faces, body, kept, volume, area) * area)
@@ -56,7 +57,7 @@ def _deviation(
 
 
 def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntArray, unit: str) -> str:
-    """How many specks are dropped, how large they are, and where the first ones are."""
+    """A sentence with the number and size of specks, and the positions of the first ones."""
     order = np.argsort(body, kind="stable")
     first = np.searchsorted(body[order], np.arange(int(body.max()) + 1))
     corners = points[faces[order]]

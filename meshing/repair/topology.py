@@ -1,4 +1,4 @@
-"""How the triangles and tetrahedra of a mesh hang together: edges, rims, neighbours, bodies."""
+"""Connectivity of triangles and tetrahedra: edges, rims, connected bodies."""
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +14,9 @@ def compact(points: FloatArray, cells: IntArray) -> tuple[FloatArray, IntArray]:
 
 
 def distinct_rows(rows: npt.NDArray[np.generic]) -> tuple[IntArray, IntArray]:
-    """The first of each kind of row, and for every row the number of its kind.
+    """The first of each set of equal rows, and the index of each row's set.
 
-    What ``np.unique(axis=0)`` does, several times quicker.
+    Several times faster than ``np.unique(axis=0)``.
     """
     order = np.lexsort(rows.T[::-1])
     new = np.ones(len(rows), dtype=bool)
@@ -27,7 +27,7 @@ def distinct_rows(rows: npt.NDArray[np.generic]) -> tuple[IntArray, IntArray]:
 
 
 def components(count: int, pairs: IntArray) -> IntArray:
-    """The connected part that each of `count` items belongs to, (count,), given joined pairs (p, 2)."""
+    """The connected component of each of `count` items, (count,), given connected pairs (p, 2)."""
     from scipy.sparse import coo_matrix  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
 
@@ -36,7 +36,7 @@ def components(count: int, pairs: IntArray) -> IntArray:
 
 
 def bodies(point_count: int, cells: IntArray) -> IntArray:
-    """Which connected part each cell belongs to, (m,), numbered from 0; shared vertices connect."""
+    """The connected body of each cell, (m,), numbered from 0; cells with a common vertex are connected."""
     pairs = np.column_stack([np.repeat(cells[:, 0], cells.shape[1] - 1), cells[:, 1:].ravel()])
     labels = components(point_count, pairs)[cells[:, 0]]
     _, numbered = np.unique(labels, return_inverse=True)
@@ -44,29 +44,30 @@ def bodies(point_count: int, cells: IntArray) -> IntArray:
 
 
 class Edges:
-    """The edges of triangles (m, 3), as each triangle walks them and as the surface has them.
+    """The edges of triangles (m, 3), per triangle side and per edge of the surface.
 
     Attributes
     ----------
     start, end : (3 m,) ndarray
-        Vertices of the triangles' sides in the order walked.
+        Vertices of the triangles' sides, in the direction of the triangle.
     edge : (3 m,) ndarray
-        The number of the edge that each side is.
+        The edge of each side.
     triangles, balance : (e,) ndarray
-        Of each edge: how many triangles share it; how many more walk it up than down the vertex numbers.
+        For each edge: the number of its triangles, and how many more of them traverse it in ascending than in
+        descending order of vertices.
     """
 
     def __init__(self, faces: IntArray) -> None:
         self.start = faces.T.ravel()
         self.end = faces[:, [1, 2, 0]].T.ravel()
-        # One integer an edge sorts several times faster than two.
+        # One integer per edge sorts several times faster than two.
         key = np.minimum(self.start, self.end) * (int(faces.max(initial=0)) + 1) + np.maximum(self.start, self.end)
         _, self.edge, self.triangles = np.unique(key, return_inverse=True, return_counts=True)
         self.balance = np.bincount(self.edge, np.where(self.start < self.end, 1, -1))
 
     @property
     def consistent(self) -> bool:
-        """Whether each edge between two triangles is walked once each way."""
+        """Whether the two triangles at each edge traverse it in opposite directions."""
         return bool((self.balance[self.triangles == 2] == 0).all())
 
     @property
@@ -80,7 +81,7 @@ class Edges:
 
 
 def boundary_loops(edges: Edges) -> list[IntArray]:
-    """The rims of holes: closed chains of vertices along edges that belong to one triangle only."""
+    """The rims of holes: closed loops of vertices along edges of one triangle only."""
     single = edges.sides(edges.triangles == 1)
     rim = list(zip(edges.start[single].tolist(), edges.end[single].tolist(), strict=True))
     neighbours: dict[int, list[int]] = {}
@@ -99,7 +100,7 @@ def boundary_loops(edges: Edges) -> list[IntArray]:
             following = neighbours[here].pop()
             neighbours[following].remove(here)
             if following in place:
-                # Holes that touch at a vertex come apart here: each return to a vertex ends a loop.
+                # Holes that touch at a vertex are separated: each return to a vertex ends a loop.
                 first = place[following]
                 loop = path[first:]
                 for vertex in path[first + 1 :]:

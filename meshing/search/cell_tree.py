@@ -1,4 +1,4 @@
-"""Which tetrahedra do straight paths pass, and where? For thousands of paths at once."""
+"""Find the tetrahedra that straight paths pass or that contain points, for thousands at once."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,34 +8,34 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.corners import cross, dot, over_corners
+from tetlux.meshing.host.corners import dot, face_normals, over_corners
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9
-# The same for a point in the tetrahedron that it is deepest in: thin ones lose as many digits.
+# The same for a point and the tetrahedron that it is deepest in; thin tetrahedra lose this many digits.
 POINT_SLACK = 1e-6
-# Boxes within each box of the tree, and pairs of a path and a box that are handled at once: some megabytes.
+# Children per box of the tree, and pairs of a path and a box that are processed at once (some megabytes).
 CHILDREN = 8
 PORTION = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
-class Stretches:
-    """Paths cut where they pass from tetrahedron to tetrahedron.
+class PathSegments:
+    """Paths cut into segments, one per tetrahedron.
 
-    The stretches of a path cover it without overlap: where it runs along a face or an edge, the tetrahedron that it
-    enters first has it.
+    The segments of a path cover it without overlap. Where it runs along a face or an edge, the segment belongs to the
+    tetrahedron that it enters first.
 
     Parameters
     ----------
     paths : (s,) ndarray
-        The path of each stretch.
+        The path of each segment.
     cells : (s,) ndarray
-        Its tetrahedron, -1 outside the mesh.
+        The tetrahedron of each segment; -1 outside the mesh.
     enter, leave : (s,) ndarray
-        Where it begins and ends, along the path.
+        Distances along the path at which the segment begins and ends.
     weights, slopes : (s, 4) ndarray
-        Barycentric coordinates where it begins, and their derivatives along it; 0 outside the mesh.
+        Barycentric coordinates at its beginning, and their derivatives along the path; 0 outside the mesh.
     """
 
     paths: IntArray
@@ -66,27 +66,27 @@ class CellTree:
             low[:, block], high[:, block] = corners.min(axis=0), corners.max(axis=0)
 
         over_corners(fill, points, tetrahedra)
-        # In the order of a k-d tree's leaves neighbours stand side by side, however graded the mesh is.
+        # The leaf order of a k-d tree keeps neighbours together, also in graded meshes.
         leaves = cKDTree((0.5 * (low + high)).T, balanced_tree=False, compact_nodes=False)
         self._order = np.asarray(leaves.indices, dtype=np.int64)
-        # Centres and crossings of boxes are rounded.
+        # Covers rounding of box centres and of intersections.
         margin = 16.0 * np.finfo(float).eps * np.abs(points).max()
         low, high = (low - margin).take(self._order, axis=1), (high + margin).take(self._order, axis=1)
-        # From the tetrahedra's boxes up to the whole: centres and half sides (boxes, 6, CHILDREN) of each one's parts.
+        # From tetrahedra up to the root: centres and half sides (boxes, 6, CHILDREN) of each box's children.
         self._levels: list[FloatArray] = []
         while not self._levels or len(self._levels[-1]) > 1:
-            # Filled up with boxes that hold nothing.
+            # Padded with empty boxes.
             padding = ((0, 0), (0, -low.shape[1] % CHILDREN))
             low = np.pad(low, padding, constant_values=1e100).reshape(3, -1, CHILDREN)
             high = np.pad(high, padding, constant_values=-1e100).reshape(3, -1, CHILDREN)
             boxes = np.concatenate([0.5 * (low + high), 0.5 * (high - low)])
             self._levels.append(np.ascontiguousarray(boxes.swapaxes(0, 1)))
-            # NumPy is slow along short axes: part by part instead.
+            # NumPy is slow along short axes, so loop over them.
             low = np.minimum.reduce([low[:, :, part] for part in range(CHILDREN)])
             high = np.maximum.reduce([high[:, :, part] for part in range(CHILDREN)])
 
-    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[Stretches]:
-        """Cut paths where they pass from tetrahedron to tetrahedron.
+    def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
+        """Cut paths into segments, one per tetrahedron.
 
         Parameters
         ----------
@@ -95,31 +95,31 @@ class CellTree:
 
         Yields
         ------
-        Stretches
-            Of some paths, all that each has.
+        PathSegments
+            All segments of some of the paths.
         """
         for some, near, cells in self._near(starts, directions, lengths):
             base, slopes = self._lines(cells, starts[near], directions[near])
-            # Along a face a coordinate does not change: 0 or more from ever to ever, or never.
+            # Along a face a coordinate is constant: the path is on its inner side everywhere or nowhere.
             change = np.where(np.abs(slopes) < 1e-200, 1e-200, slopes)
             roots = -(base + SLACK) / change
             enter = np.where(change > 0, roots, -np.inf).max(axis=0).clip(min=0.0)
             leave = np.where(change < 0, roots, np.inf).min(axis=0).clip(max=lengths[near])
             hit = np.flatnonzero(leave > enter)
-            # With one of no length at the end of each path: what is not covered before it is outside the mesh.
+            # A segment of no length ends each path; gaps before it are outside the mesh.
             paths = np.concatenate([near[hit], np.arange(some.start, some.stop)])
             enter = np.concatenate([enter[hit], lengths[some]])
             leave = np.concatenate([leave[hit], lengths[some]])
-            order, covered = _covered(paths, enter, leave)
+            order, covered = _cover_paths(paths, enter, leave)
             paths, enter, leave = paths[order], enter[order], leave[order]
             inside, outside = np.flatnonzero(leave > np.maximum(enter, covered)), np.flatnonzero(enter > covered)
             chosen = hit[order[inside]]
             begin = np.maximum(enter, covered)[inside]
             weights = base[:, chosen] + begin * slopes[:, chosen]
-            # At the start, far from a small tetrahedron, they were huge, and their sum lost digits.
+            # Far from a small tetrahedron, coordinates at the start are huge, and their sum lost digits.
             weights[0] = 1.0 - weights[1:].sum(axis=0)
             none = np.zeros((len(outside), 4))
-            yield Stretches(
+            yield PathSegments(
                 np.concatenate([paths[inside], paths[outside]]),
                 np.concatenate([cells[chosen], np.full(len(outside), -1)]),
                 np.concatenate([begin, covered[outside]]),
@@ -129,7 +129,7 @@ class CellTree:
             )
 
     def locate(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The tetrahedron that holds each point.
+        """The tetrahedron that contains each point.
 
         Parameters
         ----------
@@ -138,17 +138,17 @@ class CellTree:
         Returns
         -------
         cells : (p,) ndarray
-            The one it is deepest in; -1 for points outside.
+            The tetrahedron that the point is deepest in; -1 for points outside.
         weights : (p, 4) ndarray
             Barycentric coordinates; nan for points outside.
         """
         found, weights = np.full(len(points), -1), np.full((len(points), 4), np.nan)
         still = np.zeros_like(points)
-        # Points are paths of no length.
+        # A point is a path of no length.
         for _, paths, cells in self._near(points, still, np.zeros(len(points))):
             base, _ = self._lines(cells, points[paths], still[paths])
             inside = np.flatnonzero((base >= -POINT_SLACK).all(axis=0))
-            # The deepest comes last, and stays.
+            # The deepest comes last and overwrites the others.
             inside = inside[np.argsort(base[:, inside].min(axis=0))]
             found[paths[inside]], weights[paths[inside]] = cells[inside], base[:, inside].T
         return found, weights
@@ -156,8 +156,8 @@ class CellTree:
     def _near(
         self, starts: FloatArray, directions: FloatArray, lengths: FloatArray
     ) -> Iterator[tuple[slice, IntArray, IntArray]]:
-        """Paths, and the pairs (paths, cells) of them with the tetrahedra whose boxes they meet, by ascending path."""
-        # A path across an axis meets a box at once on it, or never.
+        """Slices of paths, with the pairs (paths, cells) whose boxes intersect, in ascending order of paths."""
+        # A path perpendicular to an axis is within a box's range on that axis everywhere or nowhere.
         per_length = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
         everything = np.arange(len(starts))
         todo = [(0, len(starts), len(self._levels) - 1, everything, np.zeros_like(everything))]
@@ -181,13 +181,13 @@ class CellTree:
                 todo.append((first, last, level - 1, paths[pair], boxes[pair] * CHILDREN + part))
 
     def _lines(self, cells: IntArray, starts: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Barycentric coordinates at the start of lines, and their derivatives along them.
+        """Barycentric coordinates at the start of lines, and their derivatives along the lines.
 
         Parameters
         ----------
         cells : (c,) ndarray
         starts, directions : (c, 3) ndarray
-            The line of each tetrahedron.
+            One line per tetrahedron.
 
         Returns
         -------
@@ -195,7 +195,7 @@ class CellTree:
         """
         corners = self._coordinates[:, self._tetrahedra[cells].T]
         u, v, w = (corners[:, i] - corners[:, 0] for i in (1, 2, 3))
-        gradients = np.stack([cross(v, w), cross(w, u), cross(u, v)], axis=1)
+        gradients = np.stack(face_normals(u, v, w), axis=1)
         gradients /= dot(u, gradients[:, 0])
         base, slopes = np.empty((2, 4, len(cells)))
         base[1:] = dot((starts.T - corners[:, 0])[:, None], gradients)
@@ -204,9 +204,9 @@ class CellTree:
         return base, slopes
 
 
-def _covered(paths: IntArray, enter: FloatArray, leave: FloatArray) -> tuple[IntArray, FloatArray]:
-    """The order of intervals by path and entry, and how far each one's path is covered by those before it."""
+def _cover_paths(paths: IntArray, enter: FloatArray, leave: FloatArray) -> tuple[IntArray, FloatArray]:
+    """The order of intervals by path and entry, and how far the earlier intervals of the path reach."""
     order = np.lexsort((enter, paths))
-    # NumPy compares complex numbers by their real parts first, so that every path starts anew.
+    # NumPy orders complex numbers by their real part first, so the running maximum restarts with each path.
     reached = np.maximum.accumulate(paths[order] + 1j * leave[order]).imag
     return order, np.where(np.diff(paths[order], prepend=-1) > 0, 0.0, np.roll(reached, 1))

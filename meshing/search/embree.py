@@ -1,4 +1,4 @@
-"""Rays by Embree: a microsecond each, in single precision."""
+"""Ray casting by Embree: one microsecond per ray, in single precision."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 
-# Single precision holds no places farther away than this.
+# Coordinates are clipped to this range of single precision.
 FARTHEST = 1e12
 
 
@@ -16,7 +16,7 @@ class Embree:
     Parameters
     ----------
     corners : (f, 3, 3) ndarray
-        About the origin, with an extent of 1.
+        Centred at the origin, with an extent of 1.
     """
 
     def __init__(self, corners: FloatArray) -> None:
@@ -27,7 +27,7 @@ class Embree:
         TriangleMesh(self._scene, _single(corners))
 
     def __call__(self, starts: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The first triangle that each ray (q, 3) meets, -1 for none, and the distance, good to six digits."""
+        """The first triangle that each ray (q, 3) hits, -1 for none, and the distance to six digits."""
         met = self._scene.run(_single(starts), np.ascontiguousarray(directions, dtype=np.float32), output=True)
         return np.asarray(met["primID"], dtype=np.int64), np.asarray(met["tfar"], dtype=np.float64)
 

@@ -1,4 +1,4 @@
-"""Where is the surface? Nearest points, insides and rays, for a soup of triangles."""
+"""Nearest points, overlapping boxes, winding numbers and line intersections of triangles."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,9 +7,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
-# A line closer to a triangle's plane than this, by the sine of the angle, runs along it.
+# Lines at less than this sine of the angle to a triangle's plane count as parallel.
 PARALLEL = 1e-9
-# Pairs of boxes handled at once: tens of megabytes.
+# Pairs of boxes processed at once (tens of megabytes).
 PORTION = 1 << 18
 
 
@@ -42,7 +42,7 @@ class ClosestPoint:
         return nearest, faces
 
     def within(self, queries: FloatArray, distance: float) -> BoolArray:
-        """Whether each of the queries (q, 3) is no farther from the soup than a distance; quick where that is short."""
+        """Whether each query (q, 3) is within a distance of the triangles; fast for short distances."""
         from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
         from vtkmodules.vtkCommonDataModel import vtkGenericCell  # noqa: PLC0415
 
@@ -57,7 +57,7 @@ class ClosestPoint:
 
 
 def cell_locator(points: FloatArray, faces: IntArray, per_bucket: int = 10) -> Any:
-    """VTK's static cell locator of triangles ``points[faces]``, about so many in each of its buckets."""
+    """VTK's static cell locator of triangles ``points[faces]``, with about `per_bucket` in each bucket."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray  # noqa: PLC0415
     from vtkmodules.vtkCommonCore import vtkPoints  # noqa: PLC0415
     from vtkmodules.vtkCommonDataModel import (  # noqa: PLC0415
@@ -87,8 +87,8 @@ def cell_locator(points: FloatArray, faces: IntArray, per_bucket: int = 10) -> A
 def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
     """Pairs of boxes that touch or overlap, each pair once.
 
-    Boxes are sorted along a Morton curve, which makes a binary tree of boxes round neighbours; pairs of tree
-    nodes are opened level by level, whole levels at a time.
+    Boxes are sorted along a Morton curve into a binary tree of bounding boxes; pairs of tree nodes are split level by
+    level, many at a time.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntAr
     Yields
     ------
     first, second : (p,) ndarray
-        Numbers of the boxes, in portions that bound the memory.
+        Indices of the boxes, in portions that bound the memory.
     """
     order = np.argsort(_morton_code(0.5 * (low + high)))
     depth = int(len(order) - 1).bit_length()
     padding = (0, (1 << depth) - len(order))
-    # Padded with boxes that overlap nothing.
+    # Padded with empty boxes.
     lows = [np.pad(x[order], padding, constant_values=np.inf) for x in low.T]
     highs = [np.pad(x[order], padding, constant_values=-np.inf) for x in high.T]
     levels = [(lows, highs)]
@@ -123,7 +123,7 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntAr
         else:
             lows, highs = levels[level - 1]
             i, j = 2 * i, 2 * j
-            # A node paired with itself: its second child with its first is its first with its second.
+            # For a node paired with itself, (second child, first child) repeats (first, second).
             other = i != j
             i, j = np.concatenate([i, i, i + 1, i[other] + 1]), np.concatenate([j, j + 1, j + 1, j[other]])
             for lowest, highest in zip(lows, highs, strict=True):
@@ -133,7 +133,7 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntAr
 
 
 def _morton_code(points: FloatArray) -> IntArray:
-    """Place of each point along a space-filling curve, (n,): the bits of its three coordinates, interleaved."""
+    """Morton code of each point, (n,): the interleaved bits of its coordinates."""
     size = float(np.ptp(points, axis=0).max())
     code = ((points - points.min(axis=0)) * (1023.0 / size if size > 0 else 0.0)).astype(np.int64)
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
@@ -142,7 +142,7 @@ def _morton_code(points: FloatArray) -> IntArray:
 
 
 def winding_number(points: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
-    """How often a closed surface winds round each query point: 1 inside, 0 outside.
+    """Winding number of a closed surface around each query point: 1 inside, 0 outside.
 
     The sum of the triangles' signed solid angles (Van Oosterom & Strackee 1983) over 4 pi.
 
@@ -156,7 +156,7 @@ def winding_number(points: FloatArray, faces: IntArray, queries: FloatArray) -> 
     -------
     (q,) ndarray
     """
-    # Coordinate by coordinate: NumPy is slow along axes of three.
+    # By coordinate, since NumPy is slow along axes of three.
     corners = [np.ascontiguousarray(points[faces[:, i]].T) for i in range(3)]
     result = np.empty(len(queries))
     for i, query in enumerate(queries):
@@ -178,7 +178,7 @@ def winding_number(points: FloatArray, faces: IntArray, queries: FloatArray) -> 
 def cross_segments(
     origins: FloatArray, directions: FloatArray, corners: FloatArray, slack: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Where lines cross triangles, pair by pair (Möller & Trumbore 1997).
+    """Intersections of lines with triangles, pairwise (Möller & Trumbore 1997).
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def cross_segments(
     corners : (n, 3, 3) ndarray
         The triangle of each pair.
     slack : float
-        How far outside a triangle (in barycentric coordinates) still counts.
+        Distance outside a triangle, in barycentric coordinates, that still counts as a hit.
 
     Returns
     -------

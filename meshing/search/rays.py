@@ -1,4 +1,4 @@
-"""Which triangle does a ray meet first? For millions of rays."""
+"""The first triangle that each of millions of rays hits."""
 
 from functools import cached_property
 from importlib.util import find_spec
@@ -11,12 +11,12 @@ from tetlux.meshing.search.vtk_rays import RayLocator
 
 # Embree has no wheel for Linux on ARM.
 ENGINE: type[Embree] | type[RayLocator] = RayLocator if find_spec("embreex") is None else Embree
-# Embree computes in single precision: rays start this share of the triangles' extent along their way.
+# Rays start this share of the triangles' extent beyond their origin, since Embree computes in single precision.
 OFFSET = 1e-5
 
 
 class RayCaster:
-    """The triangles of a surface, ready to be met by rays.
+    """The triangles of a surface, prepared for ray casting.
 
     Parameters
     ----------
@@ -34,29 +34,29 @@ class RayCaster:
         return ENGINE((self._corners - self._origin) / self._size)
 
     def first(self, origins: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
-        """The first triangle that each ray meets.
+        """The first triangle that each ray hits.
 
         Parameters
         ----------
         origins, directions : (q, 3) ndarray
-            Directions are unit vectors. What lies within 1e-5 of the surface's extent before the origin is not met.
+            Directions are unit vectors. Hits within 1e-5 of the surface's extent from the origin are ignored.
 
         Returns
         -------
         distances : (q,) ndarray
-            inf where nothing is met.
+            inf for rays without a hit.
         faces : (q,) ndarray
-            -1 where nothing is met.
+            -1 for rays without a hit.
         """
         if len(origins) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64)
-        # No precision holds places far from the triangles: rays start from near them.
+        # Move distant origins near the triangles, where coordinates keep their precision.
         gone = np.maximum(np.einsum("ij,ij->i", self._origin - origins, directions) - self._size, 0.0)
         origins = origins + gone[:, None] * directions
         offset = OFFSET * self._size
         starts = (origins + offset * directions - self._origin) / self._size
         faces, rough = self._engine(starts, directions)
-        # The engine says which triangle; how far that is, is computed anew in full precision.
+        # The engine finds the triangle; its distance is recomputed in double precision.
         corners = self._corners[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):

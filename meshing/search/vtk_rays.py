@@ -1,4 +1,4 @@
-"""Rays by VTK's static cell locator: what stands in for Embree where that has no wheel."""
+"""Ray casting by VTK's static cell locator, for platforms without a wheel of Embree."""
 
 from typing import Any
 
@@ -7,24 +7,24 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import cell_locator
 
-# A ray that passes a triangle by less than this still meets it. With 0, one ray in fifty that is aimed at an edge or a
-# vertex of a sphere passes between its triangles.
+# A ray within this distance of a triangle hits it. With 0, one in fifty rays aimed at an edge or a vertex of a sphere
+# passes between its triangles.
 TOLERANCE = 1e-10
-# Rays begin at most one extent before the middle of the triangles, and half an extent beside it: those that begin
-# farther away meet nothing, and all have passed the triangles after this length.
+# Rays that can hit start within `NEAR` extents of the centre of the triangles and have passed all of them after
+# `LENGTH`.
 NEAR = 1.5
 LENGTH = 3.0
-# Triangles in a bucket of the locator: a ray takes 30 % less time than with the usual ten.
+# Triangles per bucket of the locator: 30 % faster than with the default of ten.
 PER_BUCKET = 3
 
 
 class RayLocator:
-    """Triangles in VTK's static cell locator, in double precision, at about 5 to 15 µs a ray.
+    """Triangles in VTK's static cell locator, in double precision: 5 to 15 µs per ray.
 
     Parameters
     ----------
     corners : (f, 3, 3) ndarray
-        About the origin, with an extent of 1.
+        Centred at the origin, with an extent of 1.
     """
 
     def __init__(self, corners: FloatArray) -> None:
@@ -32,11 +32,11 @@ class RayLocator:
         self._locator = cell_locator(corners.reshape(-1, 3), triangles, PER_BUCKET)
 
     def __call__(self, starts: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The first triangle that each ray (q, 3) meets, -1 for none, and the distance."""
+        """The first triangle that each ray (q, 3) hits, -1 for none, and the distance."""
         from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
 
         faces, distances = np.full(len(starts), -1), np.full(len(starts), np.inf)
-        # What is no number must not reach VTK, which makes bucket numbers of it. Comparisons with nan are false.
+        # VTK computes bucket indices from coordinates, so they must be finite. Comparisons with nan are false.
         near = np.flatnonzero((np.abs(starts) <= NEAR).all(axis=1) & np.isfinite(directions).all(axis=1))
         ends = starts[near] + LENGTH * directions[near]
         share: Any = reference(0.0)

@@ -1,1 +1,1 @@
-"""`Surface`, the closed triangle mesh that bounds a body, and the smooth surface it stands for."""
+"""`Surface`, the closed triangle mesh that bounds a body, and the smooth surface that it approximates."""

@@ -1,10 +1,9 @@
-"""The curved surface that triangles stand for: where it is smooth, each becomes a cubic patch.
+"""The curved surface that triangles approximate: a cubic patch over each triangle of a smooth part.
 
-A triangle mesh of a round body lies inside it, by ``h²/8R`` for edges h and radius R, and light that enters a
-mean free path deep notices: on a sphere of 5,120 triangles and ten mean free paths radius the exitance of the
-flat triangles is off by 0.4 %. Patches through the same vertices with the same normals (PN triangles: Vlachos,
-Peters, Boyd & Mitchell 2001) take that away. Edges that bend by more than the surface's `crease_angle` are meant
-to be edges, and stay straight and sharp.
+The triangles of a round body lie inside it by ``h²/8R``, for edges h and radius R, which matters for light that enters
+one mean free path deep: on a sphere of 5,120 triangles and a radius of ten mean free paths, the exitance of flat
+triangles is off by 0.4 %. Patches through the same vertices with the same normals (PN triangles: Vlachos, Peters, Boyd
+& Mitchell 2001) remove this error. Edges that bend by more than the surface's `crease_angle` stay straight and sharp.
 """
 
 from functools import cached_property
@@ -29,12 +28,12 @@ class CurvedPatches:
     normals : (m, 3) ndarray
         Outward unit normals of the faces.
     crease_angle : float
-        Degrees that two triangles may be bent by at their common edge and still be parts of one smooth surface.
+        Largest angle, degrees, between two triangles of one smooth surface at their common edge.
     """
 
     def __init__(self, points: FloatArray, faces: IntArray, normals: FloatArray, crease_angle: float) -> None:
         self._points, self._faces, self._normals = points, faces, normals
-        # Twelve sides bend by 30 degrees, and all alike whatever the rounding.
+        # The tolerance makes all edges of a regular twelve-sided prism (30 degrees) equal despite rounding.
         self._least_cosine = np.cos(np.radians(crease_angle)) + 1e-6
 
     def __call__(self, faces: IntArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -43,7 +42,7 @@ class CurvedPatches:
         corners, along, middle = (part[index] for part in self._control_points(wanted))
         w = weights[:, :, None]
         after, before = w[:, _NEXT], w[:, _LAST]
-        # along[:, i, 0] lies on the edge to the next corner, a third of the way, along[:, i, 1] on that to the last.
+        # along[:, i, 0] is a third of the way to the next corner, along[:, i, 1] a third of the way to the last.
         value = w**3 * corners + 3.0 * w**2 * (after * along[:, :, 0] + before * along[:, :, 1])
         position = value.sum(axis=1) + 6.0 * w.prod(axis=1) * middle
         slope = 3.0 * w**2 * corners + 6.0 * w * (after * along[:, :, 0] + before * along[:, :, 1])
@@ -54,12 +53,12 @@ class CurvedPatches:
         normal = np.cross(slope[:, 1] - slope[:, 0], slope[:, 2] - slope[:, 0])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         flat = self._normals[faces]
-        # A patch never folds over its own triangle; where a bad one would, the triangle's normal stands.
+        # Where a patch would fold over its own triangle, use the triangle's normal.
         bad = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
         return position, np.where(bad, flat, normal / np.where(length > 0, length, 1.0))
 
     def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of some faces: corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
+        """Control points of faces (f,): corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
         corners = self._points[self._faces[faces]]
         normals = self._corner_normals[faces]
         smooth = self._smooth_sides[faces]
@@ -73,13 +72,13 @@ class CurvedPatches:
 
     @cached_property
     def _corner_normals(self) -> FloatArray:
-        """Unit normals at the corners of the faces, (m, 3, 3): one for all that meet in a vertex between two creases.
+        """Unit normals at the corners of the faces, (m, 3, 3), common to faces at a vertex that no crease separates.
 
         Weighted as Max (1999) does, which is exact for vertices on a sphere.
         """
         count = len(self._faces)
-        first, second = self._joined
-        # An edge runs from corner i to the next on one side and back on the other: its ends are each one vertex.
+        first, second = self._smooth_edges
+        # The two sides of an edge run in opposite directions, so the start of one is the end of the other.
         after_first, after_second = (3 * (edge // 3) + _NEXT[edge % 3] for edge in (first, second))
         ends = np.concatenate([first, after_first]), np.concatenate([after_second, second])
         graph = coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(3 * count, 3 * count))
@@ -95,20 +94,20 @@ class CurvedPatches:
 
     @cached_property
     def _smooth_sides(self) -> BoolArray:
-        """Whether the side from each corner to the next bends less than the crease angle, (m, 3)."""
+        """Whether the edge from each corner to the next bends less than the crease angle, (m, 3)."""
         smooth = np.zeros(3 * len(self._faces), dtype=bool)
-        smooth[np.concatenate(self._joined)] = True
+        smooth[np.concatenate(self._smooth_edges)] = True
         return smooth.reshape(-1, 3)
 
     @cached_property
-    def _joined(self) -> tuple[IntArray, IntArray]:
-        """Edges that bend less than the crease angle, by the corner (3 face + place) they start at on either side."""
+    def _smooth_edges(self) -> tuple[IntArray, IntArray]:
+        """Edges that bend less than the crease angle, by the corners (3 face + place) where their two sides start."""
         tail, head = self._faces, self._faces[:, _NEXT]
         key = (np.minimum(tail, head) * np.int64(len(self._points)) + np.maximum(tail, head)).ravel()
         order = np.argsort(key, kind="stable")
         same = key[order][1:] == key[order][:-1]
         first, second = order[:-1][same], order[1:][same]
         cosine = np.einsum("ij,ij->i", self._normals[first // 3], self._normals[second // 3])
-        # Faces that run along their edge the same way are not two sides of one surface.
+        # Faces that traverse their edge in the same direction are not neighbours on one surface.
         smooth = (cosine >= self._least_cosine) & (tail.ravel()[first] != tail.ravel()[second])
         return first[smooth], second[smooth]

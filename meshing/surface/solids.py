@@ -1,4 +1,4 @@
-"""What the built-in shapes are: dimensions and placement, whatever triangles stand for them.
+"""The built-in shapes by dimensions and placement, independent of their triangles.
 
 A `Surface` that was made by `sphere`, `slab`, `box`, `cylinder` or `torus` carries one of these as its `shape`, so that
 closed forms and exact normals need not be guessed from its triangles. All lengths are in the surface's unit.
@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, Vector
 
-# Vertices lie on their shape within rounding: this share of its size, or of their distance from the origin.
+# Tolerance for vertices on their shape, as a share of its size or of their distance from the origin.
 ROUNDING = 1e-9
 
 
@@ -28,7 +28,7 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Box:
-    """A box with edges along the axes; `size` holds their lengths."""
+    """A box with edges of lengths `size` along the axes."""
 
     size: Vector
     center: Vector = (0.0, 0.0, 0.0)
@@ -53,7 +53,7 @@ class Slab:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """A cylinder along z with flat ends, its middle at `center`."""
+    """A cylinder along z with flat ends, centred at `center`."""
 
     radius: float
     height: float
@@ -67,7 +67,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Torus:
-    """A torus around a line along z: a tube of radius `minor`, whose middle is a circle of radius `major`."""
+    """A torus around a line along z: a tube of radius `minor` around a circle of radius `major`."""
 
     major: float
     minor: float

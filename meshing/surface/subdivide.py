@@ -1,4 +1,4 @@
-"""Splitting triangles whose edges are too long, without gaps between them."""
+"""Split triangles with long edges, conformingly."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ _NEXT = np.array([1, 2, 0])
 
 
 def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """The edges of triangles (f, 3): their ends (e, 2), and the edge from each corner to the next, (f, 3)."""
+    """The edges of triangles (f, 3): end nodes (e, 2), and the edge from each corner to the next, (f, 3)."""
     ends = np.sort(np.stack([faces, faces[:, _NEXT]], axis=2).reshape(-1, 2), axis=1)
     count = int(faces.max(initial=0)) + 1
     key, number = np.unique(ends[:, 0] * np.int64(count) + ends[:, 1], return_inverse=True)
@@ -16,9 +16,10 @@ def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:
 
 
 def with_longest(points: FloatArray, edges: tuple[IntArray, IntArray], marked: BoolArray) -> BoolArray:
-    """Add to marked ones (e,) of the edges from `edges_of` the longest of every triangle that has one, and so on.
+    """Mark the longest edge of every triangle with a marked edge, until nothing changes.
 
-    Splitting these keeps triangles from becoming ever thinner (Rivara 1984).
+    `edges` are those of `edges_of`, `marked` has shape (e,). Longest-edge splits keep triangles from degenerating
+    (Rivara 1984).
     """
     ends, edge = edges
     lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
@@ -34,30 +35,30 @@ def with_longest(points: FloatArray, edges: tuple[IntArray, IntArray], marked: B
 def split_edges(
     points: FloatArray, faces: IntArray, edges: tuple[IntArray, IntArray], marked: BoolArray
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Split edges of triangles in the middle, and triangles with them.
+    """Split edges of triangles at their midpoints, and the triangles with them.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     faces : (f, 3) ndarray
     edges : tuple of ndarray
-        Theirs, from `edges_of`.
+        The edges of the triangles, from `edges_of`.
     marked : (e,) ndarray of bool
-        Which of them to split, as `with_longest` returns it.
+        Edges to split, as `with_longest` returns them.
 
     Returns
     -------
     points : (n + s, 3) ndarray
-        The given ones first, then the middles of the marked edges in their order.
+        The given points, then the midpoints of the marked edges in their order.
     faces : (g, 3) ndarray
     parents : (g,) ndarray
-        The triangle that each is part of.
+        The original triangle of each.
     """
     ends, edge = edges
     middle = np.full(len(ends), -1)
     middle[marked] = len(points) + np.arange(int(marked.sum()))
     lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
-    # From a to b runs the longest edge, which is split first.
+    # The longest edge, from a to b, is split first.
     turn = (lengths[edge].argmax(axis=1)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(faces, turn, axis=1).T
     ab, bc, ca = np.take_along_axis(middle[edge], turn, axis=1).T
@@ -78,7 +79,7 @@ def split_edges(
 
 
 def quartered(corners: FloatArray) -> FloatArray:
-    """Four triangles (4 f, 3, 3) out of each of (f, 3, 3)."""
+    """Split each triangle (f, 3, 3) into four, (4 f, 3, 3)."""
     a, b, c = (corners[:, i] for i in range(3))
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
     parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]

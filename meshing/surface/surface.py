@@ -12,7 +12,7 @@ from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.solids import Shape, lies_on
 
-# Triangles beyond which a surface is taken to be fine enough.
+# Above this number of triangles, a surface counts as fine enough.
 MOST_BULGING = 20_000
 MILLIMETRES = {"nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 UNITS = tuple(MILLIMETRES)
@@ -26,16 +26,11 @@ def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
     return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
 
 
-def place_words(place: FloatArray, size: float) -> str:
-    """Coordinates to be read, of a place in a body of that size: what rounding left of 0 is 0."""
-    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
-
-
 def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Volume and area of each body, (b,), whichever way it faces; `body` (m,) numbers the triangles' bodies from 0."""
+    """Volume and area of each body, (b,), of either orientation; `body` (m,) is the body of each triangle, from 0."""
     corners = points[faces]
     count = int(body.max()) + 1
-    # About its own middle: a small body far away has no digits to spare.
+    # Relative to its own centre, since a small body far from the origin would lose digits.
     middle = np.column_stack([summed(body, x, count) for x in corners.mean(axis=1).T])
     middle /= np.bincount(body, minlength=count)[:, None]
     a, b, c = (corners[:, i] - middle[body] for i in range(3))
@@ -53,7 +48,7 @@ def longest_sides(corners: FloatArray) -> FloatArray:
 class Surface:
     """A closed, outward oriented triangle mesh.
 
-    Made by `read_surface`, by a built-in shape, or from arrays by `surface_from_arrays`; these check it.
+    `read_surface`, the built-in shapes and `surface_from_arrays` make and check surfaces.
 
     Parameters
     ----------
@@ -65,16 +60,16 @@ class Surface:
         The unit of length; coefficients are in 1/unit.
     name : str
     repairs, warnings : tuple of str
-        What was mended when it was read, and what was left that a user should know.
+        What was repaired when the surface was read, and what the user should know about it.
     overlaps : bool
-        Whether it crosses itself or holds a body within another, so that `volume` and `area` count parts of
+        Whether it crosses itself or contains one body inside another, so that `volume` and `area` count parts of
         the body more than once.
     crease_angle : float
-        Triangles that bend by less than this at their common edge, in degrees, are parts of one smooth surface,
-        and `on_curve` is where it is; 0 means the triangles themselves.
+        Triangles that bend by less than this at their common edge, in degrees, belong to one smooth surface, which
+        `on_curve` evaluates; 0 means flat triangles.
     shape : Sphere, Box, Slab, Cylinder or Torus, optional
-        What the triangles stand for, if they were made from a built-in shape. It is kept by whatever copies the
-        surface (``replace``) and dropped where a vertex does not lie on it.
+        The built-in shape that the triangles were made from, if any. Copies (``replace``) keep it while all vertices
+        lie on it.
     """
 
     points: FloatArray
@@ -88,7 +83,7 @@ class Surface:
     shape: Shape | None = None
 
     def __post_init__(self) -> None:
-        # A copy with moved vertices must not be taken for the shape that it was.
+        # A copy with moved vertices no longer has the shape.
         if self.shape is not None and not lies_on(self.points, self.shape):
             object.__setattr__(self, "shape", None)
 
@@ -114,7 +109,7 @@ class Surface:
 
     @property
     def extent(self) -> str:
-        """The ranges of its coordinates, to be read."""
+        """The ranges of the coordinates, as text."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         return ", ".join(f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True)) + (
             f" {self.unit}"
@@ -137,13 +132,13 @@ class Surface:
         return CurvedPatches(self.points, self.faces, self.normals, self.crease_angle)
 
     def on_curve(self, faces: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The smooth surface above points of its triangles.
+        """The smooth surface at points of the triangles.
 
         Parameters
         ----------
         faces : (q,) ndarray
         points : (q, 3) ndarray
-            On these faces.
+            Barycentric coordinates in these faces.
 
         Returns
         -------
@@ -157,9 +152,9 @@ class Surface:
 
     @cached_property
     def bulge(self) -> float:
-        """How much larger the smooth surface's volume is than that of the triangles, as a share of it, roughly.
+        """Approximate excess of the smooth surface's volume over that of the triangles, as a share.
 
-        Surfaces of many triangles do not bulge, and are not looked at.
+        It is taken as 0 for surfaces of many triangles.
         """
         if self.crease_angle <= 0 or len(self.faces) > MOST_BULGING:
             return 0.0
@@ -171,7 +166,7 @@ class Surface:
         return float(added @ triangle_areas(self.points, self.faces)[1]) / self.volume
 
     def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Points (q, 3) of the smooth surface and its normals (q, 3), above the nearest points of triangles."""
+        """Points (q, 3) and normals (q, 3) of the smooth surface, at the nearest points of the triangles."""
         nearest, faces = self.closest(queries)
         return self.on_curve(faces, nearest)
 
@@ -183,7 +178,7 @@ class Surface:
         return inside
 
     def crossings(self, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Where a ray meets the surface.
+        """Intersections of a ray with the surface.
 
         Returns
         -------
@@ -196,7 +191,7 @@ class Surface:
             np.broadcast_to(origin, (count, 3)),
             np.broadcast_to(direction, (count, 3)),
             self.points[self.faces],
-            # A ray through an edge must not slip between two triangles.
+            # The slack keeps a ray through an edge from passing between two triangles.
             slack=1e-10,
         )
         faces = np.flatnonzero(distances > 1e-9 * self.diagonal)
@@ -205,13 +200,13 @@ class Surface:
 
     @cached_property
     def rays(self) -> RayCaster:
-        """The triangles, ready to be met by many rays."""
+        """A ray caster for the triangles."""
         return RayCaster(self.points, self.faces)
 
     def exit(self, origin: FloatArray, direction: FloatArray) -> tuple[float, int] | None:
-        """Where a ray from inside leaves the body.
+        """The point where a ray from inside leaves the body.
 
-        Parts of the surface that lie inside the body (overlaps, shells within) are passed.
+        Parts of the surface inside the body (overlaps, inner shells) do not count.
 
         Returns
         -------
@@ -220,11 +215,11 @@ class Surface:
         """
         distances, faces = self.crossings(origin, direction)
         outward = np.sign(self.normals[faces] @ direction)
-        # A ray through an edge meets two triangles at once: they count once.
+        # A ray through an edge meets two triangles at one distance; they count once.
         same = np.zeros(len(faces), dtype=bool)
         same[1:] = (np.diff(distances) < 1e-9 * self.diagonal) & (outward[1:] == outward[:-1])
         distances, faces, outward = distances[~same], faces[~same], outward[~same]
-        # How deep inside the ray still is after each crossing: beyond the last one it is outside.
+        # Nesting depth after each crossing; it is 0 after the last.
         depth_after = outward[::-1].cumsum()[::-1] - outward
         leaves = np.flatnonzero((outward > 0) & (depth_after <= 0))
         if len(leaves) == 0:

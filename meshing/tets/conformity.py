@@ -1,4 +1,4 @@
-"""Whether tetrahedra fill a body without gaps and overlaps: each face between two of them, or on the boundary."""
+"""Check that tetrahedra fill a body without gaps and overlaps: each face is shared by two or on the boundary."""
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -6,35 +6,33 @@ from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.host.blocks import grouped
+from tetlux.meshing.host.blocks import group_keys
 from tetlux.meshing.notes import Note
-from tetlux.meshing.tets.mesh import FACES, TetMesh
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import FACES, face_keys
 
-# How far outside the middle of a facet another tetrahedron is looked for, as a share of the facet's size; and of the
-# mesh's diagonal, since files round coordinates.
+# Distance outside a facet's centroid at which another tetrahedron is searched, as a share of the facet's size, and its
+# minimum as a share of the mesh's diagonal, since files round coordinates.
 OUTSIDE, ROUNDED = 1e-4, 2e-6
-# A tetrahedron that holds the middle of a facet deeper than this many times that distance is overlapped.
+# A tetrahedron that contains a facet's centroid deeper than this many times that distance overlaps.
 DEEP = 20.0
-# The share of the boundary's area that may lie against or inside other tetrahedra: more is refused, less is said.
+# The share of the boundary's area that may lie against or inside other tetrahedra: more is refused, less is noted.
 MOST_INSIDE = 1e-3
 
 
 def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
-    """The number of faces that more than one tetrahedron has on the same side, so that these overlap.
+    """The number of faces with several tetrahedra on one side, which therefore overlap.
 
     Parameters
     ----------
     corners : (m, 4) ndarray
-        Of positively oriented tetrahedra.
+        Corners of positively oriented tetrahedra.
     nodes : int
-        How many there are.
+        Number of nodes of the mesh.
     """
     faces = corners[:, FACES].reshape(-1, 3)
-    low, high = faces.min(axis=1), faces.max(axis=1)
-    middle = faces.sum(axis=1) - low - high
-    pairs = grouped((low * nodes + middle).astype(np.uint64))[1].astype(np.uint64)
-    _, face = grouped(pairs * np.uint64(nodes) + high.astype(np.uint64))
-    # A face is seen the same way round from one side: the order of its corners is an even or an odd permutation.
+    _, face = group_keys(face_keys(corners, nodes))
+    # Tetrahedra on one side of a face list its corners in the same orientation: an even or an odd permutation.
     first, second = faces[:, 0], faces[:, 1]
     even = ((first < second) & ((second < faces[:, 2]) | (faces[:, 2] < first))) | (
         (first > second) & (second < faces[:, 2]) & (faces[:, 2] < first)
@@ -45,7 +43,7 @@ def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
 
 
 def check_overlap(corners: IntArray, nodes: int) -> None:
-    """Refuse tetrahedra that have a face in common and lie on the same side of it.
+    """Refuse tetrahedra that lie on the same side of a common face.
 
     Raises
     ------
@@ -60,12 +58,12 @@ def check_overlap(corners: IntArray, nodes: int) -> None:
 
 
 def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
-    """Refuse a mesh that counts a volume twice, or has parts that touch but have no nodes in common.
+    """Refuse a mesh with overlaps, or with parts that touch without common nodes.
 
     Returns
     -------
     tuple of str
-        What a user should know: facets that lie against others, if they are few.
+        Notes on facets that lie against others, if they are few.
 
     Raises
     ------
@@ -76,12 +74,12 @@ def check_conformity(mesh: TetMesh) -> tuple[str, ...]:
 
 
 def conformity_of(mesh: TetMesh) -> tuple[str, ...]:
-    """`check_conformity`, once for each mesh."""
-    return mesh.remembered(check_conformity, lambda: check_conformity(mesh))
+    """`check_conformity`, computed once per mesh."""
+    return mesh.cache.get(check_conformity, lambda: check_conformity(mesh))
 
 
-def check_facets(mesh: TetMesh, joined: bool = False) -> tuple[str, ...]:
-    """The part of `check_conformity` that looks at the boundary; `joined` if no two nodes are at one place."""
+def check_facets(mesh: TetMesh, merged: bool = False) -> tuple[str, ...]:
+    """The part of `check_conformity` for the boundary; `merged` if coincident nodes were merged."""
     against, inside = _covered_facets(mesh)
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:
@@ -103,21 +101,21 @@ def check_facets(mesh: TetMesh, joined: bool = False) -> tuple[str, ...]:
         f"parts touch without having their nodes in common: {figure} of the boundary face each other inside, and no "
         "light would pass there; mesh the parts together, so that they share the nodes between them (in gmsh with "
         "BooleanFragments or Coherence)"
-        + ("." if joined else ", or give doubled nodes to mesh_from_arrays, which joins them.")
+        + ("." if merged else ", or give doubled nodes to mesh_from_arrays, which joins them.")
     )
 
 
 def _parts(mesh: TetMesh) -> int:
-    """How many parts it has that have no node in common."""
+    """The number of parts without common nodes."""
     size = len(mesh.points)
     used = np.unique(mesh.tetrahedra).size
     links = coo_array((np.ones(len(mesh.edges), dtype=bool), mesh.edges.T), shape=(size, size))
-    # A node that no tetrahedron uses is a part of its own.
+    # Each unused node counts as a component.
     return int(connected_components(links, directed=False)[0]) - (size - used)
 
 
 def _covered_facets(mesh: TetMesh) -> tuple[BoolArray, BoolArray]:
-    """Which facets of the boundary lie against another tetrahedron, and which inside one, (f,) each."""
+    """Boundary facets that lie against another tetrahedron, and those inside one, (f,) each."""
     corners = mesh.points[mesh.boundary_faces]
     middles = corners.mean(axis=1)
     normals, areas = mesh.surface.normals, mesh.boundary_areas
@@ -125,7 +123,7 @@ def _covered_facets(mesh: TetMesh) -> tuple[BoolArray, BoolArray]:
     cells, weights = mesh.locate(middles + steps[:, None] * normals)
     covered = (cells >= 0) & (cells != mesh.boundary_cells)
     rows = np.flatnonzero(covered)
-    # The distance from the nearest face of that tetrahedron: a coordinate times its height, the inverse of its slope.
+    # The distance from a face of that tetrahedron is a barycentric coordinate times the height on the face.
     heights = 1.0 / np.linalg.norm(mesh.hat_gradients[cells[rows]], axis=2)
     deep = (weights[rows] * heights).min(axis=1) > DEEP * steps[rows]
     inside = np.zeros(len(cells), dtype=bool)

@@ -1,4 +1,4 @@
-"""Tetrahedra made elsewhere, mended where that is safe and checked before they become a `TetMesh`."""
+"""Repair and check tetrahedra that were made elsewhere, and make a `TetMesh` of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -13,27 +13,29 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.topology import distinct_rows
 from tetlux.meshing.tets.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
-from tetlux.meshing.tets.mesh import EDGES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.topology import EDGES
 
-# The largest coordinate, in whatever unit.
+# Largest coordinate, in any unit.
 LONGEST = 1e30
-# Nodes nearer to each other than this share of the mesh's diagonal are one node (files round at a tenth of it), unless
-# the second share of the shortest edge is less.
+# Nodes are merged within the first share of the mesh's diagonal (rounding in files is a tenth of it), or within the
+# second share of the shortest edge if that is less.
 SAME_PLACE, OF_SHORTEST_EDGE = 1e-6, 1e-3
-# A tetrahedron whose volume is less than this share of its longest edge cubed is flat: rounding makes it so.
+# A tetrahedron is flat if its volume is below this share of the cube of its size, the level of rounding errors.
 FLAT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class _Tetrahedra:
-    """Tetrahedra on their way to a mesh.
+    """Tetrahedra that are being repaired.
 
     Attributes
     ----------
     points : (n, 3) ndarray
     corners : (m, 4) ndarray
     nodes, cells : (n,), (m,) ndarray
-        The numbers that nodes and tetrahedra were given with.
+        Indices of the nodes and tetrahedra in the given arrays.
     repairs : tuple of str
     """
 
@@ -44,7 +46,7 @@ class _Tetrahedra:
     repairs: tuple[str, ...] = ()
 
     def only(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
-        """Those that are kept, with a sentence that says why the others are not."""
+        """The tetrahedra that are kept, with a sentence on why the others are not."""
         if kept.all():
             return self
         if not kept.any():
@@ -61,34 +63,34 @@ def mesh_from_arrays(
     unit: str = "mm",
     numbered_from: int | None = None,
 ) -> TetMesh:
-    """Make a mesh of tetrahedra that come from elsewhere: mend what can be mended safely, and refuse the rest.
+    """Make a mesh of tetrahedra from other programs: repair what can be repaired safely, and refuse the rest.
 
     Parameters
     ----------
     points : (n, 3) array_like
         Nodes, in `unit`.
     tetrahedra : (m, 4) array_like of int
-        Corners, either way round.
+        Corners, in either orientation.
     labels : (m,) array_like of int, optional
-        What each tetrahedron is of: any integers. Media are given by them, see `tetlux.fem.solve`.
+        Label of each tetrahedron, any integer; `tetlux.fem.solve` takes media by label.
     names : mapping of int to str, optional
-        Of the labels.
+        Names of the labels.
     unit : str
         Unit of the coordinates.
     numbered_from : {0, 1}, optional
-        The number of the first node in `tetrahedra`; if not given it is 1 where number n is used and 0 is not, which
-        `repairs` then says, and else 0.
+        The number of the first node in `tetrahedra`. If not given, it is 1 if number n is used and 0 is not, which
+        `repairs` then reports, and otherwise 0.
 
     Returns
     -------
     TetMesh
-        `repairs` says what was mended: nodes that lie at one place are joined, unused nodes, flat tetrahedra and
-        copies are left out, inverted tetrahedra are turned.
+        `repairs` lists what was repaired: coincident nodes are merged, unused nodes, flat tetrahedra and copies are
+        removed, inverted tetrahedra are reoriented.
 
     Raises
     ------
     InputError
-        If shapes or numbers are wrong, tetrahedra overlap, or parts touch without having their nodes in common.
+        If shapes or numbers are wrong, tetrahedra overlap, or parts touch without common nodes.
 
     Examples
     --------
@@ -103,7 +105,7 @@ def mesh_from_arrays(
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Arrays as `mesh_from_arrays` takes them, and what is to be said of how they were read."""
+    """Arrays as `mesh_from_arrays` takes them, with notes on how they were read."""
 
     points: npt.ArrayLike
     tetrahedra: npt.ArrayLike
@@ -115,56 +117,56 @@ class Given:
 
 
 def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
-    """The mesh that arrays make, and the number that each of its nodes was given with, (k,).
+    """Make a checked mesh of arrays; also return the given index of each of its nodes, (k,).
 
     Raises
     ------
     InputError
         As `mesh_from_arrays`.
     """
-    numbered = _numbered(given.points, given.tetrahedra, given.numbered_from)
+    numbered = _check_arrays(given.points, given.tetrahedra, given.numbered_from)
     regions = None if given.labels is None else whole_numbers(given.labels, len(numbered.corners))
     if given.labels is not None and regions is None:
         raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
-    mended = _without_copies(_turned(_without_flat(_joined(numbered))), regions)
-    present = {} if regions is None else dict.fromkeys(np.unique(regions[mended.cells]).tolist())
+    repaired = _remove_copies(_reorient(_remove_flat(_merge_nodes(numbered))), regions)
+    present = {} if regions is None else dict.fromkeys(np.unique(regions[repaired.cells]).tolist())
     mesh = TetMesh(
-        mended.points,
-        mended.corners,
+        repaired.points,
+        repaired.corners,
         unit,
         labels={label: name for label, name in given.names.items() if label in present},
-        repairs=(*given.repairs, *mended.repairs),
+        repairs=(*given.repairs, *repaired.repairs),
         warnings=given.warnings,
-        **({} if regions is None else {"regions": regions[mended.cells]}),
+        **({} if regions is None else {"regions": regions[repaired.cells]}),
     )
-    found = check_facets(mesh, joined=True)
+    found = check_facets(mesh, merged=True)
     if found:
         mesh = replace(mesh, warnings=(*given.warnings, *found))
-    # So that it is not checked again when it is solved on.
-    mesh.remembered(check_conformity, lambda: found)
-    return mesh, mended.nodes
+    # Cached, so that a solve does not check the mesh again.
+    mesh.cache.get(check_conformity, lambda: found)
+    return mesh, repaired.nodes
 
 
 def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """`mesh_from_arrays` without labels, and the number that each of the mesh's nodes was given with, (k,)."""
+    """`mesh_from_arrays` without labels; also return the given index of each of the mesh's nodes, (k,)."""
     return checked_mesh(Given(points, cells), unit)
 
 
 def unjoined(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """Tetrahedra that only carry values, whose parts may have nodes of their own: turned where they are inverted.
+    """Make a mesh that only carries values, so its parts need no common nodes; inverted tetrahedra are reoriented.
 
     Returns
     -------
     mesh : TetMesh
     nodes : (k,) ndarray
-        The number that each of its nodes was given with.
+        The given index of each of its nodes.
     """
-    given = _turned(_numbered(points, cells))
+    given = _reorient(_check_arrays(points, cells))
     return TetMesh(given.points, given.corners, unit), given.nodes
 
 
-def _numbered(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
-    """Tetrahedra with nodes that exist, lie somewhere, and are all used."""
+def _check_arrays(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
+    """Check shapes, node numbers and coordinates; drop unused nodes."""
     try:
         vertices, corners = np.asarray(points, dtype=np.float64), np.array(cells)
     except (TypeError, ValueError) as error:
@@ -181,13 +183,13 @@ def _numbered(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | 
     corners -= numbered_from or 0
     if corners.min() < 0 or corners.max() >= len(vertices):
         raise InputError("a tetrahedron names a node that does not exist; the file is damaged.")
-    vertices, corners, nodes = _used(vertices, corners, np.arange(len(vertices)))
+    vertices, corners, nodes = _drop_unused(vertices, corners, np.arange(len(vertices)))
     if not (np.abs(vertices) < LONGEST).all():
         raise InputError("a node's coordinate is no number, or absurdly large; export the file again.")
     return _Tetrahedra(vertices, corners, nodes, np.arange(len(corners)), tuple(repairs))
 
 
-def _used(points: FloatArray, corners: IntArray, nodes: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
+def _drop_unused(points: FloatArray, corners: IntArray, nodes: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
     """Points, corners and node numbers without the nodes that no tetrahedron uses."""
     used = np.zeros(len(points), dtype=bool)
     used[corners] = True
@@ -196,14 +198,14 @@ def _used(points: FloatArray, corners: IntArray, nodes: IntArray) -> tuple[Float
     return points[used], (np.cumsum(used) - 1)[corners], nodes[used]
 
 
-def _joined(given: _Tetrahedra) -> _Tetrahedra:
-    """One node for all that lie at one place."""
+def _merge_nodes(given: _Tetrahedra) -> _Tetrahedra:
+    """Merge nodes that coincide."""
     points, corners = given.points, given.corners
     near = SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     if len(pairs) == 0:
         return given
-    # Nodes of a tetrahedron that small are not one node.
+    # Do not merge the nodes of small tetrahedra.
     starts, ends = points[corners[:, EDGES]].transpose(2, 0, 1, 3)
     lengths = np.linalg.norm(ends - starts, axis=2)
     shortest = float(lengths.min(initial=near / OF_SHORTEST_EDGE, where=lengths > 0.0))
@@ -214,21 +216,21 @@ def _joined(given: _Tetrahedra) -> _Tetrahedra:
     _, place = connected_components(coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size)), directed=False)
     _, first = np.unique(place, return_index=True)
     repair = f"{size - len(first):,} nodes that lie where another one does were joined with it."
-    vertices, corners, nodes = _used(points[first], place[corners].astype(np.int64), given.nodes[first])
+    vertices, corners, nodes = _drop_unused(points[first], place[corners].astype(np.int64), given.nodes[first])
     return replace(given, points=vertices, corners=corners, nodes=nodes, repairs=(*given.repairs, repair))
 
 
-def _without_flat(given: _Tetrahedra) -> _Tetrahedra:
+def _remove_flat(given: _Tetrahedra) -> _Tetrahedra:
     points, corners = given.points, given.corners
     volumes = np.abs(tetrahedron_volumes(points, corners))
     sizes = np.ptp(points[corners], axis=1).max(axis=1)
     flat = volumes <= FLAT * sizes**3
     found = given.only(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
-    vertices, corners, nodes = _used(found.points, found.corners, found.nodes)
+    vertices, corners, nodes = _drop_unused(found.points, found.corners, found.nodes)
     return replace(found, points=vertices, corners=corners, nodes=nodes)
 
 
-def _turned(given: _Tetrahedra) -> _Tetrahedra:
+def _reorient(given: _Tetrahedra) -> _Tetrahedra:
     inverted = tetrahedron_volumes(given.points, given.corners) < 0
     if not inverted.any():
         return given
@@ -240,8 +242,8 @@ def _turned(given: _Tetrahedra) -> _Tetrahedra:
     )
 
 
-def _without_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
-    """Each tetrahedron once: of copies the one with the label that the fewest have, as parts of a whole have it."""
+def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
+    """Keep each tetrahedron once: of copies, the one with the rarest label, which is that of a part of a whole."""
     if not doubly_covered_faces(given.corners, len(given.points)):
         return given
     labels = np.zeros(len(given.corners), dtype=np.int64) if regions is None else regions[given.cells]
@@ -259,7 +261,7 @@ def _without_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra
 
 
 def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:
-    """Values as integers, if there are so many and they are whole and below 2^31, whatever their type; else None."""
+    """Values of any type as integers; None unless there are `count`, all whole and below 2^31."""
     array = np.asarray(values)
     if array.size != count or array.ndim > 2 or array.shape[:1] != (count,) or array.dtype.kind not in "biuf":
         return None

@@ -1,6 +1,6 @@
-"""Paths that were marched through a mesh, kept for those who ask for them again.
+"""Paths that were traced through a mesh, cached for later requests.
 
-Light of one refractive index takes the same paths in every medium, and only fades more or less along them.
+At equal refractive index, light takes the same paths in every medium; only its attenuation along them differs.
 """
 
 from dataclasses import dataclass, field, replace
@@ -10,47 +10,47 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.search.cell_tree import Stretches
+from tetlux.meshing.search.cell_tree import PathSegments
 
-# Stretches that are kept of one mesh: two hundred megabytes.
-MOST_KEPT = 1 << 21
-# And parts, each of which is looked through; the oldest go first.
+# Segments cached per mesh: two hundred megabytes.
+MOST_SEGMENTS = 1 << 21
+# Parts cached per mesh, since each is searched; the oldest are dropped first.
 MOST_PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Marched:
-    """Paths that were marched.
+class TracedPaths:
+    """Paths that were traced.
 
     Parameters
     ----------
     lines : (7, p) ndarray
-        Starts, directions, and how far each was marched.
+        Starts, directions, and the length traced of each.
     cells, ends : (p,) ndarray
-        The tetrahedra in which they begin and end.
+        The tetrahedra in which the paths begin and end.
     lost : (p,) ndarray of bool
-        Those that could not be marched.
-    stretches : Stretches
-        Of the others.
+        Paths whose tracing failed.
+    segments : PathSegments
+        Segments of the other paths.
     """
 
     lines: FloatArray
     cells: IntArray
     ends: IntArray
     lost: BoolArray
-    stretches: Stretches
+    segments: PathSegments
 
     @cached_property
     def _by_key(self) -> tuple[FloatArray, IntArray]:
-        """The keys of all paths, ascending, and whose they are."""
+        """The keys of all paths, ascending, and the path of each."""
         keys = keys_of(self.lines)
         order = np.argsort(keys)
         return keys[order], order
 
     def find(self, keys: FloatArray, lines: FloatArray, cells: IntArray) -> IntArray:
-        """The paths that are the same as lines (7, p) from given tetrahedra, however far, (p,); -1 where none is.
+        """The cached path, (p,), with the start, direction and tetrahedron of each line (7, p); -1 if none.
 
-        Of lines that are the same, only one is found.
+        Lengths may differ. Of several equal lines, only one is found.
         """
         known, order = self._by_key
         places = np.minimum(np.searchsorted(known, keys), len(order) - 1)
@@ -67,30 +67,33 @@ class Marched:
         found[alike[first]] = places[first]
         return found
 
-    def some(self, places: IntArray) -> "Marched":
-        """Some of the paths, in a given order."""
+    def select(self, places: IntArray) -> "TracedPaths":
+        """The paths of given indices, in that order."""
         if np.array_equal(places, np.arange(len(self.cells))):
             return self
         number = np.full(len(self.cells), -1)
         number[places] = np.arange(len(places))
-        numbers = number[self.stretches.paths]
-        stretches = some_of(replace(self.stretches, paths=numbers), numbers >= 0)
-        return Marched(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], stretches)
+        numbers = number[self.segments.paths]
+        segments = select_segments(replace(self.segments, paths=numbers), numbers >= 0)
+        return TracedPaths(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], segments)
 
-    def up_to(self, lengths: FloatArray) -> "Marched":
-        """The same no further than some lengths (p,); where they end is not known any more."""
+    def shorten(self, lengths: FloatArray) -> "TracedPaths":
+        """The paths cut off at lengths (p,); `ends` of the shortened paths is then not valid."""
         if (self.lines[6] <= lengths).all():
             return self
-        every = self.stretches
-        most = lengths[every.paths]
-        return replace(self, stretches=some_of(replace(every, leave=np.minimum(every.leave, most)), every.enter < most))
+        every = self.segments
+        longest = lengths[every.paths]
+        return replace(
+            self,
+            segments=select_segments(replace(every, leave=np.minimum(every.leave, longest)), every.enter < longest),
+        )
 
-    def on(self, more: "Marched", further: IntArray) -> "Marched":
-        """Together with what some of its paths were marched from where they ended."""
+    def extend(self, more: "TracedPaths", further: IntArray) -> "TracedPaths":
+        """The paths with continuations `more` of the paths `further`, traced from where these ended."""
         lines, ends, lost = self.lines.copy(), self.ends.copy(), self.lost.copy()
         lines[6, further], ends[further], lost[further] = more.lines[6], more.ends, more.lost
-        one, other = self.stretches, more.stretches
-        stretches = Stretches(
+        one, other = self.segments, more.segments
+        segments = PathSegments(
             np.concatenate([one.paths, further[other.paths]]),
             np.concatenate([one.cells, other.cells]),
             np.concatenate([one.enter, other.enter]),
@@ -98,44 +101,44 @@ class Marched:
             np.concatenate([one.weights, other.weights]),
             np.concatenate([one.slopes, other.slopes]),
         )
-        return Marched(lines, self.cells, ends, lost, some_of(stretches, ~lost[stretches.paths]))
+        return TracedPaths(lines, self.cells, ends, lost, select_segments(segments, ~lost[segments.paths]))
 
     __repr__ = one_line
 
 
-def some_of(every: Stretches, chosen: BoolArray) -> Stretches:
-    """The chosen stretches."""
+def select_segments(every: PathSegments, chosen: BoolArray) -> PathSegments:
+    """The chosen segments."""
     if chosen.all():
         return every
     places = np.flatnonzero(chosen)
-    return Stretches(
+    return PathSegments(
         every.paths[places],
         every.cells[places],
         every.enter[places],
         every.leave[places],
-        # As they are marched, by corners.
+        # Selected corner by corner, the memory order in which paths are traced.
         every.weights.T.take(places, axis=1).T,
         every.slopes.T.take(places, axis=1).T,
     )
 
 
-# Any numbers of the same size that have nothing to do with each other.
+# Hash weights, linearly independent over the rationals.
 _WEIGHTS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
 
 
 def keys_of(lines: FloatArray) -> FloatArray:
-    """A number for each of lines (7, p), by where they start and go; the same, to the last bit, for the same."""
+    """A hash of the start and direction of each line (7, p), (p,); bitwise equal lines have equal hashes."""
     return np.asarray(sum(weight * row for weight, row in zip(_WEIGHTS, lines[:6], strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
-    """What was marched through one mesh."""
+class PathCache:
+    """The paths that were traced through one mesh."""
 
-    parts: list[Marched] = field(default_factory=list)
+    parts: list[TracedPaths] = field(default_factory=list)
 
-    def add(self, part: Marched, instead: Marched | None = None) -> None:
-        """Keep paths, in the place of a part that they continue if there is one, unless they are too many."""
+    def add(self, part: TracedPaths, instead: TracedPaths | None = None) -> None:
+        """Cache a part, in place of the part that it extends, unless the cache would exceed its size limit."""
         others = [each for each in self.parts if each is not instead]
-        if sum(len(each.stretches.paths) for each in [*others, part]) <= MOST_KEPT:
+        if sum(len(each.segments.paths) for each in [*others, part]) <= MOST_SEGMENTS:
             self.parts[:] = [*others, part][-MOST_PARTS:]

@@ -1,4 +1,4 @@
-"""Refinement of marked tetrahedra, with new boundary nodes on the true surface."""
+"""Refine marked tetrahedra, with new boundary nodes on the true surface."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,18 +8,20 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.mesh import EDGES, EDGES_OF_FACES, TetMesh, tetrahedron_volumes
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import nodes_of
+from tetlux.meshing.tets.topology import EDGES, EDGES_OF_FACES
 
-# When boundary nodes move, no tetrahedron may keep less than this share of its volume or of its quality; and
-# below this quality, no tetrahedron may get worse. Otherwise the move is shortened.
+# Moves of boundary nodes are shortened until each tetrahedron keeps this share of its volume and of its quality, and a
+# quality above the second value, or its old quality if that was lower.
 SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
-# A node on two surfaces goes to one and the other in turn so often, which ends where they meet.
+# A node on two surfaces is projected on them in turn this many times, which converges to their intersection.
 ROUNDS = 10
 # The edges of a tetrahedron, and of each of its faces.
 _GROUPS = [list(range(6)), *EDGES_OF_FACES.tolist()]
-# Even permutations of the corners that put each edge first, and where they put the edges.
+# Even permutations of the corners that put each edge first, and the resulting permutations of the edges.
 _EDGE_FIRST = np.array([[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 2, 0], [2, 3, 0, 1]])
 _ITS_EDGES = np.array(
     [[EDGES.tolist().index(sorted(pair)) for pair in corners[EDGES].tolist()] for corners in _EDGE_FIRST]
@@ -29,28 +31,28 @@ _ITS_EDGES = np.array(
 def refine(
     mesh: TetMesh, marked: BoolArray, surface: Surface | None = None, regions: Sequence[Surface] = ()
 ) -> TetMesh:
-    """Split marked tetrahedra (and as many neighbours as keeps the mesh conforming) by longest edges.
+    """Bisect marked tetrahedra by longest edges, and neighbours as needed for a conforming mesh.
 
     Parameters
     ----------
     mesh : TetMesh
     marked : (m,) ndarray of bool
     surface : Surface, optional
-        Where new boundary nodes are moved to; without it they stay in the middle of their edges.
+        Surface that new boundary nodes are moved to; without it they stay at the midpoints of edges.
     regions : sequence of Surface
-        Where new nodes between regions are moved to: the inner surfaces that the mesh was made of, in their order.
+        Surfaces that new nodes between regions are moved to: the inner surfaces of the mesh, in their order.
 
     Returns
     -------
     TetMesh
-        Its first ``len(mesh.points)`` nodes are those of `mesh`; parts of a tetrahedron are in its region.
+        Its first ``len(mesh.points)`` nodes are those of `mesh`; parts of a tetrahedron keep its region.
 
     Raises
     ------
     InputError
         If `mesh` has more regions than there are inner surfaces, unless there are none.
     """
-    points, tetrahedra, parents = _bisected(mesh, marked)
+    points, tetrahedra, parents = _bisect(mesh, marked)
     fine = TetMesh(points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
     if mesh.regions.any():
         fine = replace(fine, regions=mesh.regions[parents])
@@ -59,20 +61,19 @@ def refine(
     return moved_to_surface(fine, surface, regions, first=len(mesh.points))
 
 
-def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
-    """New points and tetrahedra, and the old tetrahedron that each is part of.
+def _bisect(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
+    """Bisect tetrahedra: new points and tetrahedra, and the old tetrahedron of each.
 
     Bisection by longest edges (Plaza & Carey 2000, refinement based on the skeleton).
 
-    All edges have one order, by length. A tetrahedron or a face any of whose edges is split has its longest one
-    split too, and the split edges of a tetrahedron are halved from the longest to the shortest: both sides of a face
-    then cut it in the same way.
+    All edges have one order, by length. If any edge of a tetrahedron or a face is split, so is its longest one, and the
+    split edges of a tetrahedron are halved from the longest to the shortest. So both sides of a face are cut alike.
     """
     ends, edges = mesh.edges, mesh.tetrahedron_edges
     order = np.empty(len(ends), dtype=np.int32)
     order[np.argsort(mesh.edge_lengths, kind="stable")] = np.arange(len(ends))
     priority = order[edges]
-    split = np.flatnonzero(_closed(edges, priority, marked, len(ends)))
+    split = np.flatnonzero(_mark_edges(edges, priority, marked, len(ends)))
     points = np.concatenate([mesh.points, 0.5 * (mesh.points[ends[split, 0]] + mesh.points[ends[split, 1]])])
     middle_of_edge = np.full(len(ends), -1)
     middle_of_edge[split] = len(mesh.points) + np.arange(len(split))
@@ -92,7 +93,7 @@ def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, I
         middles = np.take_along_axis(middles, _ITS_EDGES[longest], axis=1)
         priority = np.take_along_axis(priority, _ITS_EDGES[longest], axis=1)
         halves, middles_of_halves = np.stack([corners, corners]), np.stack([middles, middles])
-        # The middle takes the place of the second corner, and of the first; the edges that meet there stay whole.
+        # The midpoint replaces the second corner in one half and the first in the other; edges at it are not split.
         halves[0, :, 1] = halves[1, :, 0] = middles[:, 0]
         middles_of_halves[0][:, [0, 3, 4]] = -1
         middles_of_halves[1][:, [0, 1, 2]] = -1
@@ -100,8 +101,8 @@ def _bisected(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, I
         priority, parents = np.concatenate([priority, priority]), np.concatenate([parents, parents])
 
 
-def _closed(edges: IndexArray, priority: IndexArray, marked: BoolArray, count: int) -> BoolArray:
-    """The edges that have to be split, of `count`, for the longest of each marked tetrahedron to be."""
+def _mark_edges(edges: IndexArray, priority: IndexArray, marked: BoolArray, count: int) -> BoolArray:
+    """Which of `count` edges are split: the longest of each marked tetrahedron, and those that conformity adds."""
     rows = np.arange(len(edges))
     longest = [edges[rows, np.array(group)[priority[:, group].argmax(axis=1)]] for group in _GROUPS]
     split = np.zeros(count, dtype=bool)
@@ -119,8 +120,8 @@ def moved_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]
 
     Nodes between regions are moved to the inner surfaces, and those where surfaces touch onto both.
 
-    A node whose move would invert or squash a tetrahedron goes only part of the way, or stays. On fTetWild's
-    meshes 0 to 5 % of the nodes do, and the worst quality stays above 0.1 where it was.
+    A node whose move would invert or flatten a tetrahedron moves only part of the way or not at all. On fTetWild's
+    meshes these are 0 to 5 % of the nodes, and a worst quality above 0.1 stays above it.
     """
     targets = [(target, np.flatnonzero(nodes[first:]) + first) for target, nodes in nodes_of(mesh, surface, regions)]
     surfaces_at = np.bincount(np.concatenate([nodes for _, nodes in targets]), minlength=len(mesh.points))
@@ -142,7 +143,7 @@ def moved_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]
         squashed = tetrahedron_volumes(moved, touched) < least
         sound = np.flatnonzero(~squashed)
         if len(sound) > 0:
-            # A node that stays leaves the quality the same but for rounding.
+            # The tolerance covers rounding of the quality where no node moved.
             squashed[sound] = TetMesh(moved, touched[sound]).quality < (1.0 - 1e-9) * lowest[sound]
         if not squashed.any():
             break

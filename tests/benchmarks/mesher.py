@@ -13,7 +13,8 @@ import numpy as np
 from tetlux.meshing import Surface, TetMesh, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.repair.topology import compact
-from tetlux.meshing.tets.regions import nesting, own_volumes
+from tetlux.meshing.tets.nesting import nesting
+from tetlux.meshing.tets.regions import own_volumes
 
 
 def ellipsoid(*radii: float) -> Surface:

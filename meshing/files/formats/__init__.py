@@ -1,1 +1,1 @@
-"""Readers of surface files, one a format: from bytes to points and triangles."""
+"""Readers of surface files, one per format: from bytes to points and triangles."""

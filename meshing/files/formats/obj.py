@@ -1,4 +1,4 @@
-"""Wavefront OBJ: `v` and `f`; everything else is about looks, curves or names."""
+"""Wavefront OBJ: `v` and `f`; other lines (materials, curves, names) are ignored."""
 
 import re
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ def read_obj(data: bytes) -> tuple[FloatArray, IntArray]:
     Raises
     ------
     ValueError
-        If a number is none, or a vertex has fewer than three.
+        If a number is invalid, or a vertex has fewer than three.
     """
     if b"\\" in data:
         data = re.sub(rb"\\[ \t]*(\r\n|\n|\r)", b" ", data)
@@ -35,14 +35,14 @@ def read_obj(data: bytes) -> tuple[FloatArray, IntArray]:
     points = words[starts[:, None] + np.arange(1, 4)].astype(np.float64)
     words, starts, counts = _words([line for line in lines if line[:1] == b"f"], b"f")
     corners = np.delete(words, starts).astype(np.int64)
-    # A 0 or what counts back too far becomes -1, which names no vertex.
+    # 0 and negative indices out of range become -1, which is no vertex.
     before = np.repeat(np.cumsum(kinds == 0)[kinds == 1], counts)
     corners = np.where(corners > 0, corners - 1, np.where(corners < 0, np.maximum(corners + before, -1), -1))
     return points, triangulate(points, corners, counts)
 
 
 def _words(lines: Sequence[bytes], key: bytes) -> tuple[npt.NDArray[np.bytes_], IntArray, IntArray]:
-    """The words of lines that begin with a key, where each line begins, and how many words follow its key."""
+    """The words of lines that begin with a key, the first word of each line, and the number of words after its key."""
     text = b" ".join(lines)
     if b"/" in text:
         text = re.sub(rb"/\S*", b"", text)

@@ -23,7 +23,7 @@ def read_off(data: bytes) -> tuple[FloatArray, IntArray]:
     InputError
         If the file is binary, of other dimensions or was cut short.
     ValueError
-        If it is no OFF.
+        If it is not OFF.
     """
     lines = [line.split(b"#")[0].split() for line in data.splitlines()]
     rows = [line for line in lines if line]
@@ -33,7 +33,7 @@ def read_off(data: bytes) -> tuple[FloatArray, IntArray]:
             raise InputError("is an OFF file of more than three dimensions; export it with three.")
         if rows[0][1:2] == [b"BINARY"]:
             raise InputError("is a binary OFF file; export it as text.")
-        # ModelNet's files have no blank between the word and the first count.
+        # ModelNet's files have no space between OFF and the first count.
         rows[0] = [head[3], *rows[0][1:]] if head[3] else rows[0][1:]
         rows = rows if rows[0] else rows[1:]
     vertices, polygons = int(rows[0][0]), int(rows[0][1])

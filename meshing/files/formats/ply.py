@@ -26,7 +26,7 @@ def read_ply(data: bytes) -> tuple[FloatArray, IntArray]:
     InputError
         If the file was cut short.
     ValueError
-        If it is no PLY.
+        If it is not PLY.
     """
     order, elements, start = _head(data)
     columns: dict[str, dict[str, Column]] = {}
@@ -65,15 +65,15 @@ def _of_strips(_: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
     faces = np.column_stack([corners[:-2], corners[1:-1], corners[2:]])
     odd = place[:-2] % 2 == 1
     faces[odd] = faces[odd][:, [1, 0, 2]]
-    # Strips are turned by corners that are named twice.
+    # Repeated corners reverse the orientation in a strip.
     proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     return np.asarray(faces[(strip[:-2] == strip[2:]) & proper])
 
 
 def _head(data: bytes) -> tuple[str, list[Element], int]:
-    """Byte order (nothing for text), elements, and where the rows start."""
+    """Byte order (empty for text), elements, and the offset of the rows."""
     first = re.match(rb"ply[ \t]*(\r\n|\n|\r)", data)
-    # A comment may name the last line's word; the first binary number may begin as a line's end does.
+    # A comment may contain ``end_header``; the first binary byte may equal a line ending.
     last = re.search(rb"[\r\n][ \t]*end_header[ \t]*" + (first[1] if first else b"\n"), data)
     if first is None or last is None:
         raise ValueError("no head")

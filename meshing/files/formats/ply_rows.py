@@ -1,4 +1,4 @@
-"""The rows of a PLY file, element by element, whatever their properties are."""
+"""Read the rows of a PLY file by element, with any properties."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +11,7 @@ from tetlux.meshing.arrays import IntArray
 
 @dataclass
 class Element:
-    """One kind of row: its properties are (name, type of the list's length or nothing, type)."""
+    """One kind of row; each property is (name, type of the list's length or empty, type)."""
 
     name: str
     count: int
@@ -20,7 +20,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Lists:
-    """Lists of one property: all values, one after the other, and the length of each list."""
+    """Lists of one property: the concatenated values, and the length of each list."""
 
     values: npt.NDArray[Any]
     counts: IntArray
@@ -30,18 +30,18 @@ Column = npt.NDArray[Any] | Lists
 
 
 class Rows:
-    """Takes values one after the other; an IndexError says that there are no more."""
+    """Reads values in sequence; an IndexError means that none are left."""
 
     def take(self, kind: str, count: int) -> npt.NDArray[Any]:
         """The next values of a type."""
         raise NotImplementedError
 
     def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
-        """The columns of an element whose lists have these lengths in every row, or None if they do not."""
+        """The columns of an element if its lists have these lengths in every row, or else None."""
         raise NotImplementedError
 
     def read(self, element: Element) -> dict[str, Column]:
-        """The columns of the next element: quickly if its rows are alike, as most are."""
+        """The columns of the next element; fast if all rows have equal lists, as in most files."""
         if element.count == 0:
             return {}
         start = self.at
@@ -67,7 +67,7 @@ class Rows:
 
 
 class Binary(Rows):
-    """Rows of bytes; `order` is that of NumPy's types."""
+    """Binary rows; `order` is NumPy's byte order character."""
 
     def __init__(self, data: bytes, start: int, order: str) -> None:
         self.data, self.at, self.order = data, start, order
@@ -83,7 +83,7 @@ class Binary(Rows):
         return values
 
     def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
-        """The columns of an element whose lists have these lengths in every row, or None if they do not."""
+        """The columns of an element if its lists have these lengths in every row, or else None."""
         parts: list[tuple[str, str, tuple[int, ...]]] = []
         for i, (_, length, kind) in enumerate(element.properties):
             parts += [(f"length {i}", self.order + length, ())] if length else []
@@ -103,14 +103,14 @@ class Binary(Rows):
 
 
 class Text(Rows):
-    """Rows of words."""
+    """Text rows."""
 
     def __init__(self, data: bytes) -> None:
         self.words = np.array(data.split(), dtype=np.bytes_).astype(np.float64)
         self.at = 0
 
     def take(self, kind: str, count: int) -> npt.NDArray[Any]:
-        """The next values, whatever their type."""
+        """The next values, of any type."""
         end = self.at + count
         if count < 0 or end > len(self.words):
             raise IndexError
@@ -119,7 +119,7 @@ class Text(Rows):
         return values
 
     def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
-        """The columns of an element whose lists have these lengths in every row, or None if they do not."""
+        """The columns of an element if its lists have these lengths in every row, or else None."""
         width = sum(n + bool(length) for n, (_, length, _) in zip(lengths, element.properties, strict=True))
         end = self.at + element.count * width
         if end > len(self.words):

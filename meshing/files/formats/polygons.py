@@ -1,4 +1,4 @@
-"""Polygons of a file made into triangles."""
+"""Triangulate the polygons of a file."""
 
 from collections.abc import Sequence
 
@@ -9,15 +9,15 @@ from tetlux.meshing.repair.caps import triangulate_polygon
 
 
 def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
-    """Triangles (t, 3) of polygons; those of fewer than three corners are left out.
+    """Triangles (t, 3) of polygons; those of fewer than three corners are dropped.
 
     Parameters
     ----------
     points : (n, 3) ndarray
     corners : (c,) ndarray
-        The vertices of all polygons, one after the other.
+        The concatenated vertices of all polygons.
     counts : (p,) ndarray
-        How many corners each has.
+        The number of corners of each.
     """
     if (counts == 3).all():
         return corners.reshape(-1, 3)
@@ -39,7 +39,7 @@ def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntA
 
 
 def _hollow(points: FloatArray, fans: IntArray) -> IntArray:
-    """The polygons (p, k - 2, 3), as fans, whose triangles do not all face one way."""
+    """Indices of concave polygons: fans (p, k - 2, 3) whose triangles face different ways."""
     if fans.shape[1] < 2:
         return np.zeros(0, dtype=np.int64)
     corners = points[fans]
@@ -49,6 +49,6 @@ def _hollow(points: FloatArray, fans: IntArray) -> IntArray:
 
 
 def flatten(rows: Sequence[Sequence[object]]) -> tuple[list[object], IntArray]:
-    """What the rows hold, one after the other, and how much each holds."""
+    """The concatenated items of the rows, and the number of items of each."""
     counts = np.fromiter(map(len, rows), dtype=np.int64, count=len(rows))
     return [value for row in rows for value in row], counts

@@ -16,28 +16,28 @@ COMPRESSED = {
     "EXT_meshopt_compression": "compressed by meshopt",
     "KHR_meshopt_compression": "compressed by meshopt",
 }
-# What a file may require and be read rightly all the same: looks only, or whole numbers that a node scales.
+# Required extensions that do not affect the shape: materials, or quantized coordinates that a node scales.
 HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "EXT_lights_", "KHR_mesh_quantization")
 FAN = 6
 UNITS_OF_3MF = {"micron": 1e-3, "millimeter": 1.0, "centimeter": 10.0, "inch": 25.4, "foot": 304.8, "meter": 1e3}
-# The bytes of a model in which its first word is looked for.
+# Bytes of a model that are searched for its root element.
 HEAD = 1 << 16
 
 
 def read_scene(path: Path) -> tuple[FloatArray, IntArray]:
-    """Points (n, 3) and triangles (m, 3) of all meshes, where the scene puts them.
+    """Points (n, 3) and triangles (m, 3) of all meshes, as placed in the scene.
 
     Raises
     ------
     InputError
-        If the file holds what trimesh does not read, or reads as something else.
+        If the file has content that trimesh ignores or misreads.
     """
     import trimesh  # noqa: PLC0415
     from trimesh.resolvers import ZipResolver  # noqa: PLC0415
 
     if path.suffix.lower() in (".glb", ".gltf"):
         check_gltf(_gltf_head(path))
-    # Of a file's pictures and materials nothing is wanted: only glTF has triangles in other files.
+    # Pictures and materials are not read: only glTF keeps triangles in other files.
     resolver = None if path.suffix.lower() == ".gltf" else ZipResolver({})
     scene = trimesh.load_scene(path, resolver=resolver, process=False)
     meshes = [m for m in scene.dump() if isinstance(m, trimesh.Trimesh)]
@@ -61,7 +61,7 @@ def unit_of_3mf(path: Path) -> tuple[str, float]:
 
 
 def _gltf_head(path: Path) -> dict[str, Any]:
-    """The JSON that describes a scene."""
+    """The JSON header of a scene."""
     data = path.read_bytes()
     if data[:4] == b"glTF":
         data = data[20 : 20 + int.from_bytes(data[12:16], "little")]
@@ -72,7 +72,7 @@ def _gltf_head(path: Path) -> dict[str, Any]:
 
 
 def check_gltf(head: dict[str, Any]) -> None:
-    """Refuse what trimesh would read as nothing, or as another shape.
+    """Refuse files that trimesh would read as empty or as another shape.
 
     Raises
     ------

@@ -9,13 +9,13 @@ from tetlux.meshing.errors import InputError
 
 HEAD = 84
 TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-# Words may stand in one line; a name may be "vertex" or "facet" too, but no numbers or normal follow.
+# All words may be on one line. A name may be "vertex" or "facet", but without numbers after it.
 VERTEX = re.compile(rb"(?<!\S)vertex\s+([-+.\dni]\S*)\s+([-+.\dni]\S*)\s+([-+.\dni]\S*)", re.IGNORECASE)
 FACET = re.compile(rb"(?<!\S)facet\s+normal(?!\S)", re.IGNORECASE)
 
 
 def read_stl(data: bytes) -> tuple[FloatArray, IntArray]:
-    """Points (3 m, 3) and triangles (m, 3), each with corners of its own.
+    """Points (3 m, 3) and triangles (m, 3), each with separate corners.
 
     Of a binary file the count in its head decides, and what follows the last triangle is nothing: it may also begin
     with "solid", as text does.
@@ -25,7 +25,7 @@ def read_stl(data: bytes) -> tuple[FloatArray, IntArray]:
     InputError
         If the file was cut short.
     ValueError
-        If it is neither kind.
+        If it is neither binary nor text STL.
     """
     count = int.from_bytes(data[80:HEAD], "little") if len(data) >= HEAD else 0
     whole = HEAD + TRIANGLE.itemsize * count

@@ -1,0 +1,41 @@
+"""Nearest points and distances on the boundary of a mesh."""
+
+from functools import cached_property
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.search.proximity import ClosestPoint
+from tetlux.meshing.surface.surface import Surface, barycentric_of
+
+
+class BoundaryQueries:
+    """The boundary of a mesh, prepared for nearest points and distances.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+    faces : (f, 3) ndarray
+        Node numbers of the boundary triangles.
+    """
+
+    def __init__(self, points: FloatArray, faces: IntArray) -> None:
+        self._points, self._faces = points, faces
+        self._distances: dict[Surface, FloatArray] = {}
+
+    @cached_property
+    def _closest(self) -> ClosestPoint:
+        return ClosestPoint(self._points, self._faces)
+
+    def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Nearest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
+        nearest, face = self._closest(queries)
+        return nearest, face, barycentric_of(nearest, self._points[self._faces[face]])
+
+    def distances(self, surface: Surface, faces: IntArray) -> FloatArray:
+        """Distance of the centroids of boundary triangles (q,) from a surface, (q,); each is computed once."""
+        known = self._distances.setdefault(surface, np.full(len(self._faces), np.nan))
+        new = faces[np.isnan(known[faces])]
+        middles = self._points[self._faces[new]].mean(axis=1)
+        known[new] = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
+        return np.asarray(known[faces])
