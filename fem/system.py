@@ -223,7 +223,7 @@ class System:
             load = np.sum([np.zeros(len(mesh.points)), *uneven], axis=0)
             found.append(_Part(equations, added([of_lights[light] for light in some]), load, emission))
         notes = [equations.solver.note for equations in dict.fromkeys(laws) if equations.solver.note]
-        validity = Validity(mesh, self.coefficients, sources.lights, sources.deposits)
+        validity = Validity(mesh, self.coefficients, sources.deposits)
         solution = replace(
             added(of_lights),
             warnings=notes,

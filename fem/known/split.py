@@ -24,7 +24,6 @@ class Sources:
 
     Attributes
     ----------
-    lights : tuple of Light
     deposits : tuple of Deposit
         What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
@@ -35,7 +34,6 @@ class Sources:
         What of each light is left to be put on the nodes.
     """
 
-    lights: tuple[Light, ...]
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
@@ -96,7 +94,7 @@ def sources_of(
         owners += [number] * len(found)
         deposits.append(known)
         on_mesh.append(rest)
-    return Sources(tuple(lights), tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
 
 
 def check_list(lights: Sequence[Light]) -> None:

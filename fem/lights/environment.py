@@ -97,9 +97,10 @@ class EnvironmentLight:
             raise InputError(
                 'environment light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'
             )
-        return Deposit(on_mesh=self._on_mesh)
+        return Deposit(on_mesh=self)
 
-    def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
         del surface
         eta = coefficients.outer.eta
         return mesh.remembered((self, eta), lambda: self._seen_from(mesh, eta))

@@ -9,6 +9,7 @@ import numpy as np
 from tetlux.fem.ballistic.follow import Rays, beyond, entered, follow
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.optical_paths import OpticalPaths
+from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
 from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.spot import Disc, sunflower
@@ -16,6 +17,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit, together
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
@@ -95,6 +97,10 @@ class PencilBeam:
             raise self._missed(surface)
         return np.asarray(points[0])
 
+    def arrows(self, surface: Surface) -> Arrows:
+        """One, along its axis."""
+        return Arrows(self.entry(surface)[None], unit_vector(self.direction, "direction"))
+
     def deposit_in(self, body: Body) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
         surface = body.surface
@@ -117,6 +123,7 @@ class PencilBeam:
             incident=self.power * len(beams.entries) / beams.count,
             specular=beams.specular,
             entries=beams.entries,
+            beams_as_points=self.deposit == "point",
             warnings=(*found.warnings, *self._warnings(beams, body)),
         )
 
@@ -286,15 +293,7 @@ def _as_line(rays: Rays, body: Body) -> Deposit:
         return Deposit()
     surface, medium = body.surface, body.only_medium
     start, direction, power = rays.starts[0], rays.directions[0], float(rays.powers[0])
-
-    def ray_on(mesh: TetMesh) -> Rays:
-        """The beam from where it meets a facet of the mesh."""
-        back = (start - ASTRAY * surface.diagonal * direction)[None]
-        distance, face = mesh.rays.first(back, rays.directions)
-        met = face[0] >= 0 and distance[0] < 2.0 * ASTRAY * surface.diagonal
-        place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
-        return replace(rays, starts=place)
-
+    beam = _ThinBeam(rays, ASTRAY * surface.diagonal)
     way_out = surface.exit(start, direction)
     length = way_out[0] if way_out else 0.0
     paths = body.paths(rays.starts, rays.directions, np.array([length]), body.ways_out(rays.starts, rays.directions)[0])
@@ -303,11 +302,7 @@ def _as_line(rays: Rays, body: Body) -> Deposit:
     along = np.minimum([paths.place(np.array([depth]), peaked=True)[0] for depth in rows], length)
     lit = start + np.unique(along)[:, None] * direction
     if medium is None:
-        return Deposit(
-            lit=lit,
-            resolution=resolution,
-            on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)),
-        )
+        return Deposit(lit=lit, resolution=resolution, on_mesh=FollowedBeam(beam))
     extinction = medium.sigma_a + medium.delta_eddington[0]
     end = power * math.exp(-extinction * length)
     segment = Deposit(
@@ -321,17 +316,60 @@ def _as_line(rays: Rays, body: Body) -> Deposit:
     )
     if end <= NEGLIGIBLE * power:
         return replace(segment, absorbed=segment.absorbed + end)
+    return replace(segment, on_mesh=RestOfBeam(beam, end))
 
-    def rest_on(mesh: TetMesh, _: Surface, coefficients: Coefficients) -> Deposit:
-        ray = ray_on(mesh)
+
+@dataclass(frozen=True, eq=False)
+class _ThinBeam:
+    """A thin beam inside the body, and how far the facets of a mesh may lie from the body's surface, unit."""
+
+    rays: Rays
+    astray: float
+
+    def on(self, mesh: TetMesh) -> Rays:
+        """The beam from where it meets a facet of the mesh."""
+        start, direction = self.rays.starts[0], self.rays.directions[0]
+        back = (start - self.astray * direction)[None]
+        distance, face = mesh.rays.first(back, self.rays.directions)
+        met = face[0] >= 0 and distance[0] < 2.0 * self.astray
+        place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
+        return replace(self.rays, starts=place)
+
+
+@dataclass(frozen=True, eq=False)
+class FollowedBeam:
+    """A thin beam that is followed through the tetrahedra of a mesh."""
+
+    beam: _ThinBeam
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
+        del surface
+        return follow(mesh, coefficients, self.beam.on(mesh))
+
+    __repr__ = one_line
+
+
+@dataclass(frozen=True, eq=False)
+class RestOfBeam:
+    """What of a thin beam reaches the far side of the body, W: reflected there and followed, or let out."""
+
+    beam: _ThinBeam
+    power: float
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
+        del surface
+        ray = self.beam.on(mesh)
         distance, face = mesh.rays.first(ray.starts, ray.directions)
         if face[0] < 0:
-            return Deposit(ballistic=end)
-        arrived = Rays(ray.starts + distance[:, None] * direction, ray.directions, np.array([end]))
+            return Deposit(ballistic=self.power)
+        places = ray.starts + distance[:, None] * ray.directions[0]
+        arrived = Rays(places, ray.directions, np.array([self.power]))
         on, ballistic, specular = beyond(mesh, coefficients, arrived, face)
         return together([Deposit(ballistic=ballistic, specular=specular), follow(mesh, coefficients, on)])
 
-    return replace(segment, on_mesh=rest_on)
+    __repr__ = one_line
 
 
 def _partly_missed(share: float) -> Note:
