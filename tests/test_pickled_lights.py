@@ -9,6 +9,7 @@ from tests.conftest import TISSUE, block
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
+    DiffusePatch,
     Disc,
     Emission,
     EnvironmentLight,
@@ -42,6 +43,7 @@ LIGHTS: dict[str, Light] = {
     "rectangle": CollimatedBeam(DOWN, 1.0, Rectangle(CENTER, 1.0, 0.5)),
     "image": CollimatedBeam(DOWN, 1.0, Image(CENTER, 1.0, PIXELS)),
     "diffuse": DiffuseLight(1.0),
+    "patch": DiffusePatch((0.1, 0.2, 0.0), 0.8, 1.0),
     "environment": EnvironmentLight(PIXELS),
     "glow": Emission(1.0),
     "glow of a region": Emission(1.0, region=0),

@@ -4,6 +4,7 @@ from tetlux.fem.lights.collimated import CollimatedBeam
 from tetlux.fem.lights.diffuse import DiffuseLight
 from tetlux.fem.lights.emission import Emission
 from tetlux.fem.lights.environment import EnvironmentLight
+from tetlux.fem.lights.patch import DiffusePatch
 from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.lights.point import PointSource
 from tetlux.fem.lights.spot import Disc, Gaussian, Image, Rectangle
@@ -13,6 +14,7 @@ __all__ = [
     "CollimatedBeam",
     "Deposit",
     "DiffuseLight",
+    "DiffusePatch",
     "Disc",
     "Emission",
     "EnvironmentLight",

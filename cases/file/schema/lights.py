@@ -10,6 +10,7 @@ from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length
 from tetlux.fem.lights import (
     CollimatedBeam,
     DiffuseLight,
+    DiffusePatch,
     Disc,
     Emission,
     EnvironmentLight,
@@ -87,6 +88,19 @@ class DiffuseSpec(LightSection):
         """See `LightSection`."""
         del place
         return DiffuseLight(self.number("irradiance"))
+
+
+class PatchSpec(LightSection):
+    """Diffuse light on a round patch of the surface, as `tetlux.fem.DiffusePatch`."""
+
+    center: Vector3
+    radius: Length
+    irradiance: Each = Field(description="W/unit²")
+
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        del place
+        return DiffusePatch(self.center, self.radius, self.number("irradiance"))
 
 
 class DiscSpec(Section):
@@ -207,6 +221,7 @@ class LightSpec(Choice):
     pencil: PencilSpec | None = None
     point: PointSpec | None = None
     diffuse: DiffuseSpec | None = None
+    patch: PatchSpec | None = None
     collimated: CollimatedSpec | None = None
     environment: EnvironmentSpec | None = None
     emission: EmissionSpec | None = None
