@@ -174,7 +174,7 @@ def test_environments_that_cannot_be(image: FloatArray, message: str) -> None:
 
 
 def test_directions_that_do_not_go_together() -> None:
-    with pytest.raises(InputError, match=r"up and front of the environment are both along \(0.0, 0.0, 1.0\)"):
+    with pytest.raises(InputError, match=r"up and front of the environment are both along \(0, 0, 1\)"):
         EnvironmentLight(np.ones((2, 2)), front=(0.0, 0.0, -3.0))
     with pytest.raises(InputError, match="up is zero"):
         EnvironmentLight(np.ones((2, 2)), up=(0.0, 0.0, 0.0))

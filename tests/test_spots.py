@@ -194,5 +194,5 @@ def test_spots_that_cannot_be() -> None:
         Rectangle((0.0, 0.0, 0.0), 1.0, math.inf)
     with pytest.raises(InputError, match="center is"):
         Disc((0.0, math.nan, 0.0), 1.0)
-    with pytest.raises(InputError, match=r"up of the spot is \(0.0, 0.0, 2.0\), along the beam"):
+    with pytest.raises(InputError, match=r"up of the spot is \(0, 0, 2\), along the beam"):
         power(Rectangle((0.0, 0.0, 3.0), 1.0, 1.0, up=(0.0, 0.0, 2.0)), MESHES["seven"])
