@@ -23,7 +23,7 @@ from tetlux.fem import (
     Solution,
     System,
 )
-from tetlux.fem.lights.spot import Spot
+from tetlux.fem.lights.spots import Spot
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import TetMesh

@@ -8,7 +8,8 @@ from tetlux.fem.ballistic.follow import Rays, entered, follow
 from tetlux.fem.body.body import Body
 from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.point import check_positive, unit_vector
-from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
+from tetlux.fem.lights.spots import UNCHANGING, Spot
+from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.lights.point import unit_vector
-from tetlux.fem.lights.spot import check_pixels
+from tetlux.fem.lights.spots.image import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.media.varying import as_text
