@@ -212,7 +212,7 @@ WRONG = [
     ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" stands here twice'),
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),
     ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: a name here is of letters from A to Z, digits and"),
-    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, collimated, environment, emission"),
+    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, patch, collimated, environment, emission"),
     (
         POINT,
         "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n",
