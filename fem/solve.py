@@ -13,8 +13,8 @@ from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
+from tetlux.fem.notes import notes_on
 from tetlux.fem.operators.assembly import Mass
-from tetlux.fem.outcome.notes import notes_on
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scene import channels_of, scene_of
 from tetlux.fem.sources.deposit import Light

@@ -197,7 +197,7 @@ class System:
         solution = replace(
             sum_solutions(of_lights),
             warnings=[operator.solver.note for operator in dict.fromkeys(operators) if operator.solver.note],
-            validity=Validity(mesh, self.coefficients, sources.lights, sources.deposits),
+            validity=Validity(mesh, self.coefficients, sources.deposits),
             residual=max((result.residual for result in solved), default=0.0),
             iterations=max((result.iterations for result in solved), default=0),
         )

@@ -12,7 +12,7 @@ from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case, load_cases
 from tetlux.cases.file.images import read_pixels
 from tetlux.cases.picture.arrows import rays
-from tetlux.fem import CollimatedBeam, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
+from tetlux.fem import CollimatedBeam, DiffusePatch, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector
 from tetlux.meshing import InputError, box
@@ -82,6 +82,16 @@ def test_light_on_the_whole_body_is_drawn_as_parallel_arrows(load: Load) -> None
         assert start - end == pytest.approx([0.0, 0.0, 0.3 * case.surface.diagonal])
     (spot,) = rays(CollimatedBeam((0.0, 0.0, -1.0), 1.0, Disc((1.0, 2.0, 0.0), 0.5)), box((8.0, 8.0, 8.0)))
     assert spot.end == pytest.approx((1.0, 2.0, 4.0), abs=0.05)
+
+
+def test_a_patch_has_a_value_for_each_channel(load: Load) -> None:
+    patch = "patch: {center: [1, 2, 4], radius: 1, irradiance: [2, 0, 3]}"
+    case = load(f"{patch}\n  - {POINT}", medium=THREE)
+    lights = [channel.lights.get("patch_1") for channel in case.channels]
+    assert lights == [DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), None, DiffusePatch((1.0, 2.0, 4.0), 1.0, 3.0)]
+    (drawn,) = rays(DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), case.surface)
+    assert drawn.is_point
+    assert drawn.end == pytest.approx((1.0, 2.0, 4.0))
 
 
 @pytest.mark.usefixtures("slide")
@@ -202,7 +212,7 @@ WRONG = [
     ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" stands here twice'),
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),
     ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: a name here is of letters from A to Z, digits and"),
-    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, collimated, environment, emission"),
+    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, patch, collimated, environment, emission"),
     (
         POINT,
         "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n",

@@ -10,6 +10,7 @@ from tests.test_paths import TROUGH
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
+    DiffusePatch,
     Disc,
     Emission,
     EnvironmentLight,
@@ -22,7 +23,7 @@ from tetlux.fem import (
     Solution,
     System,
 )
-from tetlux.fem.lights.spot import Spot
+from tetlux.fem.lights.spots import Spot
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import TetMesh
@@ -30,7 +31,8 @@ from tetlux.meshing.arrays import Vector
 
 MESHES = {"cube": block((4, 4, 4), (4.0, 4.0, 4.0)), "trough": TROUGH}
 PIXELS = np.random.default_rng(4).random((5, 7))
-KINDS = ("whole", "disc", "gaussian", "rectangle", "image", "round pencil", "pencil", "diffuse", "environment", "glow")
+SPOTS = ("disc", "gaussian", "rectangle", "image")
+KINDS = ("whole", *SPOTS, "round pencil", "pencil", "diffuse", "patch", "environment", "glow")
 
 # The same examples on every machine.
 few = settings(max_examples=20, deadline=None, derandomize=True, database=None)
@@ -57,10 +59,12 @@ def light(kind: str, direction: Vector, brightness: float, scale: float, name: s
     irradiance = brightness / scale**2
     if kind == "whole" or kind in spots:
         return CollimatedBeam(direction, irradiance, spots.get(kind))
+    place = (scale * WITHIN[name][0], scale * WITHIN[name][1], scale * WITHIN[name][2])
     others: dict[str, Light] = {
         "round pencil": PencilBeam((x, y, z), direction, power=brightness, radius=0.4 * scale, deposit="line"),
         "pencil": PencilBeam((x, y, z), direction, power=brightness, deposit="line"),
         "diffuse": DiffuseLight(irradiance),
+        "patch": DiffusePatch(place, 2.5 * scale, irradiance),
         "environment": EnvironmentLight(irradiance * PIXELS, up=direction, front=(up[0], up[1], up[2])),
         "glow": Emission(brightness / scale**3),
     }

@@ -8,7 +8,7 @@ import pytest
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Deposit, Disc, Gaussian, Image, Medium, Rectangle
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.spot import Spot
+from tetlux.fem.lights.spots import Spot
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.meshing import InputError, TetMesh, box
 from tetlux.meshing.arrays import FloatArray, Vector

@@ -29,7 +29,6 @@ def validity_of(mesh: TetMesh, medium: Medium, *lights: Light, surface: Surface 
     return Validity(
         mesh,
         coefficients_of(medium),
-        lights,
         [light.deposit_in(Body(surface or mesh.surface, (medium,))) for light in lights],
     )
 

@@ -8,7 +8,8 @@ from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.file.body import CaseBody, body_of
 from tetlux.cases.file.channels import ALL, channel_names, check_different
 from tetlux.cases.file.document import Document, Key, read_document
-from tetlux.cases.file.lighting import keys_of, light_names, light_of
+from tetlux.cases.file.in_channel import InChannel
+from tetlux.cases.file.lighting import keys_of, light_names
 from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.sensors import Sensor, sensor_of
@@ -242,7 +243,7 @@ def _lights(
     for i, light_spec in enumerate(spec.lights):
         with document.at(("lights", i), keys_of(light_spec)):
             for channel, of_channel in enumerate(bodies):
-                light = light_of(light_spec, channel, len(bodies), body.parts, reader)
+                light = light_spec.light(InChannel(channel, len(bodies), body.parts, reader.pixels))
                 if light is None:
                     continue
                 lights[channel][names[i]] = light

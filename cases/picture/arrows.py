@@ -3,32 +3,27 @@
 import numpy as np
 
 from tetlux.cases.picture.view import Ray
-from tetlux.fem.lights import CollimatedBeam, Light, PencilBeam, PointSource
-from tetlux.fem.lights.point import unit_vector
+from tetlux.fem.lights import Light
+from tetlux.fem.lights.arrows import HasArrows
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.surface.surface import Surface
 
 # Of an arrow, as a share of the body's diagonal.
 LENGTH = 0.3
-# Light on the whole body is drawn as so many arrows.
-ARROWS = 3
 # So far from the middle of what is lit they stand at most, as a share of its extent: not at its rim.
 SPREAD = 0.6
 
 
 def rays(light: Light, surface: Surface) -> tuple[Ray, ...]:
     """Arrows or points of a light; light from everywhere and light of the volume have none."""
-    if isinstance(light, PencilBeam):
-        end = light.entry(surface)
-        start = end - LENGTH * surface.diagonal * unit_vector(light.direction, "direction")
-        return (Ray(_vector(start), _vector(end)),)
-    if isinstance(light, PointSource):
-        return (Ray(light.position, light.position),)
-    if isinstance(light, CollimatedBeam):
-        along = unit_vector(light.direction, "direction")
-        ends = _spread(light.entries(surface), along, ARROWS if light.spot is None else 1)
-        return tuple(Ray(_vector(end - LENGTH * surface.diagonal * along), _vector(end)) for end in ends)
-    return ()
+    if not isinstance(light, HasArrows):
+        return ()
+    arrows = light.arrows(surface)
+    if arrows.direction is None:
+        return tuple(Ray(_vector(place), _vector(place)) for place in arrows.places[: arrows.count])
+    back = LENGTH * surface.diagonal * arrows.direction
+    ends = _spread(arrows.places, arrows.direction, arrows.count)
+    return tuple(Ray(_vector(end - back), _vector(end)) for end in ends)
 
 
 def _spread(places: FloatArray, along: FloatArray, count: int) -> FloatArray:

@@ -226,7 +226,7 @@ def two_balls(
     core = Medium(sigma_a=absorption * shell.sigma_a, sigma_s_prime=scattering * shell.sigma_s_prime, eta=shell.eta)
     inner = CORE_LAYERS / LAYERS * radius
     surface, light, bound = shapes.sphere(radius), _light_of_two_balls(light_kind), None
-    if isinstance(light, DiffuseLight):
+    if light_kind == "diffuse":
         transmitted = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
         value = transmitted * concentric.diffuse_exitance(core, shell, core_radius=inner, radius=radius)
         bound = 4.0 * shell.eta**2

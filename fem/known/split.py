@@ -25,7 +25,6 @@ class Sources:
 
     Attributes
     ----------
-    lights : tuple of Light
     deposits : tuple of Deposit
         What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
@@ -36,7 +35,6 @@ class Sources:
         What of each light is left to be put on the nodes.
     """
 
-    lights: tuple[Light, ...]
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
@@ -97,7 +95,7 @@ def sources_of(
         owners += [number] * len(found)
         deposits.append(known)
         on_mesh.append(rest)
-    return Sources(tuple(lights), tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
 
 
 def check_list(lights: Sequence[Light]) -> None:

@@ -6,8 +6,10 @@ import numpy as np
 
 from tetlux.fem.ballistic.follow import Rays, entered, follow
 from tetlux.fem.body.body import Body
+from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.point import check_positive, unit_vector
-from tetlux.fem.lights.spot import UNCHANGING, Spot, scattered, sunflower
+from tetlux.fem.lights.spots import UNCHANGING, Spot
+from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
@@ -21,6 +23,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 LOOKS = 2000
 # And at so many of these, at most, it is looked at how deep it reaches.
 DEPTHS = 64
+# Light on the whole body is drawn as so many arrows.
+ARROWS = 3
 # Facets are quartered at most so many times to see a spot. What each part sees of it is looked up at so many points, at
 # least and at most, and at so many together where that lies in between.
 _CUTS = 16
@@ -75,7 +79,18 @@ class CollimatedBeam:
         apart = surface.diagonal / np.sqrt(LOOKS)
         # What is smaller than its depth in a spot is blurred; the spot itself may be a thin beam.
         narrow = np.inf if self.spot is None else max(0.5 * self.spot.reach, 0.5 * depth)
-        return Deposit(resolution=min(max(depth, apart), narrow), lit=lit, entries=lit, on_mesh=self._on_mesh)
+        return Deposit(
+            resolution=min(max(depth, apart), narrow),
+            lit=lit,
+            entries=lit,
+            breadth=np.inf if self.spot is None else None,
+            on_mesh=self,
+        )
+
+    def arrows(self, surface: Surface) -> Arrows:
+        """Several on the whole body, one on a spot."""
+        direction = unit_vector(self.direction, "direction")
+        return Arrows(self.entries(surface), direction, ARROWS if self.spot is None else 1)
 
     def _least_depth(self, body: Body, entries: FloatArray) -> float:
         """Least depth, at some of the entries, at which the beam has faded to 1/e, unit."""
@@ -101,7 +116,8 @@ class CollimatedBeam:
         distances, met = surface.rays.first(starts, directions)
         return np.asarray(starts + np.where(met >= 0, distances, 0.0)[:, None] * direction)[met >= 0]
 
-    def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
         del surface
         if self.spot is None or isinstance(self.spot, UNCHANGING):
             key = (type(self), tuple(self.direction), self.spot, self.from_center)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from tetlux.fem.body.body import Body
 from tetlux.fem.lights.point import check_positive
 from tetlux.fem.media.fresnel import moments
+from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.errors import InputError
 
@@ -35,14 +36,27 @@ class DiffuseLight:
 
     def deposit_in(self, body: Body) -> Deposit:
         """What passes the surface; its power depends on the mesh's area, and is known when solved."""
-        medium = body.outer
-        if medium.boundary != "exact":
-            raise InputError(
-                'diffuse light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'
-            )
-        # Reciprocity: from outside passes eta² times the share that passes from inside, 1 - 2 C1.
-        c1, _ = moments(medium.eta)
-        return Deposit(
-            irradiance=self.irradiance,
-            transmitted_irradiance=self.irradiance * medium.eta**2 * (1.0 - 2.0 * c1),
-        )
+        transmittance = diffuse_transmittance(body.outer, "diffuse light")
+        return Deposit(irradiance=self.irradiance, transmitted_irradiance=self.irradiance * transmittance)
+
+
+def diffuse_transmittance(medium: Medium, light: str) -> float:
+    """Share of diffuse light that passes a surface from outside, ``eta² (1 - 2 C1)``.
+
+    Parameters
+    ----------
+    medium : Medium
+        Below the surface.
+    light : str
+        What an error calls the light.
+
+    Raises
+    ------
+    InputError
+        If the medium's boundary is "classic".
+    """
+    if medium.boundary != "exact":
+        raise InputError(f'{light} needs the boundary "exact": "classic" has no Fresnel moments to go with it.')
+    # Reciprocity: from outside passes eta² times the share that passes from inside, 1 - 2 C1.
+    c1, _ = moments(medium.eta)
+    return float(medium.eta**2 * (1.0 - 2.0 * c1))

@@ -39,9 +39,20 @@ class Emission:
     def deposit_in(self, body: Body) -> Deposit:
         """The same everywhere, or known on the mesh that has the region."""
         del body
-        return Deposit(emission=self.density) if self.region is None else Deposit(on_mesh=self._on_mesh)
+        if self.region is None:
+            return Deposit(emission=self.density)
+        return Deposit(on_mesh=RegionEmission(self.density, self.region))
 
-    def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+
+@dataclass(frozen=True)
+class RegionEmission:
+    """An even emission of one region, W/unit³, on the mesh that has it."""
+
+    density: float
+    region: int
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
         del surface, coefficients
         inside = mesh.regions == self.region
         if not inside.any():

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.lights.point import unit_vector
-from tetlux.fem.lights.spot import check_pixels
+from tetlux.fem.lights.spots.image import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.media.varying import as_text
@@ -97,9 +97,10 @@ class EnvironmentLight:
             raise InputError(
                 'environment light needs the boundary "exact": "classic" has no Fresnel moments to go with it.'
             )
-        return Deposit(on_mesh=self._on_mesh)
+        return Deposit(on_mesh=self)
 
-    def _on_mesh(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `tetlux.fem.sources.deposit.OnMesh`."""
         del surface
         eta = coefficients.outer.eta
         return mesh.cache.get((self, eta), lambda: self._seen_from(mesh, eta))

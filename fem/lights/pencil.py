@@ -6,32 +6,27 @@ from typing import Literal
 
 import numpy as np
 
-from tetlux.fem.ballistic.follow import Rays, beyond, entered, follow
+from tetlux.fem.ballistic.follow import Rays, entered
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.optical_paths import OpticalPaths
+from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
 from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
-from tetlux.fem.lights.spot import Disc, sunflower
-from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.lights.spots import Disc
+from tetlux.fem.lights.spots.plane import sunflower
+from tetlux.fem.lights.thin_line import line_of
 from tetlux.fem.media.varying import as_text
-from tetlux.fem.sources.deposit import Deposit, together
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.mesh import TetMesh
 
 # A beam with a radius is this many thin ones at least, and as many as it takes to lie half a mean free path
 # apart, up to the second number: closer than that, what they deposit runs together.
 RAYS = (127, 2000)
 # A beam that meets a surface at less than this, by the sine of the angle, meets its triangles and not their curve.
 GRAZING = 0.1
-# A beam with this share of its power left at the far side stays there.
-NEGLIGIBLE = 1e-12
-# A thin beam is as good as this many points on it, as far as where a thousandth of it is left.
-LIT, FADED = 28, 7.0
-# A mesh's facets lie within this share of the body's diagonal from its surface.
-ASTRAY = 0.02
 
 
 @dataclass(frozen=True)
@@ -95,6 +90,10 @@ class PencilBeam:
             raise self._missed(surface)
         return np.asarray(points[0])
 
+    def arrows(self, surface: Surface) -> Arrows:
+        """One, along its axis."""
+        return Arrows(self.entry(surface)[None], unit_vector(self.direction, "direction"))
+
     def deposit_in(self, body: Body) -> Deposit:
         """Refracted and scattered: its points or segments, and what was reflected, absorbed or passed."""
         surface = body.surface
@@ -103,7 +102,7 @@ class PencilBeam:
             return self._as_spot(body)
         if self.deposit == "line":
             beams = self._beams(body, 1)
-            found = _as_line(beams.inside, body)
+            found = line_of(beams.inside, body)
         else:
             beams = self._beams(body, 1 if self.radius == 0 else RAYS[0])
             # As far apart as is little for the light that is deposited.
@@ -117,6 +116,7 @@ class PencilBeam:
             incident=self.power * len(beams.entries) / beams.count,
             specular=beams.specular,
             entries=beams.entries,
+            beams_as_points=self.deposit == "point",
             warnings=(*found.warnings, *self._warnings(beams, body)),
         )
 
@@ -278,60 +278,6 @@ def _as_points(rays: Rays, body: Body) -> Deposit:
         resolution=float(depths.min()),
         warnings=warnings,
     )
-
-
-def _as_line(rays: Rays, body: Body) -> Deposit:
-    """A beam without width: through one medium to the far side at once; the rest, and several media, on the mesh."""
-    if len(rays.powers) == 0:
-        return Deposit()
-    surface, medium = body.surface, body.only_medium
-    start, direction, power = rays.starts[0], rays.directions[0], float(rays.powers[0])
-
-    def ray_on(mesh: TetMesh) -> Rays:
-        """The beam from where it meets a facet of the mesh."""
-        back = (start - ASTRAY * surface.diagonal * direction)[None]
-        distance, face = mesh.rays.first(back, rays.directions)
-        met = face[0] >= 0 and distance[0] < 2.0 * ASTRAY * surface.diagonal
-        place = back + distance[0] * direction if met else mesh.closest_boundary(start[None])[0]
-        return replace(rays, starts=place)
-
-    way_out = surface.exit(start, direction)
-    length = way_out[0] if way_out else 0.0
-    paths = body.paths(rays.starts, rays.directions, np.array([length]), body.ways_out(rays.starts, rays.directions)[0])
-    resolution = 0.5 * float(paths.place(np.ones(1), peaked=True)[0])
-    rows = np.linspace(0.0, FADED, LIT)
-    along = np.minimum([paths.place(np.array([depth]), peaked=True)[0] for depth in rows], length)
-    lit = start + np.unique(along)[:, None] * direction
-    if medium is None:
-        return Deposit(
-            lit=lit,
-            resolution=resolution,
-            on_mesh=lambda mesh, _, coefficients: follow(mesh, coefficients, ray_on(mesh)),
-        )
-    extinction = medium.sigma_a + medium.delta_eddington[0]
-    end = power * math.exp(-extinction * length)
-    segment = Deposit(
-        absorbed=(power - end) * medium.sigma_a / extinction,
-        starts=rays.starts,
-        directions=rays.directions,
-        lengths=np.array([length]),
-        fluxes=rays.powers,
-        lit=lit,
-        resolution=resolution,
-    )
-    if end <= NEGLIGIBLE * power:
-        return replace(segment, absorbed=segment.absorbed + end)
-
-    def rest_on(mesh: TetMesh, _: Surface, coefficients: Coefficients) -> Deposit:
-        ray = ray_on(mesh)
-        distance, face = mesh.rays.first(ray.starts, ray.directions)
-        if face[0] < 0:
-            return Deposit(ballistic=end)
-        arrived = Rays(ray.starts + distance[:, None] * direction, ray.directions, np.array([end]))
-        on, ballistic, specular = beyond(mesh, coefficients, arrived, face)
-        return together([Deposit(ballistic=ballistic, specular=specular), follow(mesh, coefficients, on)])
-
-    return replace(segment, on_mesh=rest_on)
 
 
 def _partly_missed(share: float) -> Note:

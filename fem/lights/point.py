@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface.surface import Surface
 
 # A point nearer to the surface than this share of the body's diagonal is on it.
 ON_SURFACE = 1e-9
@@ -82,6 +84,11 @@ class PointSource:
     def __post_init__(self) -> None:
         as_vector(self.position, "position")
         check_positive(self.power, "power", "watts")
+
+    def arrows(self, surface: Surface) -> Arrows:
+        """A point."""
+        del surface
+        return Arrows(as_vector(self.position, "position")[None])
 
     def deposit_in(self, body: Body) -> Deposit:
         """All of its power at one point."""

@@ -1,6 +1,6 @@
 """What a light leaves in a medium: points, beams that fade along straight segments, diffuse light, emission."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -59,9 +59,14 @@ class Deposit:
         Other places near which it has to.
     entries : (e, 3) ndarray
         Some of the places where beams enter the body.
+    breadth : float, optional
+        Radius of an even disc that spreads as what is lit does, unit; inf for light on the whole body. If not given, it
+        follows from `entries`, or from `points` where there are none.
+    beams_as_points : bool
+        Whether each point stands for a thin beam that enters at one of `entries`.
     warnings : tuple of str
-    on_mesh : callable, optional
-        What comes to it on a mesh.
+    on_mesh : OnMesh, optional
+        What comes to it on a mesh; plain data too, so that a deposit can be pickled.
     """
 
     incident: float = 0.0
@@ -82,8 +87,10 @@ class Deposit:
     resolution: float = np.inf
     lit: FloatArray = field(default_factory=_no_vectors)
     entries: FloatArray = field(default_factory=_no_vectors)
+    breadth: float | None = None
+    beams_as_points: bool = False
     warnings: tuple[str, ...] = ()
-    on_mesh: Callable[[TetMesh, Surface, Coefficients], "Deposit"] | None = None
+    on_mesh: "OnMesh | None" = None
 
     @property
     def even(self) -> bool:
@@ -94,14 +101,14 @@ class Deposit:
         """What it is on a mesh of the surface with given coefficients."""
         if self.on_mesh is None:
             return self
-        return together([replace(self, on_mesh=None), self.on_mesh(mesh, surface, coefficients)])
+        return together([replace(self, on_mesh=None), self.on_mesh.on(mesh, surface, coefficients)])
 
     __repr__ = one_line
 
 
 def together(parts: Sequence[Deposit]) -> Deposit:
     """Several deposits as one."""
-    on_mesh = [part.on_mesh for part in parts if part.on_mesh is not None]
+    on_mesh = tuple(part.on_mesh for part in parts if part.on_mesh is not None)
     return Deposit(
         incident=sum(p.incident for p in parts),
         specular=sum(p.specular for p in parts),
@@ -121,11 +128,32 @@ def together(parts: Sequence[Deposit]) -> Deposit:
         resolution=min(p.resolution for p in parts),
         lit=np.vstack([p.lit for p in parts]),
         entries=np.vstack([p.entries for p in parts]),
+        breadth=max((p.breadth for p in parts if p.breadth is not None), default=None),
+        beams_as_points=any(p.beams_as_points for p in parts),
         warnings=tuple(w for p in parts for w in p.warnings),
-        on_mesh=None
-        if not on_mesh
-        else lambda mesh, surface, coefficients: together([one(mesh, surface, coefficients) for one in on_mesh]),
+        on_mesh=_Several(on_mesh) if on_mesh else None,
     )
+
+
+class OnMesh(Protocol):
+    """What is known of a deposit on a mesh only: a dataclass of plain values, and no closure."""
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """Say what it deposits on a mesh of the surface with given coefficients."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class _Several:
+    """What several deposits leave on a mesh."""
+
+    parts: tuple[OnMesh, ...]
+
+    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `OnMesh`."""
+        return together([part.on(mesh, surface, coefficients) for part in self.parts])
+
+    __repr__ = one_line
 
 
 def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:

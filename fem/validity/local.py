@@ -8,10 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tetlux.fem.lights.collimated import CollimatedBeam
-from tetlux.fem.lights.pencil import PencilBeam
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.validity.facet_media import LocalMedia, media_in, media_under_facets
 from tetlux.fem.validity.tables import FADED, Spread, far_error, near_error, near_rows, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
@@ -34,14 +32,12 @@ class Validity:
         Its boundary is looked at.
     coefficients : Coefficients
         Of its tetrahedra.
-    lights : sequence of Light
     deposits : sequence of Deposit
-        What each of them leaves in the body.
+        What each light leaves in the body.
     """
 
     mesh: TetMesh
     coefficients: Coefficients
-    lights: Sequence[Light]
     deposits: Sequence[Deposit]
 
     def at(self, points: FloatArray) -> FloatArray:
@@ -133,9 +129,9 @@ class Validity:
 
     @cached_property
     def _entries(self) -> "list[_Entry]":
-        return [self._entry_of(*each) for each in zip(self.lights, self.deposits, strict=True)]
+        return [self._entry_of(deposit) for deposit in self.deposits]
 
-    def _entry_of(self, light: Light, deposit: Deposit) -> "_Entry":
+    def _entry_of(self, deposit: Deposit) -> "_Entry":
         sources = len(deposit.entries) == 0
         places = deposit.points if sources else deposit.entries
         if len(places) == 0:
@@ -148,12 +144,12 @@ class Validity:
             media = self.below[self.mesh.closest_boundary(places)[1]]
         # The deposit of a thin beam in one point is at fault itself where scattering is isotropic; a line is as good
         # there as either is where scattering is forward.
-        in_a_point = isinstance(light, PencilBeam) and light.deposit == "point"
-        rows = near_rows(media.albedo, None if sources else media.cosine if in_a_point else np.ones(len(places)))
-        breadth = np.inf
-        if not isinstance(light, CollimatedBeam) or light.spot is not None:
+        as_points = deposit.beams_as_points
+        rows = near_rows(media.albedo, None if sources else media.cosine if as_points else np.ones(len(places)))
+        breadth = deposit.breadth
+        if breadth is None:
             breadth = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
-        return _Entry(cKDTree(places), media, breadth, rows, in_a_point and not sources)
+        return _Entry(cKDTree(places), media, breadth, rows, as_points and not sources)
 
     __repr__ = one_line
 

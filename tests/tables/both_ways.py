@@ -44,7 +44,7 @@ from tetlux.fem import (
     solve,
 )
 from tetlux.fem.exact import layered
-from tetlux.fem.lights.spot import sunflower
+from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.meshing import Surface, box, sphere
 from tetlux.meshing.arrays import FloatArray

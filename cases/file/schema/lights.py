@@ -1,14 +1,58 @@
 """The sections of the case file that describe lights, detectors and the camera."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from tetlux.cases.file.in_channel import InChannel
 from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
+from tetlux.fem.lights import (
+    CollimatedBeam,
+    DiffuseLight,
+    DiffusePatch,
+    Disc,
+    Emission,
+    EnvironmentLight,
+    Gaussian,
+    Image,
+    Light,
+    PencilBeam,
+    PointSource,
+    Rectangle,
+)
+from tetlux.fem.lights.point import check_positive
+from tetlux.meshing.errors import InputError
+
+AnySpot = Disc | Gaussian | Rectangle | Image
 
 
-class PencilSpec(Section):
+class LightSection(Section):
+    """The section of one kind of light, which makes that light."""
+
+    def light(self, place: InChannel) -> Light | None:
+        """The light in one channel, or None where it is dark; a section has no lists any more when it is asked.
+
+        Raises
+        ------
+        InputError
+            If a value is wrong.
+        """
+        raise NotImplementedError
+
+    def in_channel(self, channel: int) -> Self | None:
+        """The section with the values of one channel, or None if one is 0 there: in a list that stands for dark."""
+        lists = {name: value[channel] for name, value in self if isinstance(value, list)}
+        return None if 0 in lists.values() else self.model_copy(update=lists)
+
+    def number(self, name: str) -> float:
+        """A value that may be a list, and is none in one channel."""
+        value = getattr(self, name)
+        assert not isinstance(value, list)
+        return float(value)
+
+
+class PencilSpec(LightSection):
     """A pencil beam, as `tetlux.fem.PencilBeam`."""
 
     origin: Vector3
@@ -17,18 +61,46 @@ class PencilSpec(Section):
     radius: Number = Field(0.0, description="unit")
     deposit: Literal["point", "line"] = "point"
 
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        del place
+        return PencilBeam(self.origin, self.direction, self.number("power"), self.radius, self.deposit)
 
-class PointSpec(Section):
+
+class PointSpec(LightSection):
     """An isotropic point inside the body, as `tetlux.fem.PointSource`."""
 
     position: Vector3
     power: Each = Field(1.0, description="W")
 
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        del place
+        return PointSource(self.position, self.number("power"))
 
-class DiffuseSpec(Section):
+
+class DiffuseSpec(LightSection):
     """Diffuse light from all around, as `tetlux.fem.DiffuseLight`."""
 
     irradiance: Each = Field(description="W/unit²")
+
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        del place
+        return DiffuseLight(self.number("irradiance"))
+
+
+class PatchSpec(LightSection):
+    """Diffuse light on a round patch of the surface, as `tetlux.fem.DiffusePatch`."""
+
+    center: Vector3
+    radius: Length
+    irradiance: Each = Field(description="W/unit²")
+
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        del place
+        return DiffusePatch(self.center, self.radius, self.number("irradiance"))
 
 
 class DiscSpec(Section):
@@ -65,8 +137,21 @@ class SpotSpec(Choice):
     rectangle: RectangleSpec | None = None
     image: ImageSpec | None = None
 
+    def spot(self, place: InChannel) -> AnySpot | None:
+        """The spot in one channel, or None where an image is dark."""
+        if self.disc:
+            return Disc(self.disc.center, self.disc.radius)
+        if self.gaussian:
+            return Gaussian(self.gaussian.center, self.gaussian.radius)
+        if self.rectangle:
+            return Rectangle(**dict(self.rectangle))
+        assert self.image is not None
+        # An image that is black in all channels is refused by the spot.
+        pixels = place.pixels(self.image.file, self.image.encoding)
+        return None if pixels is None else Image(self.image.center, self.image.width, pixels, self.image.up)
 
-class CollimatedSpec(Section):
+
+class CollimatedSpec(LightSection):
     """Parallel light, as `tetlux.fem.CollimatedBeam`."""
 
     direction: Vector3
@@ -86,8 +171,20 @@ class CollimatedSpec(Section):
             )
         return self
 
+    def light(self, place: InChannel) -> Light | None:
+        """See `LightSection`."""
+        if self.spot is None:
+            return CollimatedBeam(self.direction, self.number("irradiance"))
+        spot = self.spot.spot(place)
+        if spot is None:
+            if self.power is not None:
+                raise InputError("the image is black in a channel that has power; give an irradiance instead.")
+            return None
+        irradiance = self.number("irradiance") if self.power is None else self.number("power") / spot.area
+        return CollimatedBeam(self.direction, irradiance, spot)
 
-class EnvironmentSpec(Section):
+
+class EnvironmentSpec(LightSection):
     """Light from all around by an image of the surroundings, as `tetlux.fem.EnvironmentLight`."""
 
     file: str = Field(description="image file, longitude by latitude, relative to the case file")
@@ -96,14 +193,25 @@ class EnvironmentSpec(Section):
     front: Vector3 = Field((0.0, 1.0, 0.0), description="direction of the image's middle")
     encoding: Encoding = "srgb"
 
+    def light(self, place: InChannel) -> Light | None:
+        """See `LightSection`."""
+        brightest = self.number("brightest")
+        check_positive(brightest, "brightest", "W/(unit² sr)")
+        pixels = place.pixels(self.file, self.encoding)
+        return None if pixels is None else EnvironmentLight(brightest * pixels, up=self.up, front=self.front)
 
-class EmissionSpec(Section):
+
+class EmissionSpec(LightSection):
     """Light that the volume emits, as `tetlux.fem.Emission`."""
 
     density: Each = Field(description="W/unit³")
     region: str | int | None = Field(
         None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
     )
+
+    def light(self, place: InChannel) -> Light:
+        """See `LightSection`."""
+        return Emission(self.number("density"), place.region(self.region))
 
 
 class LightSpec(Choice):
@@ -113,9 +221,22 @@ class LightSpec(Choice):
     pencil: PencilSpec | None = None
     point: PointSpec | None = None
     diffuse: DiffuseSpec | None = None
+    patch: PatchSpec | None = None
     collimated: CollimatedSpec | None = None
     environment: EnvironmentSpec | None = None
     emission: EmissionSpec | None = None
+
+    def light(self, place: InChannel) -> Light | None:
+        """The light in one channel, or None where it is dark.
+
+        Raises
+        ------
+        InputError
+            If a value is wrong.
+        """
+        section: LightSection = getattr(self, self.kind)
+        here = section.in_channel(place.channel)
+        return None if here is None else here.light(place)
 
 
 class FibreSpec(DiscSpec):

@@ -1,0 +1,63 @@
+"""An even, round spot."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.lights.point import as_vector
+from tetlux.fem.lights.spots.plane import beyond, squared, sunflower, with_middle
+from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.meshing.arrays import FloatArray, Vector
+
+
+@dataclass(frozen=True)
+class Disc:
+    """An even, round spot.
+
+    Parameters
+    ----------
+    center : (3,) floats
+        A point on the beam's axis, unit.
+    radius : float
+        unit.
+    """
+
+    center: Vector
+    radius: float
+
+    def __post_init__(self) -> None:
+        as_vector(self.center, "center")
+        check_length(self.radius, "radius")
+
+    @property
+    def reach(self) -> float:
+        """See `Spot`."""
+        return self.radius
+
+    @property
+    def detail(self) -> float:
+        """See `Spot`."""
+        return self.radius / 2.0
+
+    @property
+    def edge(self) -> float:
+        """See `Spot`."""
+        return 2.0 * EDGE * self.radius
+
+    @property
+    def area(self) -> float:
+        """See `Spot`."""
+        return math.pi * self.radius**2
+
+    def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        return np.where(squared(offsets, direction) <= self.radius**2, 1.0, 0.0)
+
+    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        return beyond(offsets, direction, self.reach)
+
+    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        return with_middle(sunflower(count, self.reach, direction))

@@ -1,0 +1,128 @@
+"""A spot with the pattern of an image."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tetlux.fem.lights.point import as_vector
+from tetlux.fem.lights.spots.plane import axes, outside, scattered
+from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
+from tetlux.meshing.describe import one_line
+from tetlux.meshing.errors import InputError
+
+# Details finer than this share of an image are averaged: light that diffuses does not show them.
+FINEST = 1.0 / 128.0
+
+
+def check_pixels(pixels: FloatArray) -> None:
+    """Refuse what is no image of brightness, or one that is black all over."""
+    if pixels.ndim != 2 or min(pixels.shape) < 1:
+        raise InputError(f"the image has the shape {pixels.shape}; give rows and columns of brightness.")
+    if not np.isfinite(pixels).all() or (pixels < 0).any():
+        raise InputError("the image holds a brightness that is not a number or negative.")
+    if not (pixels > 0).any():
+        raise InputError("the image is black all over; no light would fall on the body.")
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """A spot whose irradiance is an image, as a projector casts it: its upper edge towards `up`.
+
+    Who looks along the beam sees the image as it is. Details finer than a 128th of it are averaged.
+
+    Parameters
+    ----------
+    center : (3,) floats
+        A point on the beam's axis, where the image's middle goes, unit.
+    width : float
+        unit; the height follows from the image.
+    pixels : (rows, columns) ndarray
+        Brightness from 0 to 1, linear, the upper row first.
+    up : (3,) floats
+        The direction that is up on it, not along the beam.
+
+    Raises
+    ------
+    InputError
+        If the pixels are no image or all dark.
+    """
+
+    center: Vector
+    width: float
+    pixels: FloatArray
+    up: Vector = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("center", "up"):
+            # Nobody can change them afterwards.
+            object.__setattr__(self, name, tuple(as_vector(getattr(self, name), name).tolist()))
+        check_length(self.width, "width")
+        check_pixels(self.pixels)
+
+    @cached_property
+    def _coarse(self) -> FloatArray:
+        """The image with what is finer than `FINEST` averaged."""
+        pixels = self.pixels
+        for axis in (0, 1):
+            count = min(pixels.shape[axis], round(1.0 / FINEST))
+            places = np.arange(pixels.shape[axis]) * count // pixels.shape[axis]
+            sizes = np.bincount(places)
+            sums = np.add.reduceat(pixels, np.searchsorted(places, np.arange(count)), axis=axis)
+            pixels = sums / (sizes[:, None] if axis == 0 else sizes)
+        return np.asarray(pixels)
+
+    @property
+    def height(self) -> float:
+        """Unit."""
+        return float(self.width * self.pixels.shape[0] / self.pixels.shape[1])
+
+    @property
+    def reach(self) -> float:
+        """See `Spot`."""
+        return 0.5 * math.hypot(self.width, self.height)
+
+    @property
+    def detail(self) -> float:
+        """See `Spot`."""
+        rows, columns = self._coarse.shape
+        return float(min(self.height / max(rows, 4), self.width / max(columns, 4)))
+
+    @property
+    def edge(self) -> float:
+        """See `Spot`."""
+        return EDGE * min(self.width, self.height)
+
+    @property
+    def area(self) -> float:
+        """See `Spot`."""
+        return float(self._coarse.mean()) * self.width * self.height
+
+    def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        right, up = axes(direction, self.up)
+        rows, columns = self._coarse.shape
+        row = np.floor((0.5 - (offsets @ up) / self.height) * rows).astype(np.int64)
+        column = np.floor(((offsets @ right) / self.width + 0.5) * columns).astype(np.int64)
+        inside: BoolArray = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        shares = np.zeros(len(offsets))
+        shares[inside] = self._coarse[row[inside], column[inside]]
+        return shares
+
+    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        return outside(offsets, axes(direction, self.up), (self.width, self.height))
+
+    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        rows, columns = self._coarse.shape
+        bright = np.flatnonzero(self._coarse.ravel() > 0)
+        # In every bright pixel if there are few, else in some of each row.
+        row, column = np.divmod(bright[np.arange(count) * len(bright) // count], columns)
+        within = scattered(count)
+        places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
+        return np.asarray(places * [self.width, self.height] @ np.stack(axes(direction, self.up)))
+
+    __repr__ = one_line

@@ -1,0 +1,71 @@
+"""An even, rectangular spot."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from tetlux.fem.lights.point import as_vector
+from tetlux.fem.lights.spots.plane import axes, outside, scattered, with_middle
+from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.meshing.arrays import FloatArray, Vector
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """An even, rectangular spot.
+
+    Parameters
+    ----------
+    center : (3,) floats
+        A point on the beam's axis, unit.
+    width, height : float
+        Across and along `up`, unit.
+    up : (3,) floats
+        The direction that is up on it, not along the beam.
+    """
+
+    center: Vector
+    width: float
+    height: float
+    up: Vector = (0.0, 1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        as_vector(self.center, "center")
+        check_length(self.width, "width")
+        check_length(self.height, "height")
+
+    @property
+    def reach(self) -> float:
+        """See `Spot`."""
+        return 0.5 * math.hypot(self.width, self.height)
+
+    @property
+    def detail(self) -> float:
+        """See `Spot`."""
+        return 0.5 * min(self.width, self.height)
+
+    @property
+    def edge(self) -> float:
+        """See `Spot`."""
+        return EDGE * min(self.width, self.height)
+
+    @property
+    def area(self) -> float:
+        """See `Spot`."""
+        return self.width * self.height
+
+    def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        right, up = axes(direction, self.up)
+        inside = (np.abs(offsets @ right) <= 0.5 * self.width) & (np.abs(offsets @ up) <= 0.5 * self.height)
+        return np.where(inside, 1.0, 0.0)
+
+    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        return outside(offsets, axes(direction, self.up), (self.width, self.height))
+
+    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+        """See `Spot`."""
+        places = (scattered(count) - 0.5) * [self.width, self.height]
+        return with_middle(places @ np.stack(axes(direction, self.up)))
