@@ -6,8 +6,8 @@ import numpy as np
 
 from tetlux.fem.ballistic.follow import Rays, entered, follow
 from tetlux.fem.body.body import Body
+from tetlux.fem.inputs import check_positive, unit_vector
 from tetlux.fem.lights.arrows import Arrows
-from tetlux.fem.lights.point import check_positive, unit_vector
 from tetlux.fem.lights.spots import UNCHANGING, Spot
 from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients

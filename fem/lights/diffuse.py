@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.point import check_positive
+from tetlux.fem.inputs import check_positive
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.point import check_positive
+from tetlux.fem.inputs import check_positive
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.errors import InputError

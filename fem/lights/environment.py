@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.lights.point import unit_vector
+from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights.spots.image import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance

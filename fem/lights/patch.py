@@ -7,9 +7,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.inputs import as_vector, check_positive
 from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.diffuse import diffuse_transmittance
-from tetlux.fem.lights.point import as_vector, check_positive
 from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text

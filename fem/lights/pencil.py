@@ -9,9 +9,9 @@ import numpy as np
 from tetlux.fem.ballistic.follow import Rays, entered
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.optical_paths import OpticalPaths
+from tetlux.fem.inputs import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.collimated import LOOKS, CollimatedBeam
-from tetlux.fem.lights.point import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.spots import Disc
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.thin_line import line_of

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.lights.point import as_vector
+from tetlux.fem.inputs import as_vector
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share

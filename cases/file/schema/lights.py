@@ -5,8 +5,9 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.file.in_channel import InChannel
 from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
+from tetlux.cases.file.schema.place import Place
+from tetlux.fem.inputs import check_positive
 from tetlux.fem.lights import (
     CollimatedBeam,
     DiffuseLight,
@@ -21,7 +22,6 @@ from tetlux.fem.lights import (
     PointSource,
     Rectangle,
 )
-from tetlux.fem.lights.point import check_positive
 from tetlux.meshing.errors import InputError
 
 AnySpot = Disc | Gaussian | Rectangle | Image
@@ -30,7 +30,7 @@ AnySpot = Disc | Gaussian | Rectangle | Image
 class LightSection(Section):
     """The section of one kind of light, which makes that light."""
 
-    def light(self, place: InChannel) -> Light | None:
+    def light(self, place: Place) -> Light | None:
         """The light in one channel, or None where it is dark; a section has no lists any more when it is asked.
 
         Raises
@@ -61,7 +61,7 @@ class PencilSpec(LightSection):
     radius: Number = Field(0.0, description="unit")
     deposit: Literal["point", "line"] = "point"
 
-    def light(self, place: InChannel) -> Light:
+    def light(self, place: Place) -> Light:
         """See `LightSection`."""
         del place
         return PencilBeam(self.origin, self.direction, self.number("power"), self.radius, self.deposit)
@@ -73,7 +73,7 @@ class PointSpec(LightSection):
     position: Vector3
     power: Each = Field(1.0, description="W")
 
-    def light(self, place: InChannel) -> Light:
+    def light(self, place: Place) -> Light:
         """See `LightSection`."""
         del place
         return PointSource(self.position, self.number("power"))
@@ -84,7 +84,7 @@ class DiffuseSpec(LightSection):
 
     irradiance: Each = Field(description="W/unit²")
 
-    def light(self, place: InChannel) -> Light:
+    def light(self, place: Place) -> Light:
         """See `LightSection`."""
         del place
         return DiffuseLight(self.number("irradiance"))
@@ -97,7 +97,7 @@ class PatchSpec(LightSection):
     radius: Length
     irradiance: Each = Field(description="W/unit²")
 
-    def light(self, place: InChannel) -> Light:
+    def light(self, place: Place) -> Light:
         """See `LightSection`."""
         del place
         return DiffusePatch(self.center, self.radius, self.number("irradiance"))
@@ -137,7 +137,7 @@ class SpotSpec(Choice):
     rectangle: RectangleSpec | None = None
     image: ImageSpec | None = None
 
-    def spot(self, place: InChannel) -> AnySpot | None:
+    def spot(self, place: Place) -> AnySpot | None:
         """The spot in one channel, or None where an image is dark."""
         if self.disc:
             return Disc(self.disc.center, self.disc.radius)
@@ -171,7 +171,7 @@ class CollimatedSpec(LightSection):
             )
         return self
 
-    def light(self, place: InChannel) -> Light | None:
+    def light(self, place: Place) -> Light | None:
         """See `LightSection`."""
         if self.spot is None:
             return CollimatedBeam(self.direction, self.number("irradiance"))
@@ -193,7 +193,7 @@ class EnvironmentSpec(LightSection):
     front: Vector3 = Field((0.0, 1.0, 0.0), description="direction of the image's middle")
     encoding: Encoding = "srgb"
 
-    def light(self, place: InChannel) -> Light | None:
+    def light(self, place: Place) -> Light | None:
         """See `LightSection`."""
         brightest = self.number("brightest")
         check_positive(brightest, "brightest", "W/(unit² sr)")
@@ -209,7 +209,7 @@ class EmissionSpec(LightSection):
         None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
     )
 
-    def light(self, place: InChannel) -> Light:
+    def light(self, place: Place) -> Light:
         """See `LightSection`."""
         return Emission(self.number("density"), place.region(self.region))
 
@@ -226,7 +226,7 @@ class LightSpec(Choice):
     environment: EnvironmentSpec | None = None
     emission: EmissionSpec | None = None
 
-    def light(self, place: InChannel) -> Light | None:
+    def light(self, place: Place) -> Light | None:
         """The light in one channel, or None where it is dark.
 
         Raises

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.lights.point import as_vector
+from tetlux.fem.inputs import as_vector
 from tetlux.fem.lights.spots.plane import beyond, squared, sunflower, with_middle
 from tetlux.fem.lights.spots.spot import EDGE, check_length
 from tetlux.meshing.arrays import FloatArray, Vector

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.lights.point import as_vector
+from tetlux.fem.inputs import as_vector
 from tetlux.fem.lights.spots.plane import axes, outside, scattered
 from tetlux.fem.lights.spots.spot import EDGE, check_length
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.fem.lights.point import as_vector
+from tetlux.fem.inputs import as_vector
 from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
