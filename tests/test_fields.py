@@ -144,6 +144,8 @@ def test_images_that_cannot_be(tmp_path: Path) -> None:
         read(tmp_path)
     with pytest.raises(InputError, match=r"values are .*; give two finite numbers"):
         read_image_field(tmp_path / "s1.png", **PLACE, values=(0.0, np.nan))
+    with pytest.raises(InputError, match=r"values are .*; give two finite numbers up to 1e\+30"):
+        read_image_field(tmp_path / "s1.png", **PLACE, values=(-1.2e297, 0.1))
     with pytest.raises(InputError, match=r"s1.png: spacing is -1"):
         read_image_field(tmp_path / "s1.png", origin=(0, 0, 0), spacing=-1, values=(0.0, 1.0))
 

@@ -16,6 +16,8 @@ from tetlux.meshing.files.meshes import read_with_meshio
 from tetlux.meshing.host.filesystem import is_file, is_folder
 from tetlux.meshing.tets.given import unjoined
 
+# Values that single precision holds with room for sums.
+LARGEST = 1e30
 IMAGES = (".png", ".tif", ".tiff")
 # White of the grey images that Pillow reads, by their mode.
 WHITE = {"1": 1, "L": 255, "I;16": 65535, "I;16B": 65535}
@@ -104,8 +106,10 @@ def read_image_field(
     else:
         files = [_existing(path, IMAGES)]
     low, high = np.asarray(values, dtype=float)
-    if not (np.isfinite(low) and np.isfinite(high)):
-        raise InputError(f"values are {values}; give two finite numbers, what black and white stand for.")
+    if not (np.abs([low, high]) <= LARGEST).all():
+        raise InputError(
+            f"values are {values}; give two finite numbers up to {LARGEST:g}, what black and white stand for."
+        )
     slices: list[npt.NDArray[np.float32]] = []
     first = ""
     for file in files:
