@@ -10,6 +10,7 @@ from PIL import Image
 
 from tests.conftest import TISSUE, block
 from tetlux.cases.file.fields import read_array_field, read_image_field, read_mesh_field
+from tetlux.fem import grid_field
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import InputError
 from tetlux.meshing.files.meshes import write_mesh
@@ -189,3 +190,10 @@ def test_arrays(tmp_path: Path) -> None:
             read_array_field(tmp_path / "mu.npy", **PLACE)
     with pytest.raises(InputError, match=r'"\.txt" files are not read|does not exist'):
         read_array_field(tmp_path / "mu.txt", **PLACE)
+
+
+def test_a_spacing_that_no_quotient_survives_is_refused() -> None:
+    with pytest.raises(InputError, match=r"spacing is .*; give lengths of at least 1e-30"):
+        grid_field(np.ones((2, 2, 2)), origin=(0, 0, 0), spacing=1e-320)
+    with pytest.raises(InputError, match="origin is"):
+        grid_field(np.ones((2, 2, 2)), origin=(1e300, 0, 0), spacing=1.0)

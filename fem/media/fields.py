@@ -15,6 +15,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Two meshes of one curved body differ by about this share of its diagonal: so far outside, the nearest value holds.
 MARGIN = 0.01
+# Origins and spacings, in whatever unit, whose quotients do not overflow.
+LARGEST = 1e30
 # A point on the rim of a grid, rounded, is still on it: in spacings.
 ROUNDING = 1e-6
 
@@ -70,11 +72,13 @@ def grid_field(values: npt.ArrayLike, *, origin: Vector, spacing: float | Vector
     if array.ndim != 3 or array.size == 0:
         raise InputError(f"a grid needs values along x, y and z, and has the shape {array.shape}.")
     start = np.asarray(origin, dtype=float)
-    if start.shape != (3,) or not np.isfinite(start).all():
+    if start.shape != (3,) or not (np.abs(start) <= LARGEST).all():
         raise InputError(f"origin is {origin}; give three finite coordinates, the middle of the first voxel.")
     step = np.asarray(spacing, dtype=float)
-    if step.shape not in ((), (3,)) or not (np.isfinite(step) & (step > 0)).all():
+    if step.shape not in ((), (3,)) or not ((step > 0) & (step <= LARGEST)).all():
         raise InputError(f"spacing is {spacing}; give one length greater than 0, or three.")
+    if (step < 1.0 / LARGEST).any():
+        raise InputError(f"spacing is {spacing}; give lengths of at least {1.0 / LARGEST:g}.")
     return _Grid(array, start, np.broadcast_to(step, 3))
 
 

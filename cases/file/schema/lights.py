@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
@@ -201,11 +201,16 @@ class EnvironmentSpec(LightSection):
         return None if pixels is None else EnvironmentLight(brightest * pixels, up=self.up, front=self.front)
 
 
+def _number_as_text(value: object) -> object:
+    """The number of a label as the text that it is looked up by."""
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
 class EmissionSpec(LightSection):
     """Light that the volume emits, as `tetlux.fem.Emission`."""
 
     density: Each = Field(description="W/unit³")
-    region: str | int | None = Field(
+    region: Annotated[str | None, BeforeValidator(_number_as_text)] = Field(
         None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
     )
 
