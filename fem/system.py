@@ -20,7 +20,9 @@ from tetlux.fem.operators.fitting import Fitting, fitting_of
 from tetlux.fem.operators.limiter import nonnegative
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.outcome.solution import Power, Solution, sum_solutions
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.ledger import Ledger
+from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import BoolArray, FloatArray
@@ -206,16 +208,19 @@ class System:
     def _loads(self, sources: Sources) -> "tuple[list[Deposit], list[Operator], list[FloatArray]]":
         """Of each light: its deposit on the mesh, its operator, and its load at the nodes (n,), W."""
         mesh = self.mesh
-        deposits = [self._emitting(deposit.on(mesh, self.body, self.coefficients)) for deposit in sources.on_mesh]
+        deposits = [
+            self._emitting(deposit.evaluate_on(mesh, self.body, self.coefficients)) for deposit in sources.remaining
+        ]
         operators = [self._operator_of(light, deposit, sources) for light, deposit in enumerate(deposits)]
-        loads = [load_vector(mesh, self.coefficients, deposit) for deposit in deposits]
+        loads = [load_vector(mesh, self.coefficients, deposit.terms) for deposit in deposits]
         for light, (deposit, operator) in enumerate(zip(deposits, operators, strict=True)):
-            if operator.fitting is not None and np.any(deposit.emission):
-                emitted = mesh.to_nodes(deposit.emission * mesh.volumes)
+            if operator.fitting is not None and np.any(deposit.terms.emission):
+                emitted = mesh.to_nodes(deposit.terms.emission * mesh.volumes)
                 withheld = (1.0 - operator.fitting.absorption_scale) * emitted
                 # The fitted operator absorbs only in the layer: the rest is absorbed where it is emitted.
                 loads[light] -= withheld
-                deposits[light] = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+                ledger = Ledger.merge([deposit.ledger, Ledger(absorbed=float(withheld.sum()))])
+                deposits[light] = replace(deposit, ledger=ledger)
         return deposits, operators, loads
 
     def _patches(self, sources: Sources, before: Step | None) -> list[Patch]:
@@ -253,7 +258,7 @@ class System:
 
     def _operator_of(self, light: int, deposit: Deposit, sources: Sources) -> "Operator":
         """The fitted operator for light that is spread evenly, the plain one for all other light."""
-        return self.fitted if deposit.even and light not in sources.owners else self.plain
+        return self.fitted if deposit.terms.is_distributed and light not in sources.owners else self.plain
 
     def _solution(
         self,
@@ -267,41 +272,43 @@ class System:
         mesh, limited_power = self.mesh, 0.0
         if self.limit and not (self._has_first_moment(deposit) or any(patch.charges.dips for patch in patches)):
             fluence, limited_power = nonnegative(fluence, mesh.edges, self._losing(operator))
-        outside = mesh.boundary_node_areas * deposit.irradiance
-        transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
-        emitted = float((mesh.volumes * deposit.emission).sum())
+        known, distributed = deposit.ledger, deposit.terms
+        outside = mesh.boundary_node_areas * distributed.irradiance
+        transmitted = mesh.boundary_node_areas * distributed.transmitted_irradiance
+        emitted = float((mesh.volumes * distributed.emission).sum())
         absorbed = float((operator.absorbing * fluence).sum())
-        ledger = Power(
-            incident=deposit.incident + float(outside.sum()) + emitted,
-            specular=deposit.specular + float((outside - transmitted).sum()),
-            absorbed=deposit.absorbed + absorbed + sum(term.absorbed for term in terms),
+        power = Power(
+            incident=known.incident + float(outside.sum()) + emitted,
+            specular=known.specular + float((outside - transmitted).sum()),
+            absorbed=known.absorbed + absorbed + sum(term.absorbed for term in terms),
             exited=0.0,
-            ballistic=deposit.ballistic,
+            ballistic=known.ballistic,
         )
         solution = Solution(
             mesh,
             self.body,
             self.coefficients.outer,
             fluence,
-            ledger,
+            power,
             tuple(patches),
-            deposit.transmitted_irradiance,
+            distributed.transmitted_irradiance,
             limited_power=limited_power,
         )
         exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(term.exited for term in terms)
-        return replace(solution, power=replace(ledger, exited=exited))
+        return replace(solution, power=replace(power, exited=exited))
 
     def _has_first_moment(self, deposit: Deposit) -> bool:
         """Whether it has a Q1, beside which the diffusion equation itself may have a fluence below zero."""
-        return len(deposit.starts) > 0 and bool(np.any(self.coefficients.cosine != 0))
+        return len(deposit.terms.segments) > 0 and bool(np.any(self.coefficients.cosine != 0))
 
     def _emitting(self, deposit: Deposit) -> Deposit:
         """What regions emit, as it is of their true volume: facets of a round one lie inside it."""
-        if np.ndim(deposit.emission) == 0 or not self.regions:
+        if np.ndim(deposit.terms.emission) == 0 or not self.regions:
             return deposit
         held = np.bincount(self.mesh.regions, self.mesh.volumes, minlength=len(self.regions) + 1)
         share = own_volumes(self.body, tuple(region.surface for region in self.regions)) / held
-        return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
+        emission = deposit.terms.emission * share[self.mesh.regions]
+        return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
     def _losing(self, operator: "Operator") -> FloatArray:
         """What a fluence of 1 at each node loses by absorption and through the boundary, (n,), unit²."""
@@ -364,9 +371,9 @@ def _parts_by_operator(
     found = []
     for operator in dict.fromkeys(operators):
         some = [light for light, each in enumerate(operators) if each is operator]
-        emission = sum((deposits[light].emission for light in some), 0.0)
-        # Only uneven deposits make the exitance ripple, and emission is even.
-        uneven = [loads[light] for light in some if not deposits[light].even]
-        load = np.sum([np.zeros_like(loads[0]), *uneven], axis=0)
+        emission = sum((deposits[light].terms.emission for light in some), 0.0)
+        # Only points and segments make the exitance ripple.
+        concentrated = [loads[light] for light in some if not deposits[light].terms.is_distributed]
+        load = np.sum([np.zeros_like(loads[0]), *concentrated], axis=0)
         found.append(_Part(operator, sum_solutions([of_lights[light] for light in some]), load, emission))
     return found
