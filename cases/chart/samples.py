@@ -46,7 +46,7 @@ def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) 
     ----------
     surface : Surface
     lit, resolutions : (s, 3), (s,) ndarray
-        Where light is deposited, and the length to resolve there: see `tetlux.fem.grading.lit_points`.
+        Where light is deposited, and the length to resolve there: see `tetlux.fem.grading.places_to_resolve`.
 
     Returns
     -------
