@@ -11,7 +11,7 @@ BoolArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 
-def summed(places: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
+def sum_by_index(places: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
     """Sums (count,) of values by place; `places` and `values` have the same shape."""
     return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)
 

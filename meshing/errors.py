@@ -4,15 +4,15 @@ from functools import partial
 from typing import Any
 
 # Longer texts are shortened in the middle, since a quoted name can have any length.
-LONGEST = 900
+LONGEST_SENTENCE = 900
 
 
 class TetluxError(Exception):
     """Base of all errors that tetlux raises deliberately; the text is one sentence on one printable line."""
 
     def __init__(self, sentence: str) -> None:
-        if len(sentence) > LONGEST:
-            sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
+        if len(sentence) > LONGEST_SENTENCE:
+            sentence = f"{sentence[: LONGEST_SENTENCE // 2]} ... {sentence[-LONGEST_SENTENCE // 2 :]}"
         super().__init__(
             "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in sentence)
         )

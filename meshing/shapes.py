@@ -12,7 +12,7 @@ from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, To
 from tetlux.meshing.surface.surface import Surface
 
 
-def _positive(**lengths: float) -> None:
+def _check_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
         if not math.isfinite(value) or value <= 0:
             raise InputError(f"{name} is {value:g}; give a length greater than 0.")
@@ -30,13 +30,13 @@ def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int
     InputError
         If the radius is not positive, or `subdivisions` not within 1 to 7.
     """
-    _positive(radius=radius)
+    _check_lengths(radius=radius)
     if not 1 <= subdivisions <= 7:
         raise InputError(f"subdivisions is {subdivisions}; give 1 to 7.")
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return _surface_of(Sphere(radius, _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
+    return _make_surface(Sphere(radius, _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
 
 
 def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> Surface:
@@ -55,11 +55,13 @@ def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> 
         If a length is not positive.
     """
     for axis, length in zip("xyz", size, strict=True):
-        _positive(**{f"size along {axis}": length})
+        _check_lengths(**{f"size along {axis}": length})
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.box(extents=size)
-    return _surface_of(Box(_vector(size), _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
+    return _make_surface(
+        Box(_to_vector(size), _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit
+    )
 
 
 def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
@@ -70,7 +72,7 @@ def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
     InputError
         If a length is not positive.
     """
-    _positive(width=width, depth=depth)
+    _check_lengths(width=width, depth=depth)
     plate = box((width, width, depth), center=(0.0, 0.0, -0.5 * depth), unit=unit)
     return replace(plate, name="slab", shape=Slab(width, depth))
 
@@ -85,7 +87,7 @@ def cylinder(
     InputError
         If a length is not positive, or `segments` is below 8.
     """
-    _positive(radius=radius, height=height)
+    _check_lengths(radius=radius, height=height)
     if segments < 8:
         raise InputError(f"segments is {segments}; give 8 or more.")
     angle = 2.0 * np.pi * np.arange(segments) / segments
@@ -104,8 +106,8 @@ def cylinder(
     last = rows * segments
     faces.append(np.column_stack([following, here, np.full(segments, bottom)]))
     faces.append(np.column_stack([here + last, following + last, np.full(segments, top)]))
-    shape = Cylinder(radius, height, _vector(center))
-    return _surface_of(shape, points + np.asarray(center), np.vstack(faces), unit)
+    shape = Cylinder(radius, height, _to_vector(center))
+    return _make_surface(shape, points + np.asarray(center), np.vstack(faces), unit)
 
 
 def torus(
@@ -129,7 +131,7 @@ def torus(
     InputError
         If a length is not positive, the tube is wider than the ring, or `segments` is below 12.
     """
-    _positive(major=major, minor=minor)
+    _check_lengths(major=major, minor=minor)
     if minor >= major:
         raise InputError(f"minor is {minor:g} and major {major:g}; the tube's radius must be the smaller one.")
     if segments < 12:
@@ -143,16 +145,16 @@ def torus(
         [(distance * np.cos(uu)).ravel(), (distance * np.sin(uu)).ravel(), (minor * np.sin(vv)).ravel()]
     )
     faces = _grid_faces(rows, segments, closed_rows=True)
-    return _surface_of(Torus(major, minor, _vector(center)), points + np.asarray(center), faces, unit)
+    return _make_surface(Torus(major, minor, _to_vector(center)), points + np.asarray(center), faces, unit)
 
 
-def _surface_of(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
+def _make_surface(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
     """Make a checked surface of a shape's triangles that remembers the shape."""
     name = type(shape).__name__.lower()
     return replace(surface_from_arrays(points, faces, unit=unit, name=name), shape=shape)
 
 
-def _vector(values: Vector) -> Vector:
+def _to_vector(values: Vector) -> Vector:
     """Convert three numbers to floats."""
     x, y, z = map(float, values)
     return x, y, z

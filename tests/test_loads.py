@@ -212,7 +212,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
     deposit = beams(starts, ends)
     load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    monkeypatch.setattr(cell_tree, "PORTION", portion)
+    monkeypatch.setattr(cell_tree, "PAIRS_AT_ONCE", portion)
     assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(load, abs=1e-14)
     tree = mesh.tree
     parts = list(tree.cut(deposit.starts, deposit.directions, deposit.lengths))
@@ -255,7 +255,7 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
         tested = [len(cells) for *_, cells in tree._near(deposit.starts, deposit.directions, deposit.lengths)]
         # 2.7 and 2.1.
         assert sum(tested) < 4.0 * passed
-        assert max(tested) <= cell_tree.PORTION
+        assert max(tested) <= cell_tree.PAIRS_AT_ONCE
 
 
 def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:

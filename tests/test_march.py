@@ -241,7 +241,7 @@ def test_paths_that_end_outside_are_left_to_the_tree() -> None:
     assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
 
 
-@pytest.mark.parametrize("name", ["MOST_STALLS", "ASIDE"])
+@pytest.mark.parametrize("name", ["MOST_STALLS", "START_SLACK"])
 def test_paths_that_are_lost_are_left_to_the_tree(
     name: str, ball_mesh: TetMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -260,7 +260,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     mesh = block((5, 5, 5), (5.0, 5.0, 5.0))
     deposit = from_facets(mesh, 60, 6)
     load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    monkeypatch.setattr(marching, "PORTION", portion)
+    monkeypatch.setattr(marching, "PATHS_AT_ONCE", portion)
     mesh = same_mesh(mesh)
     parts = list(march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells))
     assert len(parts) >= -(-len(deposit.starts) // portion)
@@ -354,7 +354,7 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     load_vector(mesh, coefficients_of(FORWARD), deposits[0])
     held = sum(len(part.segments.paths) for part in mesh.cache.paths.parts)
     # Room for two and a half.
-    monkeypatch.setattr(path_cache, "MOST_SEGMENTS", int(2.5 * held))
+    monkeypatch.setattr(path_cache, "MOST_CACHED_SEGMENTS", int(2.5 * held))
     for deposit in deposits:
         load_vector(mesh, coefficients_of(FORWARD), deposit)
     assert len(mesh.cache.paths.parts) == 2
@@ -366,7 +366,7 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
 
 def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is looked through for every path; and what is marched to find a point is none."""
-    monkeypatch.setattr(path_cache, "MOST_PARTS", 3)
+    monkeypatch.setattr(path_cache, "MOST_CACHED_PARTS", 3)
     mesh = same_mesh(ball_mesh)
     deposits = [from_facets(mesh, 20, seed) for seed in range(5)]
     for deposit in deposits:

@@ -28,7 +28,7 @@ from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import child as child_mesher
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.repair.topology import bodies
-from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.refine import move_to_surface
 
 
 def test_the_mesher_fills_the_body(ball: Surface, ball_mesh: TetMesh) -> None:
@@ -187,7 +187,7 @@ def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
     """A cube whose nodes are called onto a ball far larger: corners would be drawn out, faces pushed flat."""
     cube = block((4, 4, 4), (2.0, 2.0, 2.0))
     target = sphere(2.0, center=(0.0, 0.0, -1.0))
-    moved = moved_to_surface(cube, target)
+    moved = move_to_surface(cube, target)
     assert moved.volume > 1.1 * cube.volume
     assert (moved.volumes >= 0.399 * cube.volumes).all()
     assert (moved.quality >= np.minimum(cube.quality, np.maximum(0.1, 0.4 * cube.quality)) - 1e-9).all()
@@ -196,7 +196,7 @@ def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
 def test_a_move_to_the_surface_does_not_shrink_tetrahedra_away() -> None:
     """All nodes are on the boundary, and called to a tenth of their distance: shapes would stay as they are."""
     cube = block((1, 1, 1), (2.0, 2.0, 2.0))
-    moved = moved_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
+    moved = move_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
     assert (moved.volumes >= 0.399 * cube.volumes).all()
     assert moved.volume < 0.9 * cube.volume
 

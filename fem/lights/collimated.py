@@ -13,9 +13,9 @@ from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.subdivide import quartered
+from tetlux.meshing.surface.subdivide import quarter_triangles
 from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -152,8 +152,10 @@ class CollimatedBeam:
         lit = lit[distances >= way[lit]]
         # All that a facet gets of a spot is one ray, from the middle of it.
         facets, places = np.unique(owner[lit], return_inverse=True)
-        total = summed(places, powers[lit], len(facets))
-        starts = np.column_stack([summed(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T])
+        total = sum_by_index(places, powers[lit], len(facets))
+        starts = np.column_stack(
+            [sum_by_index(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T]
+        )
         along = np.broadcast_to(direction, starts.shape)
         return Rays(starts, along, total, mesh.boundary_cells[facets]), normals[facets]
 
@@ -176,7 +178,7 @@ class CollimatedBeam:
             cutting &= cut < _CUTS - 1
             done.append(corners[~cutting])
             owners.append(owner[~cutting])
-            corners, owner = quartered(corners[cutting]), np.repeat(owner[cutting], 4)
+            corners, owner = quarter_triangles(corners[cutting]), np.repeat(owner[cutting], 4)
             if len(corners) == 0:
                 break
         return np.concatenate(done), np.concatenate(owners)

@@ -13,7 +13,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -86,8 +86,8 @@ class EnvironmentLight:
         level = np.column_stack([np.cos(turn), np.sin(turn)])
         even = np.column_stack([np.sqrt(1.0 - height**2)[:, None] * level, height])
         home = np.asarray(cKDTree(even).query(towards)[1])
-        total = summed(home, power, DIRECTIONS)
-        mean = np.column_stack([summed(home, power * axis, DIRECTIONS) for axis in towards.T])
+        total = sum_by_index(home, power, DIRECTIONS)
+        mean = np.column_stack([sum_by_index(home, power * axis, DIRECTIONS) for axis in towards.T])
         found = total > 0
         return mean[found] / np.linalg.norm(mean[found], axis=1, keepdims=True), total[found]
 

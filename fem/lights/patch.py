@@ -14,9 +14,9 @@ from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.subdivide import quartered
+from tetlux.meshing.surface.subdivide import quarter_triangles
 from tetlux.meshing.surface.surface import Surface, longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -137,12 +137,12 @@ def _areas_within(corners: FloatArray, radius: float) -> FloatArray:
     for cut in range(CUTS):
         distances, sizes = np.linalg.norm(corners, axis=2), longest_sides(corners)
         whole = distances.max(axis=1) <= radius
-        areas += summed(owner[whole], _sizes(corners[whole]), len(areas))
+        areas += sum_by_index(owner[whole], _sizes(corners[whole]), len(areas))
         crossed = ~whole & (distances.min(axis=1) <= radius + sizes)
         corners, owner, sizes = corners[crossed], owner[crossed], sizes[crossed]
         fine = sizes <= EDGE * radius if cut < CUTS - 1 else np.ones(len(sizes), dtype=bool)
-        areas += summed(owner[fine], _sizes(corners[fine]) * _shares_within(corners[fine], radius), len(areas))
-        corners, owner = quartered(corners[~fine]), np.repeat(owner[~fine], 4)
+        areas += sum_by_index(owner[fine], _sizes(corners[fine]) * _shares_within(corners[fine], radius), len(areas))
+        corners, owner = quarter_triangles(corners[~fine]), np.repeat(owner[~fine], 4)
         if len(corners) == 0:
             break
     return areas

@@ -10,7 +10,7 @@ from tetlux.fem.ballistic.follow import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -58,11 +58,11 @@ def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, homes: In
     if len(lost):
         cells[lost], weights[lost] = mesh.locate(points[lost])
     inside = cells >= 0
-    load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
+    load = sum_by_index(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
         # Between the surface and the mesh's facets, a hair outside the mesh.
         _, faces, corner = mesh.closest_boundary(points[~inside])
-        load += summed(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
+        load += sum_by_index(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
     return load
 
 

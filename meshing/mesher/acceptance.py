@@ -11,18 +11,18 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 # A mesh whose boundary is more than this many deviations from the surface has lost a part.
-LOST = 2.5
+LOST_PART = 2.5
 # Sample points that look for a lost part, which is larger than a triangle.
-SAMPLES = 3_000
+PART_SAMPLES = 3_000
 
 
 class NotTheBodyError(RunError):
     """The mesh does not represent the surface; one of a smaller deviation may."""
 
 
-def has_lost_a_part(mesh: TetMesh, shell: Shell) -> bool:
+def has_lost_part(mesh: TetMesh, shell: Shell) -> bool:
     """Whether the mesh is anywhere so far from a surface that a part must be missing."""
-    return surface_deviation(part_of(mesh, shell), shell.surface, SAMPLES) > LOST * shell.deviation
+    return surface_deviation(part_of(mesh, shell), shell.surface, PART_SAMPLES) > LOST_PART * shell.deviation
 
 
 def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:
@@ -58,7 +58,7 @@ def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     _, first = np.unique(body_of, return_index=True)
     vertices = surface.points[surface.faces[first]].reshape(-1, 3)
     distances = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
-    if not surface.overlaps and (distances > LOST * deviation).any():
+    if not surface.overlaps and (distances > LOST_PART * deviation).any():
         raise NotTheBodyError(
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
             "others; leave it out, or make it larger."

@@ -12,17 +12,17 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError, RunError
-from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_a_part, part_of
-from tetlux.meshing.mesher.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_part, part_of
+from tetlux.meshing.mesher.cache import cache_directory, load_cached_mesh, mesh_key, store_cached_mesh
 from tetlux.meshing.mesher.child import run_pytetwild
 from tetlux.meshing.mesher.proxy import proxy
-from tetlux.meshing.mesher.shells import shells_of
+from tetlux.meshing.mesher.shells import make_shells
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface.surface import Surface, body_sizes
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.refine import move_to_surface
 from tetlux.meshing.tets.tagging import tag_tetrahedra
 
 # Measured with the settings below on 2 cores, without the cache. Seconds are the least of four runs; the other columns
@@ -52,7 +52,7 @@ STOP_ENERGY = 9.5
 # Default seconds after which the mesher is stopped: ten times the time of slow bodies.
 TIME_LIMIT = 300.0
 # Factor on the deviation in the second attempt, made if the first mesh does not match the surface.
-SECOND = 0.3
+SECOND_ATTEMPT = 0.3
 # Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. A plate 60 wide and 1, .5 or .25
 # thick (.011, .0058, .0029) takes the mesher 2, 5 and over 60 s, with 2k and 8k tetrahedra in the first two; a needle
 # 100 widths long (.005) takes 2 s, one of 1000 (.0005) over 60 s.
@@ -152,12 +152,12 @@ def tetrahedralize(
             pytetwild=version("pytetwild"),
             fast_simplification=version("fast-simplification"),
         )
-        known = remembered_mesh(key, directory, surface.unit)
+        known = load_cached_mesh(key, directory, surface.unit)
         if known is not None:
             return known
     mesh = _mesh_body(surface, wanted, deviation, envelope, stop_energy, time_limit, regions)
     if directory is not None:
-        remember_mesh(key, directory, mesh)
+        store_cached_mesh(key, directory, mesh)
     return mesh
 
 
@@ -188,7 +188,7 @@ def _mesh_body(
 ) -> TetMesh:
     """Mesh the body; if the first mesh does not match the surface, mesh again within a smaller deviation."""
     end = time.monotonic() + time_limit
-    shells = shells_of(surface, regions, deviation)
+    shells = make_shells(surface, regions, deviation)
     if len(regions) > 0:
         envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells))
     # Where two surfaces touch, fTetWild loses the orientation of their triangles, so its inside test fails.
@@ -200,7 +200,7 @@ def _mesh_body(
             for shell in shells
         ]
         seconds = end - time.monotonic()
-        mesh = _fill(
+        mesh = _mesh_proxies(
             surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit, filtered
         )
         for shell in shells:
@@ -209,13 +209,13 @@ def _mesh_body(
 
     try:
         mesh = attempt(1.0)
-        lost = any(has_lost_a_part(mesh, shell) for shell in shells)
+        lost = any(has_lost_part(mesh, shell) for shell in shells)
     except NotTheBodyError:
         lost = True
-    return attempt(SECOND) if lost else mesh
+    return attempt(SECOND_ATTEMPT) if lost else mesh
 
 
-def _fill(
+def _mesh_proxies(
     surface: Surface,
     regions: Sequence[Surface],
     coarse: Sequence[Surface],
@@ -244,11 +244,11 @@ def _fill(
     )
     points = points * size + origin
     tags = tag_tetrahedra(points, tetrahedra, coarse[0], coarse[1:], envelope) if len(regions) > 0 else None
-    mesh = _clean(points, tetrahedra, surface, tags)
-    return moved_to_surface(mesh, surface, regions)
+    mesh = _remove_debris(points, tetrahedra, surface, tags)
+    return move_to_surface(mesh, surface, regions)
 
 
-def _clean(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
+def _remove_debris(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
     """A mesh without flat tetrahedra, small debris, unused nodes and tetrahedra tagged as outside (-1).
 
     Debris is what fTetWild's envelope can leave beside the body.

@@ -18,7 +18,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # Raise it when the code makes other meshes for the same settings, or writes them differently.
 FORMAT = 2
 # Largest cache size, bytes; the least recently used entries are removed first.
-LIMIT = 1_000_000_000
+LARGEST_CACHE = 1_000_000_000
 
 
 def cache_directory() -> Path | None:
@@ -51,9 +51,9 @@ def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: floa
     return digest.hexdigest()
 
 
-def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
+def load_cached_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     """The cached mesh of a key, or None if there is none or its file is unusable."""
-    path = _entry(key, directory)
+    path = _entry_path(key, directory)
     try:
         # Opened here, since np.load does not close a truncated file.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
@@ -69,7 +69,7 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     return mesh
 
 
-def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
+def store_cached_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
     """Cache a mesh under a key; do nothing if files cannot be written."""
     with contextlib.suppress(OSError, MemoryError):
         directory.mkdir(parents=True, exist_ok=True)
@@ -86,14 +86,14 @@ def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
                     key=np.array(key),
                 )
             # An atomic rename, so that other processes see the whole entry or none.
-            part.replace(_entry(key, directory))
+            part.replace(_entry_path(key, directory))
         except BaseException:
             part.unlink()
             raise
         _make_room(directory)
 
 
-def _entry(key: str, directory: Path) -> Path:
+def _entry_path(key: str, directory: Path) -> Path:
     return directory / f"{key}.npz"
 
 
@@ -109,7 +109,7 @@ def _make_room(directory: Path) -> None:
                 path.unlink()
     total = sum(size for _, size, _ in found)
     for _, size, path in sorted(found, key=lambda entry: entry[0]):
-        if total <= LIMIT:
+        if total <= LARGEST_CACHE:
             break
         with contextlib.suppress(OSError):
             path.unlink()

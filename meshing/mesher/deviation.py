@@ -8,10 +8,10 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Sample points per surface, at 4 µs each. A surface with more vertices is far finer than the other one, so a subset of
 # its vertices gives the same distance.
-SAMPLES = 6_000
+DISTANCE_SAMPLES = 6_000
 
 
-def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) -> float:
+def two_sided_distance(first: Surface, second: Surface, samples: int = DISTANCE_SAMPLES) -> float:
     """Largest distance from either surface to the other, unit: the Hausdorff distance, sampled.
 
     Parameters
@@ -24,7 +24,7 @@ def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) 
     return max(_farthest(first, second, samples), _farthest(second, first, samples))
 
 
-def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = SAMPLES) -> float:
+def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = DISTANCE_SAMPLES) -> float:
     """Two-sided distance between a mesh's boundary and a surface, unit."""
     return two_sided_distance(mesh.surface, surface, samples)
 

@@ -16,7 +16,7 @@ from tetlux.meshing.tets.nesting import nesting
 # envelope is common.
 INNER_DEVIATION = 0.03
 # A region with less than this share of its volume outside its inner regions counts as filled by them.
-LEFT = 1e-6
+EMPTY_REGION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Shell:
     regions: tuple[int, ...] = ()
 
 
-def shells_of(surface: Surface, regions: Sequence[Surface], deviation: float) -> list[Shell]:
+def make_shells(surface: Surface, regions: Sequence[Surface], deviation: float) -> list[Shell]:
     """The shells of the body and of its regions, with their deviations."""
     if len(regions) == 0:
         return [Shell(surface, deviation)]
@@ -43,7 +43,7 @@ def shells_of(surface: Surface, regions: Sequence[Surface], deviation: float) ->
         own = each.volume - sum(inner.volume for inner in held)
         thickness = 2.0 * own / (each.area + sum(inner.area for inner in held))
         # Layers may fill the whole region.
-        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > LEFT * each.volume else math.inf)
+        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > EMPTY_REGION * each.volume else math.inf)
     shells = [Shell(surface, min(deviation, by_thickness[0]), nested.touching[0], tuple(nested.within(0)))]
     for i, (each, parent) in enumerate(zip(surfaces[1:], nested.parents, strict=True), 1):
         # The regions on both sides of it may be thin.

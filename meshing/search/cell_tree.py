@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.corners import dot, face_normals, over_corners
+from tetlux.meshing.host.corners import dot, face_normals, run_on_corners
 
 # How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
 SLACK = 1e-9
@@ -16,7 +16,7 @@ SLACK = 1e-9
 POINT_SLACK = 1e-6
 # Children per box of the tree, and pairs of a path and a box that are processed at once (some megabytes).
 CHILDREN = 8
-PORTION = 1 << 13
+PAIRS_AT_ONCE = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class CellTree:
         def fill(block: slice, corners: FloatArray) -> None:
             low[:, block], high[:, block] = corners.min(axis=0), corners.max(axis=0)
 
-        over_corners(fill, points, tetrahedra)
+        run_on_corners(fill, points, tetrahedra)
         # The leaf order of a k-d tree keeps neighbours together, also in graded meshes.
         leaves = cKDTree((0.5 * (low + high)).T, balanced_tree=False, compact_nodes=False)
         self._order = np.asarray(leaves.indices, dtype=np.int64)
@@ -163,7 +163,7 @@ class CellTree:
         todo = [(0, len(starts), len(self._levels) - 1, everything, np.zeros_like(everything))]
         while todo:
             first, last, level, paths, boxes = todo.pop()
-            if len(paths) > PORTION and last - first > 1:
+            if len(paths) > PAIRS_AT_ONCE and last - first > 1:
                 middle = (first + last) // 2
                 half = int(np.searchsorted(paths, middle))
                 todo.append((middle, last, level, paths[half:], boxes[half:]))

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Coordinates are clipped to this range of single precision.
-FARTHEST = 1e12
+SINGLE_RANGE = 1e12
 
 
 class Embree:
@@ -33,4 +33,4 @@ class Embree:
 
 
 def _single(places: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
-    return np.asarray(np.clip(places, -FARTHEST, FARTHEST), dtype=np.float32)
+    return np.asarray(np.clip(places, -SINGLE_RANGE, SINGLE_RANGE), dtype=np.float32)

@@ -10,7 +10,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 # Lines at less than this sine of the angle to a triangle's plane count as parallel.
 PARALLEL = 1e-9
 # Pairs of boxes processed at once (tens of megabytes).
-PORTION = 1 << 18
+BOX_PAIRS_AT_ONCE = 1 << 18
 
 
 class ClosestPoint:
@@ -117,7 +117,7 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntAr
         if level == 0:
             apart = i != j
             yield order[i[apart]], order[j[apart]]
-        elif len(i) > PORTION:
+        elif len(i) > BOX_PAIRS_AT_ONCE:
             half = len(i) // 2
             todo += [(level, i[:half], j[:half]), (level, i[half:], j[half:])]
         else:

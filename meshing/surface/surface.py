@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
@@ -13,7 +13,7 @@ from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.solids import Shape, lies_on
 
 # Above this number of triangles, a surface counts as fine enough.
-MOST_BULGING = 20_000
+MOST_TRIANGLES_THAT_BULGE = 20_000
 MILLIMETRES = {"nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 UNITS = tuple(MILLIMETRES)
 
@@ -31,11 +31,11 @@ def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[Flo
     corners = points[faces]
     count = int(body.max()) + 1
     # Relative to its own centre, since a small body far from the origin would lose digits.
-    middle = np.column_stack([summed(body, x, count) for x in corners.mean(axis=1).T])
+    middle = np.column_stack([sum_by_index(body, x, count) for x in corners.mean(axis=1).T])
     middle /= np.bincount(body, minlength=count)[:, None]
     a, b, c = (corners[:, i] - middle[body] for i in range(3))
-    volume = np.abs(summed(body, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, count))
-    return volume, summed(body, triangle_areas(points, faces)[1], count)
+    volume = np.abs(sum_by_index(body, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, count))
+    return volume, sum_by_index(body, triangle_areas(points, faces)[1], count)
 
 
 def longest_sides(corners: FloatArray) -> FloatArray:
@@ -148,7 +148,7 @@ class Surface:
         """
         if self.crease_angle <= 0 or len(faces) == 0:
             return points, self.normals[faces]
-        return self._patches(faces, barycentric_of(points, self.points[self.faces[faces]]))
+        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))
 
     @cached_property
     def bulge(self) -> float:
@@ -156,7 +156,7 @@ class Surface:
 
         It is taken as 0 for surfaces of many triangles.
         """
-        if self.crease_angle <= 0 or len(self.faces) > MOST_BULGING:
+        if self.crease_angle <= 0 or len(self.faces) > MOST_TRIANGLES_THAT_BULGE:
             return 0.0
         corners = self.points[self.faces]
         faces, added = np.arange(len(self.faces)), np.zeros(len(self.faces))
@@ -233,7 +233,7 @@ class Surface:
         )
 
 
-def barycentric_of(points: FloatArray, triangles: FloatArray) -> FloatArray:
+def barycentric_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Barycentric coordinates (q, 3) of points (q, 3) on triangles (q, 3, 3)."""
     u, v, w = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
     normal = np.cross(u, v)

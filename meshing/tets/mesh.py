@@ -18,7 +18,7 @@ from tetlux.meshing.tets.queries import BoundaryQueries
 
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
 # Labels that a message lists; of further ones it gives the number.
-MOST_NAMED = 8
+MOST_LABELS_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,7 +272,11 @@ class TetMesh:
     def named(self, labels: Iterable[int]) -> str:
         """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
         texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
-        shown = texts if len(texts) <= MOST_NAMED else [*texts[:MOST_NAMED], f"{len(texts) - MOST_NAMED} more"]
+        shown = (
+            texts
+            if len(texts) <= MOST_LABELS_NAMED
+            else [*texts[:MOST_LABELS_NAMED], f"{len(texts) - MOST_LABELS_NAMED} more"]
+        )
         return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
     @cached_property

@@ -13,9 +13,9 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.cell_tree import PathSegments
 
 # Segments cached per mesh: two hundred megabytes.
-MOST_SEGMENTS = 1 << 21
+MOST_CACHED_SEGMENTS = 1 << 21
 # Parts cached per mesh, since each is searched; the oldest are dropped first.
-MOST_PARTS = 64
+MOST_CACHED_PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class TracedPaths:
     @cached_property
     def _by_key(self) -> tuple[FloatArray, IntArray]:
         """The keys of all paths, ascending, and the path of each."""
-        keys = keys_of(self.lines)
+        keys = hash_lines(self.lines)
         order = np.argsort(keys)
         return keys[order], order
 
@@ -126,7 +126,7 @@ def select_segments(every: PathSegments, chosen: BoolArray) -> PathSegments:
 _WEIGHTS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
 
 
-def keys_of(lines: FloatArray) -> FloatArray:
+def hash_lines(lines: FloatArray) -> FloatArray:
     """A hash of the start and direction of each line (7, p), (p,); bitwise equal lines have equal hashes."""
     return np.asarray(sum(weight * row for weight, row in zip(_WEIGHTS, lines[:6], strict=True)))
 
@@ -140,5 +140,5 @@ class PathCache:
     def add(self, part: TracedPaths, instead: TracedPaths | None = None) -> None:
         """Cache a part, in place of the part that it extends, unless the cache would exceed its size limit."""
         others = [each for each in self.parts if each is not instead]
-        if sum(len(each.segments.paths) for each in [*others, part]) <= MOST_SEGMENTS:
-            self.parts[:] = [*others, part][-MOST_PARTS:]
+        if sum(len(each.segments.paths) for each in [*others, part]) <= MOST_CACHED_SEGMENTS:
+            self.parts[:] = [*others, part][-MOST_CACHED_PARTS:]

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import ClosestPoint
-from tetlux.meshing.surface.surface import Surface, barycentric_of
+from tetlux.meshing.surface.surface import Surface, barycentric_on_triangles
 
 
 class BoundaryQueries:
@@ -30,7 +30,7 @@ class BoundaryQueries:
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
         """Nearest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
         nearest, face = self._closest(queries)
-        return nearest, face, barycentric_of(nearest, self._points[self._faces[face]])
+        return nearest, face, barycentric_on_triangles(nearest, self._points[self._faces[face]])
 
     def distances(self, surface: Surface, faces: IntArray) -> FloatArray:
         """Distance of the centroids of boundary triangles (q,) from a surface, (q,); each is computed once."""

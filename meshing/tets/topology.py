@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.meshing.arrays import IndexArray, IntArray
-from tetlux.meshing.host.blocks import group_keys, in_blocks, once
+from tetlux.meshing.host.blocks import find_single_keys, group_keys, run_in_blocks
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -40,7 +40,7 @@ def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray
             low, high = np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])
             keys[edge, block] = low * nodes + high
 
-    in_blocks(fill, len(tetrahedra))
+    run_in_blocks(fill, len(tetrahedra))
     unique, inverse = group_keys(keys.reshape(-1))
     return np.stack(np.divmod(unique.view(np.int64), nodes), axis=1), inverse.reshape(6, -1).T
 
@@ -63,7 +63,7 @@ def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
             else:
                 keys[block, face], pairs[block, face] = high, pair
 
-    in_blocks(fill, len(keys))
+    run_in_blocks(fill, len(keys))
     if not short:
         keys += (group_keys(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
     return keys.reshape(-1)
@@ -90,7 +90,7 @@ def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntAr
 
 def find_boundary(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """Faces of one tetrahedron only, as ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
-    places = once(face_keys(tetrahedra, nodes))
+    places = find_single_keys(face_keys(tetrahedra, nodes))
     return places, tetrahedra[places[:, None] // 4, FACES[places % 4]]
 
 
