@@ -11,10 +11,9 @@ from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights.spots.image import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -56,7 +55,8 @@ class EnvironmentLight:
         check_pixels(self.radiance)
         if np.linalg.norm(np.cross(unit_vector(self.up, "up"), unit_vector(self.front, "front"))) < 1e-6:
             raise InputError(
-                f"up and front of the environment are both along {as_text(self.up)}; give another front.", field="up"
+                f"up and front of the environment are both along {as_text(self.up)}; give another front.",
+                field="up",
             )
 
     @cached_property

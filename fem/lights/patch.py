@@ -12,9 +12,9 @@ from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.diffuse import diffuse_transmittance
 from tetlux.fem.lights.spots.plane import scattered, sunflower
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.subdivide import quarter_triangles
 from tetlux.meshing.surface.surface import Surface, longest_sides

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.fem.media.varying import Field, as_text
+from tetlux.fem.media.varying import Field
 from tetlux.meshing.arrays import FloatArray, Vector
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tets.mesh import TetMesh
 

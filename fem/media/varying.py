@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
 # Values (n,) of a coefficient, 1/unit, at points (n, 3); raises InputError where it is not known.
@@ -88,11 +88,6 @@ class VaryingMedium:
         return sigma_s_prime / (1.0 - cosine), cosine
 
     __repr__ = one_line
-
-
-def as_text(point: FloatArray | Vector) -> str:
-    """A place or a direction, as people write it."""
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
 
 
 def _values(name: str, field: Field | None, constant: float, points: FloatArray) -> FloatArray:

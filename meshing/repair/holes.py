@@ -5,7 +5,7 @@ from typing import Literal
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.caps import cap
@@ -157,4 +157,4 @@ def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
 
 def _middle(points: FloatArray, loop: IntArray) -> str:
     """The centre of a rim, as text."""
-    return place_words(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))
+    return as_text(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
 from tetlux.meshing.surface.surface import body_sizes
@@ -65,7 +65,7 @@ def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntAr
     largest = float(np.linalg.norm(extent[specks], axis=1).max())
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     middles = [points[faces[body == one]].mean(axis=(0, 1)) for one in specks[:DESCRIBED]]
-    places = ", ".join(place_words(middle, size) for middle in middles)
+    places = ", ".join(as_text(middle, size) for middle in middles)
     more = f" and {len(specks) - DESCRIBED} more places" if len(specks) > DESCRIBED else ""
     what = "a speck" if len(specks) == 1 else f"{len(specks):,} specks"
     return f"dropped {what} of up to {largest:.2g} {unit}, smaller than the mesh can show, at {places}{more}."

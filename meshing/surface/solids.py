@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, Vector
 
-# Tolerance for vertices on their shape, as a share of its size or of their distance from the origin.
+# Largest distance of a vertex from the shape that it lies on, as a share of the largest coordinate.
 ON_SHAPE = 1e-9
 
 

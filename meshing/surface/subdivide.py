@@ -1,15 +1,16 @@
-"""Split triangles with long edges, conformingly."""
+"""Split edges of triangle meshes so that the meshes stay conforming."""
 
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
-_NEXT = np.array([1, 2, 0])
+# Corner i of a triangle is followed by corner NEXT_CORNER[i].
+NEXT_CORNER = np.array([1, 2, 0])
 
 
 def number_triangle_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """The edges of triangles (f, 3): end nodes (e, 2), and the edge from each corner to the next, (f, 3)."""
-    ends = np.sort(np.stack([faces, faces[:, _NEXT]], axis=2).reshape(-1, 2), axis=1)
+    """Number the edges of triangles (f, 3): end nodes (e, 2), and the edge from each corner to the next, (f, 3)."""
+    ends = np.sort(np.stack([faces, faces[:, NEXT_CORNER]], axis=2).reshape(-1, 2), axis=1)
     count = int(faces.max(initial=0)) + 1
     key, number = np.unique(ends[:, 0] * np.int64(count) + ends[:, 1], return_inverse=True)
     return np.column_stack([key // count, key % count]), number.reshape(-1, 3)
@@ -52,7 +53,7 @@ def split_edges(
         The given points, then the midpoints of the marked edges in their order.
     faces : (g, 3) ndarray
     parents : (g,) ndarray
-        The original triangle of each.
+        The given triangle that contains each.
     """
     ends, edge = edges
     middle = np.full(len(ends), -1)

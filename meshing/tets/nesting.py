@@ -8,7 +8,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, spread_indices
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface.surface import Surface
@@ -19,7 +19,7 @@ TOUCH_DISTANCE = 1e-6
 SIDE_SAMPLES = 64
 # Regions below this share of the body's diagonal are refused. The mesher's time grows with the inverse of the size of
 # the smallest region: 8 s at 0.012, minutes at 0.0025.
-SMALLEST_REGION = 0.005
+SMALLEST = 0.005
 
 
 @dataclass(frozen=True)
@@ -65,9 +65,9 @@ def check_regions(surface: Surface, regions: Sequence[Surface]) -> None:
     """
     nesting(surface, regions)
     for number, region in enumerate(regions, 1):
-        if region.diagonal < SMALLEST_REGION * surface.diagonal:
+        if region.diagonal < SMALLEST * surface.diagonal:
             raise InputError(
-                f"region {number} is {region.diagonal:.3g} {region.unit} across, less than {SMALLEST_REGION:.1%} of the body"
+                f"region {number} is {region.diagonal:.3g} {region.unit} across, less than {SMALLEST:.1%} of the body"
                 ", and too small to be meshed within it; leave it out, or make it larger."
             )
 
@@ -110,7 +110,7 @@ def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str,
     if place is None and len(sides.inside) == 0:
         raise InputError(f"{name} is the whole body; give its medium to the body and leave it out.")
     if place is None and not sides.inside.any():
-        around = place_words(inner.points.mean(axis=0), near / TOUCH_DISTANCE)
+        around = as_text(inner.points.mean(axis=0), near / TOUCH_DISTANCE)
         if _locate_sides(body, inner, near).inside.any():
             raise InputError(f"{name} holds {body_name} and not the other way round; exchange or shrink it.")
         raise InputError(f"{name} lies outside {body_name}, around {around}; move it inside, or leave it out.")
@@ -118,7 +118,7 @@ def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str,
         place = sides.points[~sides.inside][0]
     if place is not None:
         raise InputError(
-            f"{name} crosses the surface of {body_name} around {place_words(place, near / TOUCH_DISTANCE)}; "
+            f"{name} crosses the surface of {body_name} around {as_text(place, near / TOUCH_DISTANCE)}; "
             "move or shrink it until it lies inside."
         )
     return sides.touches or bool(are_on_surface(body.points, inner, near).any())
@@ -137,7 +137,7 @@ def _compare_pair(
             place = sides.points[sides.inside][0]
     if place is not None:
         raise InputError(
-            f"{name} and {other_name} cross each other around {place_words(place, near / TOUCH_DISTANCE)}; "
+            f"{name} and {other_name} cross each other around {as_text(place, near / TOUCH_DISTANCE)}; "
             "move them apart, or put one wholly inside the other."
         )
     return one, other

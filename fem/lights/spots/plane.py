@@ -3,8 +3,8 @@
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
 
