@@ -12,7 +12,7 @@ from tetlux.meshing.arrays import IntArray
 
 # Rows per block. Fresh memory costs more than the arithmetic on it, and blocks of this size reuse memory.
 BLOCK = 8192
-# Keys sorted at once, and the largest number of parts, since each part scans all keys.
+# Keys sorted at once, and the largest number of parts that keys are divided into, since each part scans all keys.
 KEYS_AT_ONCE = 1 << 20
 MOST_KEY_PARTS = 8
 
@@ -23,7 +23,7 @@ THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 
 
 
 def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """``[work(item) for item in items]``, on all cores at once."""
+    """Compute ``[work(item) for item in items]`` in threads on all cores."""
     if len(items) < 2 or THREADS < 2:
         return [work(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
@@ -31,15 +31,14 @@ def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> 
 
 
 def run_in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:
-    """Call ``work(slice)`` for slices of `size` that together cover ``range(count)``, on all cores at once."""
+    """Call ``work(slice)`` for slices of `size` that together cover ``range(count)``, in threads on all cores."""
     map_in_threads(work, [slice(start, min(start + size, count)) for start in range(0, count, size)])
 
 
 def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.int32]]:
-    """``numpy.unique(keys, return_inverse=True)``, about ten times faster for many keys.
+    """Compute ``numpy.unique(keys, return_inverse=True)``, about ten times faster for many keys.
 
-    NumPy sorts numbers several times faster than it finds their order, so every key is sorted with its index as
-    its low digits.
+    NumPy's `sort` is several times faster than its `argsort`, so each key is sorted with its index as low digits.
 
     Parameters
     ----------

@@ -11,17 +11,17 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import FACES, face_keys
 
-# Distance outside a facet's centroid at which another tetrahedron is searched, as a share of the facet's size, and its
-# minimum as a share of the mesh's diagonal, since files round coordinates.
+# A facet is covered if a tetrahedron contains the point at this distance outside its centroid: the first share of the
+# facet's size, but at least the second share of the mesh's diagonal, since files round coordinates.
 PROBE_DISTANCE, LEAST_PROBE_DISTANCE = 1e-4, 2e-6
-# A tetrahedron that contains a facet's centroid deeper than this many times that distance overlaps.
+# A tetrahedron overlaps the mesh if that point is deeper in it than this many times the distance.
 OVERLAP_DEPTH = 20.0
-# The share of the boundary's area that may lie against or inside other tetrahedra: more is refused, less is noted.
+# Largest share of the boundary's area that may lie against or inside other tetrahedra, with a warning.
 MOST_COVERED = 1e-3
 
 
 def count_doubly_covered_faces(corners: IntArray, nodes: int) -> int:
-    """The number of faces with several tetrahedra on one side, which therefore overlap.
+    """Count the faces with several tetrahedra on one side: these tetrahedra overlap.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def count_doubly_covered_faces(corners: IntArray, nodes: int) -> int:
 
 
 def check_overlap(corners: IntArray, nodes: int) -> None:
-    """Refuse tetrahedra that lie on the same side of a common face.
+    """Refuse tetrahedra that share a face and lie on the same side of it.
 
     Raises
     ------
     InputError
     """
-    overlapped = count_doubly_covered_faces(corners, nodes)
-    if overlapped:
+    covered = count_doubly_covered_faces(corners, nodes)
+    if covered:
         raise InputError(
-            f"tetrahedra overlap: {overlapped:,} of their faces have several tetrahedra on one side, as when some are "
+            f"tetrahedra overlap: {covered:,} of their faces have several tetrahedra on one side, as when some are "
             "given twice; give each part of the volume once."
         )
 
@@ -106,7 +106,7 @@ def check_facets(mesh: TetMesh, merged: bool = False) -> tuple[str, ...]:
 
 
 def _count_parts(mesh: TetMesh) -> int:
-    """The number of parts without common nodes."""
+    """The number of connected components by common nodes."""
     size = len(mesh.points)
     used = np.unique(mesh.tetrahedra).size
     links = coo_array((np.ones(len(mesh.edges), dtype=bool), mesh.edges.T), shape=(size, size))

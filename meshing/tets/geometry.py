@@ -64,5 +64,5 @@ def quality(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
 def barycentric_coordinates(corners: FloatArray, queries: FloatArray) -> FloatArray:
     """Barycentric coordinates (q, 4) of each query (q, 3) in the tetrahedron with the corners (q, 4, 3)."""
     matrix = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    rest = np.linalg.solve(matrix, (queries - corners[:, 0])[..., None])[..., 0]
-    return np.column_stack([1.0 - rest.sum(axis=1), rest])
+    three = np.linalg.solve(matrix, (queries - corners[:, 0])[..., None])[..., 0]
+    return np.column_stack([1.0 - three.sum(axis=1), three])

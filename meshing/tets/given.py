@@ -1,4 +1,4 @@
-"""Repair and check tetrahedra that were made elsewhere, and make a `TetMesh` of them."""
+"""Repair and check tetrahedra of other programs, and make a `TetMesh` of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,23 +19,23 @@ from tetlux.meshing.tets.topology import EDGES
 
 # Largest coordinate, in any unit.
 LARGEST_COORDINATE = 1e30
-# Nodes are merged within the first share of the mesh's diagonal (rounding in files is a tenth of it), or within the
-# second share of the shortest edge if that is less.
+# Nodes are merged if they are closer than the first share of the mesh's diagonal (rounding in files is a tenth of it),
+# and than the second share of the shortest edge.
 MERGE_DISTANCE, MERGE_SHARE_OF_EDGE = 1e-6, 1e-3
-# A tetrahedron is flat if its volume is below this share of the cube of its size, the level of rounding errors.
+# A tetrahedron is flat if its volume is below this share of the cube of its size: the level of rounding errors.
 FLAT_VOLUME = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class _Tetrahedra:
-    """Tetrahedra that are being repaired.
+    """Tetrahedra during their repair.
 
     Attributes
     ----------
     points : (n, 3) ndarray
     corners : (m, 4) ndarray
     nodes, cells : (n,), (m,) ndarray
-        Indices of the nodes and tetrahedra in the given arrays.
+        Indices of the nodes and tetrahedra in the arrays of the caller.
     repairs : tuple of str
     """
 
@@ -45,8 +45,8 @@ class _Tetrahedra:
     cells: IntArray
     repairs: tuple[str, ...] = ()
 
-    def only(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
-        """The tetrahedra that are kept, with a sentence on why the others are not."""
+    def select(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
+        """The tetrahedra to keep, (m,), and a sentence on the repair."""
         if kept.all():
             return self
         if not kept.any():
@@ -105,7 +105,7 @@ def mesh_from_arrays(
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Arrays as `mesh_from_arrays` takes them, with notes on how they were read."""
+    """The arguments of `mesh_from_arrays`, with the repairs and warnings of the reader of their file."""
 
     points: npt.ArrayLike
     tetrahedra: npt.ArrayLike
@@ -117,7 +117,7 @@ class Given:
 
 
 def make_checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
-    """Make a checked mesh of arrays; also return the given index of each of its nodes, (k,).
+    """Make a checked mesh of arrays; also return the index of each of its nodes in the given points, (k,).
 
     Raises
     ------
@@ -148,18 +148,18 @@ def make_checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
 
 
 def mesh_with_nodes(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """`mesh_from_arrays` without labels; also return the given index of each of the mesh's nodes, (k,)."""
+    """Make a checked mesh without labels; also return the index of each of its nodes in `points`, (k,)."""
     return make_checked_mesh(Given(points, cells), unit)
 
 
 def value_mesh(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """Make a mesh that only carries values, so its parts need no common nodes; inverted tetrahedra are reoriented.
+    """Make a mesh to interpolate values on, whose parts need no common nodes; inverted tetrahedra are reoriented.
 
     Returns
     -------
     mesh : TetMesh
     nodes : (k,) ndarray
-        The given index of each of its nodes.
+        The index of each of its nodes in `points`.
     """
     given = _reorient(_check_tetrahedra(points, cells))
     return TetMesh(given.points, given.corners, unit), given.nodes
@@ -225,7 +225,7 @@ def _remove_flat(given: _Tetrahedra) -> _Tetrahedra:
     volumes = np.abs(tetrahedron_volumes(points, corners))
     sizes = np.ptp(points[corners], axis=1).max(axis=1)
     flat = volumes <= FLAT_VOLUME * sizes**3
-    found = given.only(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
+    found = given.select(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
     vertices, corners, nodes = _drop_unused(found.points, found.corners, found.nodes)
     return replace(found, points=vertices, corners=corners, nodes=nodes)
 
@@ -243,7 +243,7 @@ def _reorient(given: _Tetrahedra) -> _Tetrahedra:
 
 
 def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
-    """Keep each tetrahedron once: of copies, the one with the rarest label, which is that of a part of a whole."""
+    """Keep one of several equal tetrahedra: that with the rarest label, since parts have rarer labels than wholes."""
     if not count_doubly_covered_faces(given.corners, len(given.points)):
         return given
     labels = np.zeros(len(given.corners), dtype=np.int64) if regions is None else regions[given.cells]
@@ -255,7 +255,7 @@ def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
     copies = int((~kept).sum())
     alike = (labels[order] == labels[order[chosen]][of_kind]).all()
     which = "as the first of each" if alike else "with the rarer label"
-    found = given.only(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
+    found = given.select(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
     check_overlap(found.corners, len(found.points))
     return found
 

@@ -17,7 +17,7 @@ from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
 
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
-# Labels that a message lists; of further ones it gives the number.
+# Labels that a message lists; it counts the others.
 MOST_LABELS_NAMED = 8
 
 
@@ -32,18 +32,30 @@ class TetMesh:
     tetrahedra : (m, 4) ndarray
         Corners; the first three are anticlockwise seen from the fourth, so that volumes are positive.
     unit : str
+        Unit of length; coefficients are in 1/unit.
     regions : (m,) ndarray of int, optional
         The region or label of each tetrahedron; all 0 if not given. In a mesh made from surfaces, 0 is the body itself
         and regions are numbered from 1; the labels of other meshes are kept.
     labels : mapping of int to str, optional
-        Names of those labels that have one.
+        Names of labels; not every label needs one.
     repairs, warnings : tuple of str
-        What was repaired when the mesh was read, and what the user should know about it.
+        Sentences: what was repaired when the mesh was read, and what the user should know about it.
 
     Raises
     ------
     InputError
         If shapes or indices are wrong, a coordinate is not finite, or a tetrahedron is inverted or flat.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> mesh = TetMesh(points, np.array([[0, 1, 2, 3]]))
+    >>> len(mesh.edges), len(mesh.boundary_faces), round(mesh.volume, 6)
+    (6, 4, 0.166667)
+    >>> cells, weights = mesh.locate([[0.25, 0.25, 0.25], [1.0, 1.0, 1.0]])
+    >>> cells.tolist()
+    [0, -1]
     """
 
     points: FloatArray
@@ -169,21 +181,21 @@ class TetMesh:
 
     @cached_property
     def boundary_node_areas(self) -> FloatArray:
-        """A third of the area of the triangles around each boundary node, (b,): weights that sum to `area`."""
+        """A third of the area of the triangles at each boundary node, (b,), unit²: weights that sum to `area`."""
         return self.to_boundary_nodes(self.boundary_areas)
 
     def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
-        """Sums (b,) at boundary nodes of integrals over boundary triangles (f,), a third to each corner."""
+        """Distribute integrals over boundary triangles (f,) to boundary nodes (b,), a third to each corner."""
         nodes, weights = self.boundary_triangles.ravel(), np.repeat(shares / 3.0, 3)
         return np.asarray(np.bincount(nodes, weights, minlength=len(self.boundary_nodes)), dtype=np.float64)
 
     @cached_property
     def node_volumes(self) -> FloatArray:
-        """A quarter of the volume of the tetrahedra around each node, (n,): weights that sum to `volume`."""
+        """A quarter of the volume of the tetrahedra at each node, (n,), unit³: weights that sum to `volume`."""
         return self.to_nodes(self.volumes)
 
     def to_nodes(self, shares: FloatArray) -> FloatArray:
-        """Sums (n,) at nodes of integrals over tetrahedra (m,), a quarter to each corner."""
+        """Distribute integrals over tetrahedra (m,) to nodes (n,), a quarter to each corner."""
         sums = np.zeros(len(self.points))
         for corner in self.tetrahedra.T:
             sums += np.bincount(corner, shares / 4.0, minlength=len(sums))
@@ -219,7 +231,22 @@ class TetMesh:
         return BoundaryQueries(self.points, self.boundary_faces)
 
     def closest_boundary(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Nearest boundary points of queries (q, 3): points (q, 3), faces (q,), barycentric weights (q, 3)."""
+        """Closest points of the boundary to query points.
+
+        Parameters
+        ----------
+        queries : (q, 3) ndarray
+            Unit.
+
+        Returns
+        -------
+        points : (q, 3) ndarray
+            Unit.
+        faces : (q,) ndarray
+            The boundary triangle of each, an index into `boundary_faces`.
+        weights : (q, 3) ndarray
+            Barycentric coordinates in this triangle.
+        """
         return self._boundary_queries.closest(queries)
 
     def boundary_distances(self, surface: Surface, faces: IntArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""How the closed surfaces of regions lie in the body and in each other, and which arrangements are refused."""
+"""The nesting of the closed surfaces of regions in the body and in each other, and the refusal of crossings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface.surface import Surface
 
-# Surfaces within this share of the body's diagonal touch; rounding in files is about a tenth of it.
+# Surfaces closer than this share of the body's diagonal touch; rounding in files is about a tenth of it.
 TOUCH_DISTANCE = 1e-6
-# Sample points per surface that decide on which side of another it lies; without a crossing one would do.
+# Sample points per surface that decide whether it lies inside another; one would suffice if none touched.
 SIDE_SAMPLES = 64
 # Regions below this share of the body's diagonal are refused. The mesher's time grows with the inverse of the size of
 # the smallest region: 8 s at 0.012, minutes at 0.0025.
@@ -24,7 +24,7 @@ SMALLEST = 0.005
 
 @dataclass(frozen=True)
 class Nesting:
-    """How the inner surfaces of a body are nested.
+    """The nesting of the inner surfaces of a body.
 
     Attributes
     ----------
@@ -67,18 +67,18 @@ def check_regions(surface: Surface, regions: Sequence[Surface]) -> None:
     for number, region in enumerate(regions, 1):
         if region.diagonal < SMALLEST * surface.diagonal:
             raise InputError(
-                f"region {number} is {region.diagonal:.3g} {region.unit} across, less than {SMALLEST:.1%} of the body"
-                ", and too small to be meshed within it; leave it out, or make it larger."
+                f"region {number} is {region.diagonal:.3g} {region.unit} across, less than {SMALLEST:.1%} of the body, "
+                "and too small to be meshed within it; leave it out, or make it larger."
             )
 
 
 def nesting(surface: Surface, regions: Sequence[Surface]) -> Nesting:
-    """How the inner surfaces are nested.
+    """Find the nesting of inner surfaces.
 
     Raises
     ------
     InputError
-        As `check_regions`, except for small surfaces.
+        As `check_regions` does, except for small surfaces.
     """
     near = TOUCH_DISTANCE * surface.diagonal
     touching = np.zeros(len(regions) + 1, dtype=bool)
@@ -102,7 +102,7 @@ def nesting(surface: Surface, regions: Sequence[Surface]) -> Nesting:
 
 
 def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str, near: float) -> bool:
-    """Whether an inner surface touches the body's surface; an error if it is not inside the body."""
+    """Refuse an inner surface that is not inside the body; whether it touches the body's surface."""
     if inner.unit != body.unit:
         raise InputError(f"{name} is in {inner.unit} and the body in {body.unit}; give both in one unit.")
     place = _find_crossing(inner, body, near)
@@ -127,7 +127,7 @@ def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str,
 def _compare_pair(
     first: Surface, second: Surface, name: str, other_name: str, near: float
 ) -> tuple["_Sides", "_Sides"]:
-    """Each of two inner surfaces relative to the other; an error if they cross or are the same."""
+    """Compare two inner surfaces: the sides of each relative to the other; an error if they cross or are equal."""
     place = _find_crossing(first, second, near)
     one, other = _locate_sides(first, second, near), _locate_sides(second, first, near)
     if place is None and 0 in (len(one.inside), len(other.inside)):
@@ -153,7 +153,7 @@ def _boxes_meet(first: Surface, second: Surface, near: float) -> bool:
 
 
 def _find_crossing(first: Surface, second: Surface, near: float) -> FloatArray | None:
-    """A point where an edge of either surface passes through a triangle of the other, away from its rim."""
+    """A point where an edge of either surface passes through the interior of a triangle of the other, or None."""
     low = np.maximum(_box(first)[0], _box(second)[0]) - near
     high = np.minimum(_box(first)[1], _box(second)[1]) + near
     if (low > high).any():
@@ -198,7 +198,7 @@ def _find_pierced(triangles: FloatArray, others: FloatArray, near: float) -> Flo
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sample points of a surface, whether each is inside another surface, and whether the two surfaces touch."""
+    """Sample points of a surface (s, 3), whether each is inside another surface (s,), and whether the two touch."""
 
     points: FloatArray
     inside: BoolArray
@@ -227,7 +227,7 @@ def _locate_sides(first: Surface, second: Surface, near: float) -> _Sides:
 
 
 def are_on_surface(points: FloatArray, surface: Surface, near: float) -> BoolArray:
-    """Whether each of the points (q, 3) lies on the surface."""
+    """Whether each point (q, 3) is within a distance `near`, unit, of the surface, (q,)."""
     low, high = _box(surface)
     on = np.asarray(((points >= low - near) & (points <= high + near)).all(axis=1))
     on[on] = surface.near(points[on], near)

@@ -1,4 +1,4 @@
-"""Nearest points and distances on the boundary of a mesh."""
+"""Closest points of the boundary of a mesh, and distances of its facets from a surface."""
 
 from functools import cached_property
 
@@ -10,7 +10,7 @@ from tetlux.meshing.surface.surface import Surface, barycentric_on_triangles
 
 
 class BoundaryQueries:
-    """The boundary of a mesh, prepared for nearest points and distances.
+    """The boundary of a mesh, prepared for closest points and distances.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ class BoundaryQueries:
         return ClosestPoint(self._points, self._faces)
 
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Nearest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
+        """Closest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
         nearest, face = self._closest(queries)
         return nearest, face, barycentric_on_triangles(nearest, self._points[self._faces[face]])
 

@@ -27,12 +27,12 @@ def own_volumes(surface: Surface, regions: tuple[Surface, ...]) -> FloatArray:
 
 
 def sort_by_volume(regions: Sequence[Surface]) -> list[int]:
-    """Region numbers from the largest to the smallest: the last one that contains a point is its region."""
+    """Region numbers by falling volume: the last region in this order that contains a point is the point's region."""
     return sorted(range(1, len(regions) + 1), key=lambda i: -regions[i - 1].volume)
 
 
 def owners(pairs: IntArray, regions: Sequence[Surface]) -> IntArray:
-    """The region that owns each triangle between two regions (f, 2): the smaller of the two, (f,)."""
+    """The region whose surface has each triangle between two regions (f, 2): the smaller of the two, (f,)."""
     rank = np.argsort([0, *sort_by_volume(regions)])
     return np.asarray(np.where(rank[pairs[:, 0]] > rank[pairs[:, 1]], pairs[:, 0], pairs[:, 1]))
 

@@ -1,4 +1,4 @@
-"""The region of each tetrahedron that the mesher returns."""
+"""The regions of the mesher's tetrahedra."""
 
 from collections.abc import Sequence
 
@@ -13,12 +13,12 @@ from tetlux.meshing.tets.nesting import are_on_surface
 from tetlux.meshing.tets.regions import sort_by_volume
 from tetlux.meshing.tets.topology import find_shared_faces
 
-# Sample tetrahedra per compartment that are tested for lying in a region.
+# Tetrahedra per compartment that are tested for lying in a region.
 COMPARTMENT_SAMPLES = 500
-# A compartment is tested tetrahedron by tetrahedron if the samples disagree on more than this share of its volume, or
-# of the region's.
+# All tetrahedra of a compartment are tested if its samples disagree on more than this share of its volume, or of the
+# region's volume.
 DISSENT = 0.1
-# The largest distance of a node on a surface from it, in envelopes.
+# A node on a surface is at most this many envelopes from it.
 ENVELOPE_SLACK = 1.01
 
 
@@ -71,12 +71,12 @@ def _is_inside(
     order = np.argsort(compartment, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(compartment[order])) + 1)
     samples = np.concatenate([part[spread_indices(len(part), COMPARTMENT_SAMPLES)] for part in parts])
-    answers, of_answers = surface.contains(centroids[samples]), compartment[samples]
-    share = np.bincount(of_answers, answers) / np.bincount(of_answers)
+    inside, sampled = surface.contains(centroids[samples]), compartment[samples]
+    share = np.bincount(sampled, inside) / np.bincount(sampled)
     result = np.asarray((share > 0.5)[compartment])
     # A gap in the mesh's copy of the surface merges two compartments: test each of their tetrahedra.
     size = np.bincount(compartment, volumes)
-    torn = np.minimum(share, 1.0 - share) * size > DISSENT * np.minimum(size, surface.volume)
-    each = np.flatnonzero(torn[compartment])
-    result[each] = surface.contains(centroids[each])
+    mixed = np.minimum(share, 1.0 - share) * size > DISSENT * np.minimum(size, surface.volume)
+    cells = np.flatnonzero(mixed[compartment])
+    result[cells] = surface.contains(centroids[cells])
     return result

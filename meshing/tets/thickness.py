@@ -5,7 +5,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Rays at 45 degrees around the inward normal.
+# Number of rays at 45 degrees around the inward normal.
 SLANTED_RAYS = 6
 
 

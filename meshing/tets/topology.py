@@ -1,4 +1,4 @@
-"""Which edges, faces and neighbours the tetrahedra of a mesh have."""
+"""Edges, faces and neighbours of the tetrahedra of a mesh."""
 
 import numpy as np
 import numpy.typing as npt
@@ -46,10 +46,10 @@ def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray
 
 
 def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
-    """A key for each face of each tetrahedron, (4m,), equal for faces with the same three corners."""
+    """A key for each face of each tetrahedron, (4m,); faces with the same three corners have equal keys."""
     keys = np.empty((len(tetrahedra), 4), dtype=np.uint64)
     short = nodes <= MOST_NODES_OF_SHORT_KEYS
-    # In larger meshes, the number of the pair of the two smaller corners takes the place of these corners.
+    # In larger meshes, the two smaller corners are replaced by the number of their pair.
     pairs = np.empty((0 if short else len(keys), 4), dtype=np.uint64)
 
     def fill(block: slice) -> None:
@@ -70,7 +70,7 @@ def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
 
 
 def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
-    """The tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
+    """Find the tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
     unique, face = group_keys(face_keys(tetrahedra, nodes))
     owners = np.repeat(np.arange(len(tetrahedra)), 4)
     both = np.bincount(face, minlength=len(unique)) == 2
@@ -80,7 +80,7 @@ def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
 
 
 def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
-    """The two tetrahedra at each inner face (p, 2), and the corners of that face (p, 3)."""
+    """Find the two tetrahedra at each inner face (p, 2), and the corners of the face (p, 3)."""
     face = group_keys(face_keys(tetrahedra, nodes))[1]
     order = np.argsort(face, kind="stable")
     pair = np.flatnonzero(np.diff(face[order]) == 0)
@@ -89,13 +89,13 @@ def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntAr
 
 
 def find_boundary(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
-    """Faces of one tetrahedron only, as ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
+    """Find the faces of only one tetrahedron: ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
     places = find_single_keys(face_keys(tetrahedra, nodes))
     return places, tetrahedra[places[:, None] // 4, FACES[places % 4]]
 
 
 def find_interfaces(tetrahedra: IntArray, regions: IntArray, nodes: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Triangles between tetrahedra of different regions, as `TetMesh.interfaces` describes them."""
+    """Find the triangles between tetrahedra of different regions, as `TetMesh.interfaces` returns them."""
     regions_at = np.zeros(nodes, dtype=np.int64)
     for region in np.unique(regions):
         touched = np.zeros(nodes, dtype=bool)
