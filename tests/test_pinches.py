@@ -14,7 +14,7 @@ from tetlux.meshing.mesher.proxy import proxy
 from tetlux.meshing.repair.pinches import parts_of, pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies
 from tetlux.meshing.surface.subdivide import number_triangle_edges, split_edges
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.triangles import signed_volume
 
 BALL = sphere(10.0)
 

@@ -9,7 +9,7 @@ from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import slab
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 
 def smallest_angle(points: FloatArray, faces: IntArray) -> float:

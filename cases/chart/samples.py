@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface.solids import Sphere
 from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Exitance falls like 1/r³ from where light enters: the pieces that are sampled are no longer than this times their
 # distance from the light, and no longer than this share of the body's diagonal.

@@ -14,7 +14,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.cell_tree import PathSegments
 from tetlux.meshing.search.rays import OFFSET
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
 

@@ -14,7 +14,8 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
 from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Candidates to each square of the spacing.
 CANDIDATES = 4.0

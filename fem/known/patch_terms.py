@@ -15,7 +15,7 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.surface import longest_sides, triangle_areas
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 
 # Degrees of the quadrature rules for the faces of a patch, by the largest ratio of the longest edge to the distance of
 # the nearest charge. A face above the last limit is cut in four, at most _CUTS times.

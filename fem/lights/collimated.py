@@ -16,7 +16,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Rays by which it is looked for where the light meets the body.

@@ -17,7 +17,8 @@ from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Places of the patch near which the mesh is fine.

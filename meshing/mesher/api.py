@@ -19,7 +19,8 @@ from tetlux.meshing.mesher.proxy import proxy
 from tetlux.meshing.mesher.shells import make_shells
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import Surface, body_sizes
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import body_sizes
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import move_to_surface

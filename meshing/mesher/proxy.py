@@ -11,7 +11,8 @@ from tetlux.meshing.repair.crossings import count_self_intersections
 from tetlux.meshing.repair.pinches import pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
-from tetlux.meshing.surface.surface import Surface, signed_volume, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 # Quadric decimation within a deviation d needs about this x area / (d x diagonal) triangles: 1.5 on a sphere, 5 to 10
 # on organic and mechanical surfaces. It gives the first count; later counts follow from measured distances.

@@ -11,7 +11,7 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.caps import cap
 from tetlux.meshing.repair.rims import join_nested_rims
 from tetlux.meshing.repair.topology import Edges, boundary_loops
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 
 Holes = Literal["small", "close", "refuse"]
 # A hole wider than this share of the diagonal is a missing part; closing it would invent a shape.

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.triangles import signed_volume
 
 # Triangles at one edge with less than this angle between them, radians, coincide.
 SAME_PLANE = 1e-4

@@ -6,7 +6,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import body_sizes
+from tetlux.meshing.surface.triangles import body_sizes
 
 # A body with a mean thickness 2 V/A below this many deviations of the mesher is dropped. Balls and cubes beside a ball
 # of 20 were meshed down to .2: in 2 s above 1, 3 s at .45, 6 to 12 s at .2, where a second attempt is needed.

@@ -6,12 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray, sum_by_index
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
-from tetlux.meshing.surface.surface import Surface, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets import geometry, topology
 from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
@@ -53,8 +54,7 @@ class TetMesh:
     >>> mesh = TetMesh(points, np.array([[0, 1, 2, 3]]))
     >>> len(mesh.edges), len(mesh.boundary_faces), round(mesh.volume, 6)
     (6, 4, 0.166667)
-    >>> cells, weights = mesh.locate([[0.25, 0.25, 0.25], [1.0, 1.0, 1.0]])
-    >>> cells.tolist()
+    >>> mesh.locate([[0.25, 0.25, 0.25], [1.0, 1.0, 1.0]])[0].tolist()
     [0, -1]
     """
 
@@ -67,21 +67,18 @@ class TetMesh:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        p, t = self.points, self.tetrahedra
-        if p.ndim != 2 or p.shape[1] != 3 or t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
-            raise InputError(f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}.")
-        if t.min() < 0 or t.max() >= len(p):
-            raise InputError("a tetrahedron names a node that does not exist.")
-        if not np.isfinite(p).all():
-            raise InputError("a node's coordinate is not finite.")
+        topology.check_arrays(self.points, self.tetrahedra)
         if self.regions is _NO_REGIONS:
             # A broadcast zero takes no memory.
-            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(t)))
-        elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu":
-            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, all integers.")
-        bad = int((self.volumes <= 0).sum())
-        if bad:
-            raise InputError(f"{bad} of {len(t)} tetrahedra are inverted or flat; orient and clean the mesh.")
+            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(self.tetrahedra)))
+        elif self.regions.shape != (len(self.tetrahedra),) or self.regions.dtype.kind not in "iu":
+            raise InputError(
+                f"a mesh of {len(self.tetrahedra)} tetrahedra needs as many numbers of regions, all integers."
+            )
+        if bad := int((self.volumes <= 0).sum()):
+            raise InputError(
+                f"{bad} of {len(self.volumes)} tetrahedra are inverted or flat; orient and clean the mesh."
+            )
 
     @cached_property
     def volumes(self) -> FloatArray:
@@ -186,8 +183,7 @@ class TetMesh:
 
     def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
         """Distribute integrals over boundary triangles (f,) to boundary nodes (b,), a third to each corner."""
-        nodes, weights = self.boundary_triangles.ravel(), np.repeat(shares / 3.0, 3)
-        return np.asarray(np.bincount(nodes, weights, minlength=len(self.boundary_nodes)), dtype=np.float64)
+        return sum_by_index(self.boundary_triangles, np.repeat(shares / 3.0, 3), len(self.boundary_nodes))
 
     @cached_property
     def node_volumes(self) -> FloatArray:
@@ -231,22 +227,7 @@ class TetMesh:
         return BoundaryQueries(self.points, self.boundary_faces)
 
     def closest_boundary(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Closest points of the boundary to query points.
-
-        Parameters
-        ----------
-        queries : (q, 3) ndarray
-            Unit.
-
-        Returns
-        -------
-        points : (q, 3) ndarray
-            Unit.
-        faces : (q,) ndarray
-            The boundary triangle of each, an index into `boundary_faces`.
-        weights : (q, 3) ndarray
-            Barycentric coordinates in this triangle.
-        """
+        """Closest boundary points to queries (q, 3): points (q, 3), their faces (q,), barycentric weights (q, 3)."""
         return self._boundary_queries.closest(queries)
 
     def boundary_distances(self, surface: Surface, faces: IntArray) -> FloatArray:
@@ -291,8 +272,7 @@ class TetMesh:
     def region_at(self, queries: FloatArray) -> IntArray:
         """The region of the tetrahedron that contains each point (q, 3), or of the nearest one, (q,)."""
         cells, _ = self.locate(queries)
-        outside = np.flatnonzero(cells < 0)
-        if len(outside):
+        if len(outside := np.flatnonzero(cells < 0)):
             cells[outside] = self.boundary_cells[self.closest_boundary(queries[outside])[1]]
         return np.asarray(self.regions[cells])
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import ClosestPoint
-from tetlux.meshing.surface.surface import Surface, barycentric_on_triangles
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import barycentric_on_triangles
 
 
 class BoundaryQueries:

@@ -3,7 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.meshing.arrays import IndexArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.host.blocks import find_single_keys, group_keys, run_in_blocks
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
@@ -14,6 +15,22 @@ EDGES_OF_FACES = np.array([[3, 4, 5], [1, 2, 5], [0, 2, 4], [0, 1, 3]])
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # Up to this many nodes, three node numbers fit into one 64-bit key.
 MOST_NODES_OF_SHORT_KEYS = 2_600_000
+
+
+def check_arrays(points: FloatArray, tetrahedra: IntArray) -> None:
+    """Refuse points that are not (n, 3) or not finite, and tetrahedra that are not (m, 4) indices of points.
+
+    Raises
+    ------
+    InputError
+    """
+    p, t = points, tetrahedra
+    if p.ndim != 2 or p.shape[1] != 3 or t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
+        raise InputError(f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}.")
+    if t.min() < 0 or t.max() >= len(p):
+        raise InputError("a tetrahedron names a node that does not exist.")
+    if not np.isfinite(p).all():
+        raise InputError("a node's coordinate is not finite.")
 
 
 def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray]:
