@@ -68,17 +68,14 @@ class TetMesh:
 
     def __post_init__(self) -> None:
         topology.check_arrays(self.points, self.tetrahedra)
+        total = len(self.tetrahedra)
         if self.regions is _NO_REGIONS:
             # A broadcast zero takes no memory.
-            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(self.tetrahedra)))
-        elif self.regions.shape != (len(self.tetrahedra),) or self.regions.dtype.kind not in "iu":
-            raise InputError(
-                f"a mesh of {len(self.tetrahedra)} tetrahedra needs as many numbers of regions, all integers."
-            )
+            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), total))
+        elif self.regions.shape != (total,) or self.regions.dtype.kind not in "iu":
+            raise InputError(f"a mesh of {total} tetrahedra needs as many numbers of regions, all integers.")
         if bad := int((self.volumes <= 0).sum()):
-            raise InputError(
-                f"{bad} of {len(self.volumes)} tetrahedra are inverted or flat; orient and clean the mesh."
-            )
+            raise InputError(f"{bad} of {total} tetrahedra are inverted or flat; orient and clean the mesh.")
 
     @cached_property
     def volumes(self) -> FloatArray:
@@ -291,9 +288,8 @@ class TetMesh:
         """Volume of each region, unit³, by its number in ascending order."""
         if self.regions.strides == (0,):
             return {int(self.regions[0]): self.volume}
-        numbers, place = np.unique(self.regions, return_inverse=True)
-        volumes = np.bincount(place, self.volumes)
-        return dict(zip(numbers.tolist(), volumes.tolist(), strict=True))
+        numbers, index = np.unique(self.regions, return_inverse=True)
+        return dict(zip(numbers.tolist(), np.bincount(index, self.volumes).tolist(), strict=True))
 
     def __repr__(self) -> str:
         regions = len(np.unique(self.regions))
