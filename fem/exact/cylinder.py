@@ -18,8 +18,8 @@ import numpy.typing as npt
 from scipy import special
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
-from tetlux.fem.exact.numerics.cylindrical import CHUNK, HALF, cosine_sum, multiplicity, reach, reflection
+from tetlux.fem.exact.numerics.bessel import CYLINDRICAL, TABLE_SIZE, inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.cylindrical import cosine_sum, multiplicity, reach, reflection
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, composite_rule
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -64,8 +64,8 @@ def line_exitance(medium: Medium, *, radius: float, source_radius: float, theta:
     angle = checks.numbers("theta", theta)
     x = np.array([medium.sigma_tr * a])
     order = _line_order(float(x[0]), t)
-    growth = wall_rates(order, x, HALF).growth[:, 0]
-    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    growth = wall_rates(order, x, CYLINDRICAL).growth[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), CYLINDRICAL)[:, 0]
     series = multiplicity(order) * ratio / (1.0 + medium.extrapolation_length / a * growth)
     return (cosine_sum(series[:, None], angle.ravel()) / (2.0 * math.pi * a)).reshape(angle.shape)
 
@@ -103,13 +103,13 @@ def line_fluence(medium: Medium, *, radius: float, source_radius: float, points:
     if x == 0.0:
         # Order 0 has its logarithm in the free field: K_0(x d) + order 0 -> log(1/d) + beta.
         weight[0] = medium.extrapolation_length / a
-    weight *= inner_ratios(order, x, np.array([t]), HALF)
+    weight *= inner_ratios(order, x, np.array([t]), CYLINDRICAL)
     with np.errstate(divide="ignore"):
         field = -np.log(distance) if x == 0.0 else special.k0(x * distance)
-    chunk = max(1, CHUNK // (order + 1))
+    chunk = max(1, TABLE_SIZE // (order + 1))
     for start in range(0, fraction.size, chunk):
         part = slice(start, start + chunk)
-        series = weight * inner_ratios(order, x, fraction[part], HALF)
+        series = weight * inner_ratios(order, x, fraction[part], CYLINDRICAL)
         field[part] += cosine_sum(series, theta[part])
     return np.asarray(field / (2.0 * math.pi * medium.diffusion))
 
@@ -138,8 +138,8 @@ def line_total(medium: Medium, *, radius: float, source_radius: float) -> float:
     """
     a, t = _source(radius, source_radius)
     x = np.array([medium.sigma_tr * a])
-    growth = wall_rates(0, x, HALF).growth[0, 0]
-    ratio = inner_ratios(0, x, np.array([t]), HALF)[0, 0]
+    growth = wall_rates(0, x, CYLINDRICAL).growth[0, 0]
+    ratio = inner_ratios(0, x, np.array([t]), CYLINDRICAL)[0, 0]
     return float(ratio / (1.0 + medium.extrapolation_length / a * growth))
 
 
@@ -198,12 +198,12 @@ def point_exitance(
         )
     waves = np.cos(np.outer(angles, np.arange(order + 1))) * multiplicity(order)
     total = np.zeros(angles.size)
-    chunk = max(1, CHUNK // (order + 1))
+    chunk = max(1, TABLE_SIZE // (order + 1))
     for start in range(0, count, chunk):
         q = step * np.arange(start, min(start + chunk, count))
         x = a * np.hypot(k, q)
-        growth = wall_rates(order, x, HALF).growth
-        ratio = inner_ratios(order, x, np.full(x.shape, t), HALF)
+        growth = wall_rates(order, x, CYLINDRICAL).growth
+        ratio = inner_ratios(order, x, np.full(x.shape, t), CYLINDRICAL)
         along = np.cos(np.outer(heights, q)) * np.where(q == 0.0, 0.5 * step, step)
         total += np.sum(waves @ (ratio / (1.0 + beta * growth)) * along, axis=1)
     return np.asarray(total / (2.0 * math.pi**2 * a)).reshape(angle.shape)
@@ -245,18 +245,18 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     first = largest / panels
     edges = np.concatenate([[0.0], first * 2.0 ** np.arange(-36, 0, dtype=float), first * np.arange(1, panels + 1)])
     q, weights = composite_rule(edges, 12)
-    if order * q.size > CHUNK * 10:
+    if order * q.size > TABLE_SIZE * 10:
         raise InputError(
             f"source_radius is {source_radius:g}, too close below the surface of the cylinder for its series; "
             "use half_space for a source as close as that."
         )
     wall = np.hypot(x, q)
     answer = reflection(medium.extrapolation_length / a, wall, order)
-    answer *= inner_ratios(order, wall, np.full(wall.shape, t), HALF)
+    answer *= inner_ratios(order, wall, np.full(wall.shape, t), CYLINDRICAL)
     with np.errstate(divide="ignore"):
         total = np.exp(-x * np.hypot(distance, z)) / np.hypot(distance, z)
     for i in range(total.size):
-        series = answer * inner_ratios(order, wall, np.full(wall.shape, fraction[i]), HALF)
+        series = answer * inner_ratios(order, wall, np.full(wall.shape, fraction[i]), CYLINDRICAL)
         around = np.cos(np.arange(order + 1) * theta[i]) @ series
         total[i] += 2.0 / math.pi * float((weights * np.cos(q * z[i])) @ around)
     return np.asarray(total / (4.0 * math.pi * medium.diffusion * a))
@@ -270,7 +270,7 @@ def _source(radius: float, source_radius: float) -> tuple[float, float]:
 
 def _line_order(x: float, t: float) -> int:
     """Order at which the series is truncated; an error if that is too large."""
-    order = order_needed(x, t, HALF, CUTOFF)
+    order = order_needed(x, t, CYLINDRICAL, CUTOFF)
     if order > LINE_ORDERS:
         raise InputError(
             f"the source is {1.0 - t:.1g} of the radius below the surface of the cylinder, too close for its "

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
 from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, compute_in_chunks, convolve_decays, graded_rule
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
@@ -162,12 +162,12 @@ def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "del
     reach = CUTOFF / min(beam.extinction, sink)
     nodes, weights = graded_rule()
     w = reach * nodes[:, None]
-    density = beam.volume * two_decays(w, beam.extinction, sink) - beam.forward * np.exp(-sink * w)
+    density = beam.volume * convolve_decays(w, beam.extinction, sink) - beam.forward * np.exp(-sink * w)
 
     def integral(part: FloatArray) -> FloatArray:
         return np.asarray((reach * weights) @ (density * mirror_flux(medium.sigma_tr, part, w)))
 
-    return (sink / (2.0 * math.pi) * in_chunks(integral, distance.ravel())).reshape(distance.shape)
+    return (sink / (2.0 * math.pi) * compute_in_chunks(integral, distance.ravel())).reshape(distance.shape)
 
 
 def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float:

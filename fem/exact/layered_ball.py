@@ -20,14 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
-
-HALF = 0.5  # i_l is I_{l + 1/2} but for a power of its argument
 
 
 def point_exitance(
@@ -63,12 +61,12 @@ def point_exitance(
     r0 = checks.within("source_radius", source_radius, inner, radius, "outermost layer")
     angle = checks.numbers("gamma", gamma)
     outer = media[-1]
-    order = order_needed(outer.sigma_tr * radius, r0 / radius, HALF, CUTOFF)
+    order = order_needed(outer.sigma_tr * radius, r0 / radius, SPHERICAL, CUTOFF)
     slope, rho, last = np.zeros(order + 1), np.zeros(order + 1), 0.0
     for number, (medium, bound) in enumerate(zip(media, bounds, strict=True)):
         if number > 0:
             slope *= media[number - 1].diffusion / medium.diffusion
-            rates = wall_rates(order, np.array([medium.sigma_tr * last]), HALF)
+            rates = wall_rates(order, np.array([medium.sigma_tr * last]), SPHERICAL)
             growth, decay = rates.growth[:, 0], rates.decay[:, 0]
             rho = (growth - slope) / (decay + slope)
         if number < len(media) - 1:
@@ -76,7 +74,7 @@ def point_exitance(
             last = bound
     at_surface, share = _carried(outer, order, last, radius, rho)
     _, share_at_source = _carried(outer, order, last, r0, rho)
-    fall = inner_ratios(order, outer.sigma_tr * radius, np.array([r0 / radius]), HALF)[:, 0]
+    fall = inner_ratios(order, outer.sigma_tr * radius, np.array([r0 / radius]), SPHERICAL)[:, 0]
     weights = (2.0 * np.arange(order + 1) + 1.0) * fall * (1.0 + share_at_source) / (1.0 + share)
     weights /= 1.0 + outer.extrapolation_length / radius * at_surface
     sums = legendre_sum(weights, angle.ravel())
@@ -86,12 +84,12 @@ def point_exitance(
 def _carried(medium: Medium, order: int, start: float, end: float, rho: FloatArray) -> tuple[FloatArray, FloatArray]:
     """``r y'/y`` and rho at the radius `end` of a layer, for a rho at `start`, of each order."""
     k = medium.sigma_tr
-    rates = wall_rates(order, np.array([k * end]), HALF)
+    rates = wall_rates(order, np.array([k * end]), SPHERICAL)
     growth, decay = rates.growth[:, 0], rates.decay[:, 0]
     if start == 0.0:
         return growth, np.zeros(order + 1)
-    before = wall_rates(order, np.array([k * start]), HALF)
-    ratio = inner_ratios(order, k * end, np.array([start / end]), HALF)[:, 0]
+    before = wall_rates(order, np.array([k * start]), SPHERICAL)
+    ratio = inner_ratios(order, k * end, np.array([start / end]), SPHERICAL)[:, 0]
     with np.errstate(under="ignore"):
         rho = rho * start * (before.growth + before.decay)[:, 0] / (end * (growth + decay)) * ratio**2
     return (growth - decay * rho) / (1.0 + rho), rho

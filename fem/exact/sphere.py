@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.numerics.ball import CHUNK, HALF, chord, residual_weight
-from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.ball import chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, TABLE_SIZE, inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
 from tetlux.fem.media.medium import Medium
@@ -64,7 +64,7 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
     angle = checks.numbers("gamma", gamma)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
     flat = angle.ravel()
-    order = order_needed(medium.sigma_tr * a, t, HALF, CUTOFF)
+    order = order_needed(medium.sigma_tr * a, t, SPHERICAL, CUTOFF)
     sums = _direct(medium, a, t, flat, order) if order <= DIRECT_ORDERS else _split(medium, a, t, flat, order)
     return np.asarray(sums / (4.0 * math.pi * a**2)).reshape(angle.shape)
 
@@ -110,7 +110,7 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     # A point that was computed to lie on the surface may lie outside by rounding.
     fraction = np.minimum(checks.numbers("|points|/radius", np.linalg.norm(where, axis=1), high=1 + 1e-12), 1.0)
     x = medium.sigma_tr * a
-    order = order_needed(x, t, HALF, CUTOFF)
+    order = order_needed(x, t, SPHERICAL, CUTOFF)
     if order > POINT_ORDERS:
         raise InputError(
             f"source_radius is {source_radius:g}, too close below the surface of the ball for its series; "
@@ -120,15 +120,15 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     gamma = np.arctan2(np.hypot(where[:, 0], where[:, 1]), where[:, 2])
     with np.errstate(divide="ignore"):
         free = np.exp(-x * distance) / distance
-    rates = wall_rates(order, np.array([x]), HALF)
+    rates = wall_rates(order, np.array([x]), SPHERICAL)
     u, v = rates.growth, rates.decay
     beta = medium.extrapolation_length / a
     weight = (2.0 * np.arange(order + 1)[:, None] + 1.0) * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v))
-    weight *= inner_ratios(order, x, np.array([t]), HALF)
-    chunk = max(1, CHUNK // order)
+    weight *= inner_ratios(order, x, np.array([t]), SPHERICAL)
+    chunk = max(1, TABLE_SIZE // order)
     for start in range(0, fraction.size, chunk):
         part = slice(start, start + chunk)
-        free[part] += legendre_sum(weight * inner_ratios(order, x, fraction[part], HALF), gamma[part])
+        free[part] += legendre_sum(weight * inner_ratios(order, x, fraction[part], SPHERICAL), gamma[part])
     return np.asarray(free / (4.0 * math.pi * medium.diffusion * a))
 
 
@@ -164,16 +164,16 @@ def point_total(medium: Medium, *, radius: float, source_radius: float) -> float
     a = checks.positive("radius", radius)
     t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
     x = np.array([medium.sigma_tr * a])
-    ratio = inner_ratios(0, x, np.array([t]), HALF)[0, 0]
-    growth = wall_rates(0, x, HALF).growth[0, 0]
+    ratio = inner_ratios(0, x, np.array([t]), SPHERICAL)[0, 0]
+    growth = wall_rates(0, x, SPHERICAL).growth[0, 0]
     return float(ratio / (1.0 + medium.extrapolation_length / a * growth))
 
 
 def _direct(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
     """``4 pi a² M`` by the series as it stands."""
     x = np.array([medium.sigma_tr * a])
-    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
-    growth = wall_rates(order, x, HALF).growth[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
+    growth = wall_rates(order, x, SPHERICAL).growth[:, 0]
     beta = medium.extrapolation_length / a
     return legendre_sum((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth), gamma)
 
@@ -190,7 +190,7 @@ def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) ->
     beta = medium.extrapolation_length / a
     distance = chord(np.asarray(1.0 - t), gamma)
     image = 2.0 / beta * np.exp(-x * distance) / distance
-    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
     residual = (2.0 * l + 1.0) * ratio * residual_weight(order, x, beta)
     residual -= (1.0 - 2.0 / beta) * t**l / (1.0 + beta * l)
     return image + (1.0 - 2.0 / beta) * _static_sum(t, beta, gamma) + legendre_sum(residual, gamma)

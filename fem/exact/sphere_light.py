@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
-from tetlux.fem.exact.numerics.ball import HALF, along_diameter, beam_series, chord, residual_weight
-from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.ball import along_diameter, beam_series, chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, two_decays
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, convolve_decays, graded_rule
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
@@ -79,7 +79,7 @@ def pencil_exitance(
     reach = CUTOFF * max(beta, 1.0 / extinction)
     s = reach * nodes
     images = 1.0 / chord(-np.expm1(-s[:, None]), flat)
-    line = (reach * weights * two_decays(s, 1.0 / beta, extinction) / beta) @ images
+    line = (reach * weights * convolve_decays(s, 1.0 / beta, extinction) / beta) @ images
     residual = weight * along - static / ((1.0 + beta * l) * (l + extinction))
     total = beam.volume * a * (2.0 / beta * singular + static * line + legendre_sum(residual, flat))
 
@@ -124,7 +124,7 @@ def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddin
     x = medium.sigma_tr * a
     extinction = beam.extinction * a
     along, _ = along_diameter(x, extinction, np.empty(0), 0)
-    growth = wall_rates(0, np.array([x]), HALF).growth[0, 0]
+    growth = wall_rates(0, np.array([x]), SPHERICAL).growth[0, 0]
     ends = beam.forward * math.expm1(-2.0 * extinction)
     return float((beam.volume * a * along[0] + ends) / (1.0 + medium.extrapolation_length / a * growth))
 
@@ -221,8 +221,8 @@ def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -
     a = checks.positive("radius", radius)
     r = checks.numbers("distance", distance, low=0.0, high=a)
     x = np.array(medium.sigma_tr * a)
-    wall = 1.0 + medium.extrapolation_length / a * wall_rates(0, x, HALF).growth[0]
-    ratio = inner_ratios(0, x, r / a, HALF)[0]
+    wall = 1.0 + medium.extrapolation_length / a * wall_rates(0, x, SPHERICAL).growth[0]
+    ratio = inner_ratios(0, x, r / a, SPHERICAL)[0]
     return np.asarray(4.0 / (1.0 - 2.0 * moments(medium.eta)[0]) * ratio / wall)
 
 
@@ -254,7 +254,7 @@ def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     0.795337
     """
     a = checks.positive("radius", radius)
-    growth = wall_rates(0, np.array(medium.sigma_tr * a), HALF).growth[0]
+    growth = wall_rates(0, np.array(medium.sigma_tr * a), SPHERICAL).growth[0]
     surface = diffuse_fluence(medium, radius=a, distance=a)
     return float(1.0 - medium.diffusion / a * growth * surface)
 
