@@ -212,7 +212,7 @@ def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(mesher, "run_pytetwild", run)
     assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
-    assert given[1] == pytest.approx(mesher.SECOND * given[0])
+    assert given[1] == pytest.approx(mesher.SECOND_ATTEMPT * given[0])
 
 
 def test_a_mesh_that_lost_a_part_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -294,9 +294,9 @@ def _lives(pid: int) -> bool:
 @pytest.mark.parametrize("found", [True, False])
 def test_pytetwild_is_loaded_without_pyvista_and_if_need_be_with_it(found: bool) -> None:
     code = (
-        "import importlib.util, sys; from tetlux.meshing.mesher._mesher_process import _without_package;"
+        "import importlib.util, sys; from tetlux.meshing.mesher._mesher_process import _import_tetrahedralize;"
         "folder = importlib.util.find_spec('pytetwild').submodule_search_locations[0];"
-        f"function = _without_package(folder if {found} else '/nowhere');"
+        f"function = _import_tetrahedralize(folder if {found} else '/nowhere');"
         "print(function.__name__, 'pyvista' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

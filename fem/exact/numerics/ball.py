@@ -87,8 +87,8 @@ def beam_series(medium: Medium, a: float, *, decay: float, volume: float, forwar
     (order + 1,) ndarray
     """
     x, extinction = medium.sigma_tr * a, decay * a
-    # Chords are numbered by the angle between the beam and the surface where they enter, with panels that shrink towards
-    # grazing incidence. Along a chord, rho_l P_l changes fastest within 1/l of both ends.
+    # A chord is given by the angle between beam and surface at its entry; panels shrink towards grazing incidence.
+    # Along a chord, rho_l P_l changes fastest within 1/l of both ends.
     steps = np.linspace(0.0, 0.5 * math.pi, 25)
     edges = np.concatenate([[0.0], steps[1] * 2.0 ** np.arange(-6, 0, dtype=float), steps[1:]])
     elevation, weight = composite_rule(edges, 14)
