@@ -14,7 +14,7 @@ from tetlux.fem.validity.notes import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Media by label or by its name, of one channel or of several.
