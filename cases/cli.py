@@ -74,7 +74,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         wrong = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
         if wrong:
-            from tetlux.cases.nearest import did_you_mean  # noqa: PLC0415
+            from tetlux.cases.hints import did_you_mean  # noqa: PLC0415
 
             commands = re.findall(r"[\w-]+", wrong[2])
             hint = did_you_mean(wrong[1], commands)

@@ -8,7 +8,7 @@ import os
 import re
 from pathlib import Path
 
-from tetlux.cases.nearest import did_you_mean
+from tetlux.cases.hints import did_you_mean
 
 # Of case files; JSON is YAML.
 SUFFIXES = (".yaml", ".yml", ".json")

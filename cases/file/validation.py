@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from tetlux.cases.file.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.parts import TAG
-from tetlux.cases.nearest import did_you_mean
+from tetlux.cases.hints import did_you_mean
 
 # What pydantic says in words of Python's, by the beginning of its error's kind; of lists, how long they are.
 PLAIN = {

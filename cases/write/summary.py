@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.write.media_rows import media_rows
-from tetlux.cases.write.ran import as_ran
+from tetlux.cases.write.run_record import describe_run
 from tetlux.cases.write.results import AnySolution, Results, lights_in
 from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.outcome.solution import Power
@@ -44,7 +44,7 @@ def summarize(
         "unit": case.surface.unit,
         "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
-        "as_ran": as_ran(case),
+        "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),

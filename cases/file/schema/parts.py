@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.nearest import did_you_mean, nearest
+from tetlux.cases.hints import did_you_mean, nearest_word
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
@@ -70,7 +70,7 @@ class Section(BaseModel):
         homes = [name for name in homes if name in data] or homes
         if len(homes) == 1:
             return f'it belongs in "{homes[0]}"; '
-        found = nearest(key, cls.model_fields)
+        found = nearest_word(key, cls.model_fields)
         meaning = cls.model_fields[found].description if found else None
         return did_you_mean(key, cls.model_fields, meaning or "")
 
