@@ -20,7 +20,7 @@ from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.media.region import Region
-from tetlux.fem.scene import media_of
+from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.solve import solve, solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
@@ -112,7 +112,7 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     """A solution for each channel, each with the seconds of all."""
     solutions = []
-    media = media_of([channel.medium for channel in case.channels], case.regions, len(case.channels))
+    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
         lights = list(channel.lights.values())

@@ -12,10 +12,10 @@ from tetlux.cases.file.reading import Reader
 from tetlux.cases.file.schema.case import CaseSpec, MeshSpec
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
-from tetlux.fem.labelled import label_of, outermost_first
+from tetlux.fem.labels import find_label, order_outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.media.region import Region
-from tetlux.fem.scene import media_of as media_of_scenes
+from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.validity.notes import check_media, check_size, check_together
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
@@ -61,7 +61,7 @@ class CaseBody:
         if self.mesh is not None:
             return [Body(self.surface, media, MeshPartition(self.mesh)) for media in self.by_label]
         partition = SurfacePartition([region.surface for region in self.regions])
-        each = media_of_scenes(self.media, self.regions, len(self.media))
+        each = media_by_scene(self.media, self.regions, len(self.media))
         return [Body(self.surface, media, partition) for media in each]
 
 
@@ -120,14 +120,14 @@ def _of_mesh(document: Document, spec: MeshSpec, unit: str, channels: int, reade
     for name, medium in spec.labels.items():
         key: Key = ("mesh", "labels", name)
         with document.at(key):
-            label = label_of(mesh, name)
+            label = find_label(mesh, name)
             if label in media:
                 raise InputError(f"label {mesh.named([label])} has a medium already; give it one.")
         nodes = mesh.points[mesh.tetrahedra[mesh.regions == label].reshape(-1)]
         media[label] = media_of(document, key, medium, nodes, mesh.unit, channels, reader)
     with document.at(("mesh", "labels")):
         check_labels(mesh, media)
-        order = outermost_first(mesh, media)
+        order = order_outermost_first(mesh, media)
         by_label = tuple({label: media[label][channel] for label in order} for channel in range(channels))
     parts: dict[str, int | None] = {str(label): label for label in order}
     parts |= {name: label for label, name in mesh.labels.items() if label in media}

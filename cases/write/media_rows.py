@@ -17,7 +17,7 @@ from tetlux.fem.media.coefficients import (
     coefficients_on,
 )
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.scene import media_of
+from tetlux.fem.scenes import media_by_scene
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -54,7 +54,7 @@ def _media_by_label(case: Case) -> list[MediaByLabel]:
     if case.mesh is not None:
         return [channel.media for channel in case.channels if not isinstance(channel.media, AnyMedium)]
     media = [channel.medium for channel in case.channels]
-    return [by_label(each) for each in media_of(media, case.regions, len(media))]
+    return [by_label(each) for each in media_by_scene(media, case.regions, len(media))]
 
 
 def _means(mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, float]:
