@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import Report, run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.cases.write.publish import check_writable

@@ -10,7 +10,7 @@ from typing import Any
 from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.sensors import readings, write_readings
+from tetlux.cases.file.detectors import read_detectors, write_readings
 from tetlux.cases.picture.arrows import rays
 from tetlux.cases.picture.draw import Scene, Shape, draw
 from tetlux.cases.write.ply import write_ply
@@ -134,7 +134,7 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         _write_surface(results, folder)
     if "volume" in case.outputs:
         write_mesh(results.with_mesh[0].mesh, folder / FILES["volume"], volume_values(results))
-    found = readings(case.sensors, results.by_light())
+    found = read_detectors(case.detectors, results.by_light())
     if "picture" in case.outputs:
         warnings += draw(_scene(results, found), folder / FILES["picture"])
     if found:
@@ -196,7 +196,7 @@ def _warnings(results: Results) -> list[str]:
     for name, solution in zip(names, solutions, strict=True):
         # What was mended is said when the case is read.
         for warning in (each for each in solution.warnings if each not in results.case.repairs):
-            told.setdefault(results.case.named(warning), []).append(name)
+            told.setdefault(results.case.name_region(warning), []).append(name)
     return [
         *results.case.region_warnings,
         *(

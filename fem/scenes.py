@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
-from tetlux.fem.labels import GivenMedia, resolve_media, check_single_label, warnings_for_cavities, warnings_for_labels
+from tetlux.fem.labels import GivenMedia, check_single_label, resolve_media, warnings_for_cavities, warnings_for_labels
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
 from tetlux.fem.operators.assembly import Assembly, Mass
@@ -168,7 +168,7 @@ def _media_and_labels(
     if len(channels) == 1 and scenes > 1 and isinstance(medium, Mapping):
         channels *= scenes
     if len(channels) != scenes:
-        raise InputError(f"there are media for {len(channels)} channels and {scenes} scenes; give media for each scene.")
+        raise InputError(f"there are media for {len(channels)} channels and {scenes} scenes; give one for each scene.")
     return [tuple(each.values()) for each in channels], tuple(channels[0])
 
 

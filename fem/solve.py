@@ -12,11 +12,11 @@ from tetlux.fem.known.split import Subtract, check_scenes, sources_of
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
-from tetlux.fem.memory import check_memory, affordable_tetrahedra
+from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.notes import notes_on
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.scenes import media_by_channel, build_scenes
+from tetlux.fem.scenes import build_scenes, media_by_channel
 from tetlux.fem.sources.deposit import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError

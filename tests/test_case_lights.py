@@ -9,8 +9,9 @@ import pytest
 from PIL import Image
 
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
 from tetlux.cases.file.images import read_pixels
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture.arrows import rays
 from tetlux.fem import CollimatedBeam, DiffusePatch, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
@@ -148,8 +149,8 @@ def test_detectors_and_camera(load: Load) -> None:
         "  - {name: c, fibre: {center: [0, -4, 0], radius: 0.5, numerical_aperture: 0.22}}\n"
         "camera: {position: [0, 0, 50]}\n"
     )
-    assert [(s.name, s.kind) for s in case.sensors] == [("a", "point"), ("b", "disc"), ("c", "fibre")]
-    assert [s.detector for s in case.sensors] == [
+    assert [(s.name, s.kind) for s in case.detectors] == [("a", "point"), ("b", "disc"), ("c", "fibre")]
+    assert [s.detector for s in case.detectors] == [
         PointDetector((0.0, 0.0, 4.0)),
         DiscDetector((4.0, 0.0, 0.0), 1.0),
         FibreDetector((0.0, -4.0, 0.0), 0.5, 0.22),
@@ -209,14 +210,14 @@ WRONG = [
         "lights: all lights are dark in channel 1; give",
     ),
     ("{name: all, " + POINT + "}", "", r'lights\[0\]: "all" is the sum'),
-    ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" stands here twice'),
+    ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" is given twice'),
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),
-    ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: a name here is of letters from A to Z, digits and"),
+    ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: expected a name of letters from A to Z, digits and"),
     ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, patch, collimated, environment, emission"),
     (
         POINT,
         "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n",
-        r'detectors\[1\]: the name "a" stands here twice',
+        r'detectors\[1\]: the name "a" is given twice',
     ),
     (POINT, "detectors: [{point: [0, 0, 4]}]\n", r"detectors\[0\]\.name: this key is missing"),
     (POINT, "detectors: [{name: a}]\n", r"detectors\[0\]: give exactly one of point, disc, fibre"),

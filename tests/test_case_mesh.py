@@ -10,7 +10,7 @@ import pytest
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.fem import Emission, Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, read_mesh
 from tetlux.meshing.files.meshes import write_mesh
@@ -138,7 +138,7 @@ def test_the_array_of_labels_is_a_key(path: Path) -> None:
             r'line 1: mesh\.labels\.skim: the mesh has no label "skim"; did you mean "sk',
         ),
         (LABELLED.replace("skin:", "4:"), r'mesh\.labels\.4: the mesh has no label "4"; its labels are 3 \(skin\)'),
-        (LABELLED.replace("skin:", "bone:"), r"mesh\.labels\.7: label 7 \(bone\) has a medium already"),
+        (LABELLED.replace("skin:", "bone:"), r"mesh\.labels\.7: label 7 \(bone\) has two media; give it one"),
         (
             f"mesh: {{file: head.msh, labels: {{7: {BONE}}}}}\n",
             r"mesh\.labels: the mesh's label 3 \(skin\) has no medium",

@@ -30,7 +30,7 @@ from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere

@@ -12,7 +12,8 @@ from PIL import Image
 from tests.conftest import TISSUE
 from tetlux.cases.compare.comparison import NAMES, source_model
 from tetlux.cases.compare.differences import MEANINGS, compare
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import ClosedForm
 from tetlux.cases.run import run_case
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve

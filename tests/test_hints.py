@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.file.case import load_cases
-from tetlux.cases.hints import ALIASES, REMEDIES, did_you_mean, nearest_word
+from tetlux.cases.file.load import load_cases
+from tetlux.cases.hints import did_you_mean, nearest_word
+from tetlux.cases.synonyms import ALIASES, REMEDIES
 from tetlux.meshing import InputError
 
 CASE = """\

@@ -13,9 +13,10 @@ import pyvista
 import trimesh
 
 from tetlux.cases import run as run_module
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
 from tetlux.cases.file.colours import LUMINANCE, preview, to_linear, to_srgb
-from tetlux.cases.file.sensors import readings
+from tetlux.cases.file.detectors import read_detectors
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import run_case
 from tetlux.cases.write.results import Results, results_of
 from tetlux.fem import solve
@@ -270,7 +271,7 @@ def test_vertices_are_chosen_by_all_channels_together(finished: Finished) -> Non
     # The point source lights a corner where the beam's channel alone would not ask for more.
     total = sum(solution.exitance_on(results.surface.points) for solution in solutions)
     np.testing.assert_allclose(results.exitance(), total, rtol=1e-9)
-    assert readings(case.sensors, [("red", "all", solutions[0])])[0]["exitance"] > 0
+    assert read_detectors(case.detectors, [("red", "all", solutions[0])])[0]["exitance"] > 0
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,8 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import run
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
 from tetlux.cases.picture.draw import Ray, Scene, Shape, draw
 from tetlux.cases.picture.frame import LEFT, TOP

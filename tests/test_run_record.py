@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder
 from tetlux.cases.write.media_rows import coefficients, media_rows
 from tetlux.cases.write.run_record import describe_run

@@ -54,7 +54,7 @@ def chart(
     """
     cases = load_all(requests)
     for case in cases:
-        if case.swept:
+        if case.sweep_values:
             raise InputError(f"{case.source} holds a sweep, and a chart is of single scenes; leave sweep out of it.")
     check_writable(out)
     methods = _methods(report)

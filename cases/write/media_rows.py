@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.lighting import BODY
+from tetlux.cases.file.light_names import BODY
 from tetlux.fem.media.coefficients import (
     AnyMedium,
     Coefficients,

@@ -25,7 +25,7 @@ def describe_run(case: Case) -> dict[str, Any]:
     """
     return {
         "source": os.path.abspath(case.source),  # noqa: PTH100
-        "sweep": dict(case.swept),
+        "sweep": dict(case.sweep_values),
         "scene": _case_file_of(case),
     }
 
