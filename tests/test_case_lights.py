@@ -12,7 +12,7 @@ from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.images import read_pixels
 from tetlux.cases.file.load import load_cases
-from tetlux.cases.picture.arrows import rays
+from tetlux.cases.picture.arrows import light_rays
 from tetlux.fem import CollimatedBeam, DiffusePatch, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector
@@ -74,14 +74,14 @@ def test_spots_and_their_power(load: Load, spot: str, expected: Disc) -> None:
 def test_light_on_the_whole_body_is_drawn_as_parallel_arrows(load: Load) -> None:
     case = load("collimated: {direction: [0, 0, -2], irradiance: 0.5}")
     assert case.lights == (CollimatedBeam((0.0, 0.0, -2.0), 0.5),)
-    drawn = rays(case.lights[0], case.surface)
+    drawn = light_rays(case.lights[0], case.surface)
     assert len(drawn) == 3
     for ray in drawn:
         start, end = np.array(ray.start), np.array(ray.end)
         assert end[2] == pytest.approx(4.0)
         assert np.abs(end[:2]).max() < 4.0
         assert start - end == pytest.approx([0.0, 0.0, 0.3 * case.surface.diagonal])
-    (spot,) = rays(CollimatedBeam((0.0, 0.0, -1.0), 1.0, Disc((1.0, 2.0, 0.0), 0.5)), box((8.0, 8.0, 8.0)))
+    (spot,) = light_rays(CollimatedBeam((0.0, 0.0, -1.0), 1.0, Disc((1.0, 2.0, 0.0), 0.5)), box((8.0, 8.0, 8.0)))
     assert spot.end == pytest.approx((1.0, 2.0, 4.0), abs=0.05)
 
 
@@ -90,7 +90,7 @@ def test_a_patch_has_a_value_for_each_channel(load: Load) -> None:
     case = load(f"{patch}\n  - {POINT}", medium=THREE)
     lights = [channel.lights.get("patch_1") for channel in case.channels]
     assert lights == [DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), None, DiffusePatch((1.0, 2.0, 4.0), 1.0, 3.0)]
-    (drawn,) = rays(DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), case.surface)
+    (drawn,) = light_rays(DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), case.surface)
     assert drawn.is_point
     assert drawn.end == pytest.approx((1.0, 2.0, 4.0))
 

@@ -411,7 +411,7 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
     [
         (
             ["ball"],
-            'ball: did you mean "sphere"? it is neither a file nor one of the cases that ship: '
+            'ball: did you mean "sphere"? it is neither a file nor one of the shipped cases: '
             "candle, hare, inclusion, laser, marble, slab, sphere, torus.",
         ),
         (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),

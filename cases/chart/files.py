@@ -12,7 +12,7 @@ from typing import Any
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.picture import draw_chart
 from tetlux.cases.chart.runs import Charted, Measurement, exponents
-from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
@@ -27,7 +27,7 @@ def write_chart(charted: Sequence[Charted], out: Path) -> None:
     RunError
         If they cannot be written.
     """
-    with claimed(out, ".") as folder:
+    with claim_folder(out, ".") as folder:
         try:
             _write_table([run for one in charted for run in one.runs], folder / "chart.csv")
             draw_chart(charted, folder / "chart.png")
@@ -35,7 +35,7 @@ def write_chart(charted: Sequence[Charted], out: Path) -> None:
             (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
             publish(folder, out, FILES)
         except OSError as error:
-            raise cannot_write(out, error) from error
+            raise write_error(out, error) from error
 
 
 def _write_table(runs: Sequence[Measurement], path: Path) -> None:

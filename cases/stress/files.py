@@ -10,7 +10,7 @@ from tetlux.cases.stress.picture import draw_map
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
-from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.write.publish import claim_folder, publish, write_error
 
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (
@@ -28,7 +28,7 @@ def write_map(trials: Sequence[Trial], words: str, out: Path) -> None:
     RunError
         If they cannot be written.
     """
-    with claimed(out, ".") as folder:
+    with claim_folder(out, ".") as folder:
         try:
             with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
                 writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
@@ -38,7 +38,7 @@ def write_map(trials: Sequence[Trial], words: str, out: Path) -> None:
             draw_map(trials, folder / "stress.png")
             publish(folder, out, FILES)
         except OSError as error:
-            raise cannot_write(out, error) from error
+            raise write_error(out, error) from error
 
 
 def _as_row(trial: Trial) -> dict[str, Any]:
