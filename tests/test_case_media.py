@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 
 from tests.conftest import block
-from tetlux.cases.chart.benchmark import benchmark_of
+from tetlux.cases.chart.benchmark import prepare_benchmark
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
@@ -152,7 +152,7 @@ def test_regions_have_media_for_every_channel(load: Load) -> None:
         Medium(sigma_a=0.2, sigma_s_prime=1.0, eta=1.4),
     )
     assert cube.medium == (Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4),) * 2
-    assert not case.is_simple
+    assert not case.has_single_medium
 
 
 def absorbing(field: str) -> str:
@@ -255,8 +255,8 @@ def test_a_wrong_medium_gets_one_sentence(
 
 def test_a_chart_is_of_simple_cases_only(load: Load) -> None:
     for case in (load("{material: marble}"), load(more=ball())):
-        with pytest.raises(RunError, match="a chart is of one channel and one even medium"):
-            benchmark_of(case, quick=True)
+        with pytest.raises(RunError, match="a chart needs one channel and one uniform medium"):
+            prepare_benchmark(case, quick=True)
 
 
 def test_repairs_of_a_region_bear_its_name(load: Load, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -98,7 +98,7 @@ def test_channels_sweeps_and_emission(path: Path) -> None:
     assert isinstance(two.media, dict)
     assert (two.media[3].sigma_a, two.media[7].sigma_a, two.media[7].sigma_s_prime) == (0.2, 0.02, 2.5)
     assert list(one.lights.values()) == [Emission(1.0, 7), Emission(1.0, 3)]
-    assert not last.is_simple
+    assert not last.has_single_medium
 
 
 def test_coefficients_from_files_are_those_of_their_label(path: Path) -> None:

@@ -127,7 +127,7 @@ class Case:
         return (*getattr(self.surface, name), *inner)
 
     @property
-    def is_simple(self) -> bool:
+    def has_single_medium(self) -> bool:
         """Whether it has a single channel and one uniform medium."""
         channel = self.channels[0]
         return len(self.channels) == 1 and not self.regions and self.mesh is None and isinstance(channel.medium, Medium)

@@ -1,4 +1,4 @@
-"""What the stress map writes: a table, the map in words, and a picture."""
+"""The files of the stress map: a table, the map as text, and a picture."""
 
 import csv
 from collections.abc import Sequence
@@ -20,8 +20,8 @@ COLUMNS = (
 )
 
 
-def write_map(trials: Sequence[Trial], words: str, out: Path) -> None:
-    """Write the files, whole: into a folder beside them first.
+def write_map(trials: Sequence[Trial], text: str, out: Path) -> None:
+    """Write the three files, all or none.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def write_map(trials: Sequence[Trial], words: str, out: Path) -> None:
                 writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
                 writer.writeheader()
                 writer.writerows(map(_as_row, trials))
-            (folder / "stress.md").write_text(words, encoding="utf-8")
+            (folder / "stress.md").write_text(text, encoding="utf-8")
             draw_map(trials, folder / "stress.png")
             publish(folder, out, FILES)
         except OSError as error:
