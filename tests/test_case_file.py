@@ -120,7 +120,7 @@ def at(line: int) -> str:
             at(10) + r"lights\[1\]: the point source .* outside",
         ),
         ("power: 0.5", "power: 0", at(9) + r"lights\[0\]\.pencil\.power: power is 0"),
-        ("depth: 1}", "depth: 1}, scale: 3", at(3) + "surface: scale belongs to a file"),
+        ("depth: 1}", "depth: 1}, scale: 3", at(3) + "surface: scale applies to a surface file"),
         ("width: 6, depth: 1", "width: 0.02, depth: 0.01", "absurdly small for diffusion; check the unit"),
         ("width: 6, depth: 1", "width: 6e6, depth: 1e6", "absurdly large for diffusion; check the unit"),
         ("outputs: [surface]", "outputs: [film]", at(13) + r"outputs\[0\]: .*'film'"),

@@ -125,7 +125,7 @@ def test_the_array_of_labels_is_a_key(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (LABELLED + "surface: {sphere: {radius: 1}}\n", r"line 1: mesh: mesh stands in place of .*; leave surface out"),
+        (LABELLED + "surface: {sphere: {radius: 1}}\n", r"line 1: mesh: mesh replaces .*; leave surface out"),
         (LABELLED + f"medium: {SKIN}\n", "leave medium out"),
         (
             LABELLED + f"regions: [{{surface: {{sphere: {{radius: 1}}}}, medium: {SKIN}}}]\ncompare: [dipole]\n",

@@ -113,7 +113,7 @@ def test_the_case_file_turns_the_picture(keys: str, toward: Vector | None, tmp_p
     [
         ("camera: {}", "camera: give position or azimuth, not neither"),
         ("camera: {azimuth: 3, position: [0, 0, 30]}", "camera: give position or azimuth, not both"),
-        ("camera: {elevation: 3, position: [0, 0, 30]}", "camera: elevation belongs to azimuth"),
+        ("camera: {elevation: 3, position: [0, 0, 30]}", "camera: elevation goes with azimuth"),
         ("camera: {azimuth: 3, elevation: 91}", "camera.elevation: expected a number less than or equal to 90"),
         ("camera: {position: [0, 0, 3]}", "camera.position: the camera is inside the body"),
         ("up: [0, 0, 0]", "line 6: up: up"),

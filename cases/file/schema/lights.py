@@ -111,7 +111,7 @@ class DiscSpec(Section):
 
 
 class RectangleSpec(Section):
-    """An even, rectangular spot."""
+    """A uniform rectangular spot."""
 
     center: Vector3
     width: Length
@@ -211,7 +211,8 @@ class EmissionSpec(LightSection):
 
     density: Each = Field(description="W/unit³")
     region: Annotated[str | None, BeforeValidator(_number_as_text)] = Field(
-        None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
+        None,
+        description="name of a region, body for the part outside of all, or name or number of a mesh's label",
     )
 
     def light(self, context: LightContext) -> Light:
@@ -245,7 +246,7 @@ class LightSpec(Choice):
 
 
 class FibreSpec(DiscSpec):
-    """A fibre that stands on the surface."""
+    """An optical fibre whose end touches the surface."""
 
     numerical_aperture: Number
 
@@ -260,13 +261,13 @@ class DetectorSpec(Choice):
 
 
 class CameraSpec(Section):
-    """From where the surface is seen: a position, or a direction by two angles."""
+    """Where the surface is seen from: a position, or a direction by two angles."""
 
     position: Vector3 | None = Field(
         None, description="the picture is taken from this side; radiance towards it is written with the surface"
     )
     azimuth: Number | None = Field(
-        None, description="of the picture alone: degrees about up, from the x axis anticlockwise seen from above"
+        None, description="for the picture only: degrees about up, anticlockwise from the x axis as seen from above"
     )
     elevation: Annotated[float, Field(strict=True, ge=-90, le=90)] | None = Field(
         None, description="degrees above the horizon, with azimuth; 20 if not given"
@@ -278,5 +279,5 @@ class CameraSpec(Section):
             what = "neither" if self.position is None else "both"
             raise PydanticCustomError("one_of", "give position or azimuth, not {what}", {"what": what})
         if self.position is not None and self.elevation is not None:
-            raise PydanticCustomError("one_of", "elevation belongs to azimuth; leave it out beside position", {})
+            raise PydanticCustomError("one_of", "elevation goes with azimuth; leave it out where position is given", {})
         return self
