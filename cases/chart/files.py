@@ -12,7 +12,7 @@ from typing import Any
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.picture import draw_chart
 from tetlux.cases.chart.runs import MeasuredBenchmark, Measurement, exponents
-from tetlux.cases.write.publish import claim_folder, publish, write_error
+from tetlux.cases.write.publish import replace_files
 from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
@@ -27,15 +27,11 @@ def write_chart(measured: Sequence[MeasuredBenchmark], out: Path) -> None:
     RunError
         If they cannot be written.
     """
-    with claim_folder(out, ".") as folder:
-        try:
-            _write_table([run for one in measured for run in one.runs], folder / "chart.csv")
-            draw_chart(measured, folder / "chart.png")
-            text = json.dumps(as_data(measured), indent=2, allow_nan=False)
-            (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
-            publish(folder, out, FILES)
-        except OSError as error:
-            raise write_error(out, error) from error
+    with replace_files(out, FILES) as folder:
+        _write_table([run for one in measured for run in one.runs], folder / "chart.csv")
+        draw_chart(measured, folder / "chart.png")
+        text = json.dumps(as_data(measured), indent=2, allow_nan=False)
+        (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
 
 
 def _write_table(runs: Sequence[Measurement], path: Path) -> None:

@@ -10,7 +10,7 @@ from tetlux.cases.stress.picture import draw_map
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
-from tetlux.cases.write.publish import claim_folder, publish, write_error
+from tetlux.cases.write.publish import replace_files
 
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (
@@ -28,17 +28,13 @@ def write_map(trials: Sequence[Trial], text: str, out: Path) -> None:
     RunError
         If they cannot be written.
     """
-    with claim_folder(out, ".") as folder:
-        try:
-            with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
-                writer.writeheader()
-                writer.writerows(map(_as_row, trials))
-            (folder / "stress.md").write_text(text, encoding="utf-8")
-            draw_map(trials, folder / "stress.png")
-            publish(folder, out, FILES)
-        except OSError as error:
-            raise write_error(out, error) from error
+    with replace_files(out, FILES) as folder:
+        with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
+            writer.writeheader()
+            writer.writerows(map(_as_row, trials))
+        (folder / "stress.md").write_text(text, encoding="utf-8")
+        draw_map(trials, folder / "stress.png")
 
 
 def _as_row(trial: Trial) -> dict[str, Any]:

@@ -127,6 +127,35 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
                 (folder / name).replace(target / name)
 
 
+@contextmanager
+def replace_files(out: Path, names: Sequence[str]) -> Iterator[Path]:
+    """Replace files of a folder, all or none, by those that the block writes into a temporary folder.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the files.
+    names : sequence of str
+        All files that the block writes.
+
+    Yields
+    ------
+    Path
+        The temporary folder.
+
+    Raises
+    ------
+    RunError
+        If they cannot be written.
+    """
+    with claim_folder(out, ".") as folder:
+        try:
+            yield folder
+            publish(folder, out, names)
+        except OSError as error:
+            raise write_error(out, error) from error
+
+
 def check_writable(out: Path) -> None:
     """Refuse a folder that results cannot be written to, before anything is solved.
 
