@@ -103,6 +103,7 @@ def test_bad_tetrahedra_and_hard_shapes_are_among_them() -> None:
     assert {DEFAULT.name, NOT_REFINED.name, CONSISTENT.name, NOTHING.name} <= variants
 
 
+@pytest.mark.slow
 def test_every_panel_makes_its_scenes() -> None:
     """The first of each; those that are refused are refused when they are solved."""
     for one in PANELS:
@@ -271,6 +272,7 @@ def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[st
         picture.load()
 
 
+@pytest.mark.slow
 def test_violations_crashes_and_hangs_fail_the_command_and_end_nothing_else(tmp_path: Path) -> None:
     grid = [
         panel(ctypes.string_at, 1, 8, name="segfault"),
