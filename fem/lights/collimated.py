@@ -97,8 +97,8 @@ class CollimatedBeam:
         """Least depth, over some of the entries, at which the beam has decayed to 1/e, unit."""
         some = body.just_inside(entries[:: -(-len(entries) // DEPTH_SAMPLES)])
         directions = np.broadcast_to(unit_vector(self.direction, "direction"), some.shape)
-        _, ends = body.ways_out(some, directions)
-        return float(body.paths(some, directions, ends).place(np.ones(len(some)), peaked=True).min())
+        _, ends = body.extents_along(some, directions)
+        return float(body.paths(some, directions, ends).distances_at(np.ones(len(some)), delta_eddington=True).min())
 
     def entries(self, surface: Surface) -> FloatArray:
         """Sample the places where the light first meets a surface.
