@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.body.optical_paths import OpticalPaths, paths_of
-from tetlux.fem.body.partition import Partition, SurfacePartition
+from tetlux.fem.body.partition import Partition, Pieces, SurfacePartition
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, by_label
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -157,7 +157,8 @@ class Body:
         medium, zeros = self.only_medium, np.zeros(len(starts))
         if medium is not None:
             sigma_a, reduced, scattering = (np.full(len(starts), value) for value in _coefficients_of(medium))
-            return OpticalPaths(np.arange(len(starts)), zeros, lengths, sigma_a, reduced, scattering)
+            every = np.arange(len(starts))
+            return OpticalPaths(Pieces(every, zeros, lengths, 0 * every), sigma_a, reduced, scattering)
         varying = [region for region, medium in self.by_label.items() if not isinstance(medium, Medium)]
         partition = self.partition
         if len(self.media) == 1:

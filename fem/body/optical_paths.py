@@ -28,23 +28,18 @@ LocalCoefficients = Callable[[int, FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class OpticalPaths:
-    """Paths (r,) divided into pieces (p,) with constant coefficients, sorted by path and along each path.
+    """Paths (r,) divided into pieces (p,) with constant coefficients.
 
     Parameters
     ----------
-    rays : (p,) ndarray
-        The path of each piece; every path has at least one.
-    enter, leave : (p,) ndarray
-        Ends of each piece, as distances along its path, unit.
+    pieces : Pieces
     sigma_a, reduced_scattering, scattering : (p,) ndarray
         Absorption, reduced scattering, and delta-Eddington scattering sigma_s*, 1/unit.
     error : float
         Bound of the error of the optical depth of sigma_t' where coefficients vary, weighted by the transmitted share.
     """
 
-    rays: IntArray
-    enter: FloatArray
-    leave: FloatArray
+    pieces: Pieces
     sigma_a: FloatArray
     reduced_scattering: FloatArray
     scattering: FloatArray
@@ -54,7 +49,7 @@ class OpticalPaths:
     def total_depths(self) -> FloatArray:
         """Optical depth of each whole path, the integral of sigma_t', (r,)."""
         extinction = self.sigma_a + self.reduced_scattering
-        return np.asarray(np.bincount(self.rays, extinction * (self.leave - self.enter)), dtype=float)
+        return np.asarray(np.bincount(self.pieces.rays, extinction * self.pieces.lengths), dtype=float)
 
     def distances_at(self, depths: FloatArray, *, delta_eddington: bool = False) -> FloatArray:
         """Distances along the paths at which given optical depths are reached.
@@ -72,10 +67,11 @@ class OpticalPaths:
             unit.
         """
         extinction = self.sigma_a + (self.scattering if delta_eddington else self.reduced_scattering)
-        before = _depths_before(self.rays, extinction * (self.leave - self.enter))
-        passed = np.bincount(self.rays[before <= depths[self.rays]], minlength=len(depths))
-        piece = np.searchsorted(self.rays, np.arange(len(depths))) + np.maximum(passed, 1) - 1
-        return np.asarray(self.enter[piece] + (depths - before[piece]) / extinction[piece])
+        rays = self.pieces.rays
+        before = depths_before(rays, extinction * self.pieces.lengths)
+        passed = np.bincount(rays[before <= depths[rays]], minlength=len(depths))
+        piece = np.searchsorted(rays, np.arange(len(depths))) + np.maximum(passed, 1) - 1
+        return np.asarray(self.pieces.enter[piece] + (depths - before[piece]) / extinction[piece])
 
     @property
     def albedo(self) -> FloatArray:
@@ -84,12 +80,12 @@ class OpticalPaths:
         It is the mean of the reduced albedo weighted by that loss, ``∫ alpha' e^-tau dtau / ∫ e^-tau dtau``, and in one
         medium the reduced albedo itself.
         """
-        extinction = self.sigma_a + self.reduced_scattering
-        depth = extinction * (self.leave - self.enter)
-        lost = np.exp(-_depths_before(self.rays, depth)) * -np.expm1(-depth)
-        total = np.bincount(self.rays, lost)
-        scattered = np.bincount(self.rays, lost * self.reduced_scattering / extinction)
-        first = np.searchsorted(self.rays, np.arange(len(total)))
+        extinction, rays = self.sigma_a + self.reduced_scattering, self.pieces.rays
+        depth = extinction * self.pieces.lengths
+        lost = np.exp(-depths_before(rays, depth)) * -np.expm1(-depth)
+        total = np.bincount(rays, lost)
+        scattered = np.bincount(rays, lost * self.reduced_scattering / extinction)
+        first = np.searchsorted(rays, np.arange(len(total)))
         # A path of length 0 loses nothing: take the albedo of its first piece.
         of_first = self.reduced_scattering[first] / extinction[first]
         return np.asarray(np.where(total > 0, scattered / np.where(total > 0, total, 1.0), of_first))
@@ -128,7 +124,7 @@ def paths_of(
         means, ranges = np.repeat(means, counts, axis=1), np.repeat(ranges, counts)
         means[:, new], ranges[new] = integrand.means_and_ranges(pieces.select(new))
     error = float(_weigh_by_transmission(pieces, means, ranges).max(initial=0.0))
-    return OpticalPaths(pieces.rays, pieces.enter, pieces.leave, means[0], means[1], means[2], error)
+    return OpticalPaths(pieces, *means, error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,11 +140,11 @@ class _Integrand:
         values = self._values(pieces)
         spread = np.ptp(values, axis=2)
         largest = np.maximum(np.ptp(values[0] + values[1], axis=1), spread[1])
-        return values @ _SIMPSON, (pieces.leave - pieces.enter) * largest
+        return values @ _SIMPSON, pieces.lengths * largest
 
     def _values(self, pieces: Pieces) -> FloatArray:
         """Coefficients at the ends and quarters of each piece, (3, p, 5)."""
-        along = pieces.enter[:, None] + np.linspace(0.0, 1.0, 5) * (pieces.leave - pieces.enter)[:, None]
+        along = pieces.enter[:, None] + np.linspace(0.0, 1.0, 5) * pieces.lengths[:, None]
         points = self.starts[pieces.rays, None] + along[:, :, None] * self.directions[pieces.rays, None]
         values = np.empty((3, len(pieces.rays), 5))
         for region in np.unique(pieces.regions).tolist():
@@ -159,8 +155,8 @@ class _Integrand:
 
 def _weigh_by_transmission(pieces: Pieces, means: FloatArray, ranges: FloatArray) -> FloatArray:
     """Ranges (p,) times the share of the light that reaches each piece."""
-    depths = (means[0] + means[1]) * (pieces.leave - pieces.enter)
-    return ranges * np.exp(-_depths_before(pieces.rays, depths))
+    depths = (means[0] + means[1]) * pieces.lengths
+    return ranges * np.exp(-depths_before(pieces.rays, depths))
 
 
 def _halve(pieces: Pieces, halved: BoolArray) -> tuple[Pieces, IntArray]:
@@ -184,12 +180,24 @@ def _grade(pieces: Pieces, varies: BoolArray) -> Pieces:
     place = np.arange(len(owner)) - first[owner]
     low = np.where(varies[owner], np.concatenate([[0.0], shares])[place], 0.0)
     high = np.where(varies[owner], shares[place], 1.0)
-    enter, length = pieces.enter[owner], (pieces.leave - pieces.enter)[owner]
+    enter, length = pieces.enter[owner], pieces.lengths[owner]
     return Pieces(pieces.rays[owner], enter + low * length, enter + high * length, pieces.regions[owner])
 
 
-def _depths_before(rays: IntArray, depths: FloatArray) -> FloatArray:
-    """Sum of the depths of the pieces before each one on its own path, (p,)."""
+def depths_before(rays: IntArray, depths: FloatArray) -> FloatArray:
+    """Sum the depths of the pieces before each one on its own path.
+
+    Parameters
+    ----------
+    rays : (p,) ndarray
+        The path of each piece, ascending.
+    depths : (p,) ndarray
+        Optical depth of each piece, along each path.
+
+    Returns
+    -------
+    (p,) ndarray
+    """
     total = np.cumsum(depths)
     before = total - depths
     first = np.diff(rays, prepend=-1) > 0

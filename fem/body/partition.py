@@ -40,6 +40,11 @@ class Pieces:
     leave: FloatArray
     regions: IntArray
 
+    @property
+    def lengths(self) -> FloatArray:
+        """Length of each piece, (p,), unit."""
+        return self.leave - self.enter
+
     def select(self, numbers: IntArray) -> "Pieces":
         """Copies of the pieces with given numbers."""
         return Pieces(self.rays[numbers], self.enter[numbers], self.leave[numbers], self.regions[numbers])
@@ -94,7 +99,7 @@ class SurfacePartition:
         """See `Partition`."""
         crossings = [_crossings(surface, starts, directions) for surface in self.surfaces]
         edges = [np.zeros((len(starts), 1)), lengths[:, None], *(distances for distances, _ in crossings)]
-        rays, enter, leave = _between(np.hstack(edges), begins, lengths)
+        rays, enter, leave = _pieces_between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         regions = np.zeros(len(rays), dtype=np.int64)
         for region in by_volume(self.surfaces):
@@ -128,7 +133,7 @@ class MeshPartition:
             regions = np.where(cells >= 0, self.mesh.regions[cells], -1)
             changes = np.flatnonzero((np.diff(regions) != 0) & (np.diff(paths) == 0)) + 1
             edges.append(_pad_rows(paths[changes], enter[changes], len(starts)))
-        rays, enter, leave = _between(np.hstack(edges), begins, lengths)
+        rays, enter, leave = _pieces_between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         return Pieces(rays, enter, leave, self.region_at(starts[rays] + middles[:, None] * directions[rays]))
 
@@ -161,7 +166,9 @@ def _crossings(surface: Surface, starts: FloatArray, directions: FloatArray) -> 
     return np.column_stack(distances), np.column_stack(signs)
 
 
-def _between(edges: FloatArray, begins: FloatArray, lengths: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
+def _pieces_between(
+    edges: FloatArray, begins: FloatArray, lengths: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """Paths (p,) and ends (p,) of the pieces between edges (r, e); the first two edges of a path are its own ends."""
     within = (edges > begins[:, None]) & (edges < lengths[:, None])
     edges = np.sort(np.where(within, edges, lengths[:, None]), axis=1)

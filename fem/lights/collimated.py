@@ -13,7 +13,7 @@ from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.illumination import ENTRY_RAYS, illumination_resolution
 from tetlux.fem.lights.spots import IMMUTABLE_SPOTS, Spot
 from tetlux.fem.lights.spots.plane import sunflower
-from tetlux.fem.lights.spots.triangles import sample_spot, split_for_spot
+from tetlux.fem.lights.spots.triangles import area_vectors, sample_spot, split_for_spot
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
@@ -168,8 +168,7 @@ class CollimatedBeam:
 
     def _sample_pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Place, power at an irradiance of 1, and distance that light has travelled, for pieces of facets (p, 3, 3)."""
-        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        projected_areas = -0.5 * sides @ direction
+        projected_areas = -area_vectors(corners) @ direction
         if self.spot is None:
             return corners.mean(axis=1), projected_areas, np.full(len(corners), np.inf)
         points, brightness = sample_spot(self.spot, corners, direction)

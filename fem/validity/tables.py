@@ -14,8 +14,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 ALBEDOS = (0.6, 0.9, 0.99)
 COSINES = (0.0, 0.8)
 INDICES = (1.0, 1.4)
-# Near the entry of a thin beam that is deposited at a point: by mean cosine of scattering, albedo, and ring of distances
-# from the entry. Each value is the largest error from that ring on, since the error changes its sign in between.
+# Near the entry of a thin beam that is deposited at a point: by mean cosine of scattering, albedo, and ring of
+# distances from the entry. Each value is the largest error from that ring on, since the error changes its sign.
 NEAR_RINGS = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0)
 BEAM = (
     ((1.00, 1.00, 1.00, 1.00, 0.69, 0.27), (0.73, 0.49, 0.49, 0.49, 0.38, 0.24), (0.70, 0.30, 0.30, 0.30, 0.23, 0.13)),
