@@ -124,7 +124,7 @@ def paths_of(
         means, ranges = np.repeat(means, counts, axis=1), np.repeat(ranges, counts)
         means[:, new], ranges[new] = integrand.means_and_ranges(pieces.select(new))
     error = float(_weigh_by_transmission(pieces, means, ranges).max(initial=0.0))
-    return OpticalPaths(pieces, *means, error)
+    return OpticalPaths(pieces, means[0], means[1], means[2], error)
 
 
 @dataclass(frozen=True, eq=False)
