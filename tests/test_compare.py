@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 
 from tests.conftest import TISSUE
-from tetlux.cases.compare.comparison import NAMES, source_model
+from tetlux.cases.compare.comparison import NAMES, describe_source_model
 from tetlux.cases.compare.differences import MEANINGS, compare
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import ClosedForm
 from tetlux.cases.run import run_case
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
@@ -98,7 +99,7 @@ def test_a_wrong_exitance_is_seen(ball_solution: Solution, tmp_path: Path) -> No
 
 
 def test_the_source_model_is_given_a_figure() -> None:
-    assert "would change the exitance" in source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
+    assert "would change the exitance" in describe_source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
 
 
 @pytest.mark.parametrize(
@@ -107,10 +108,10 @@ def test_the_source_model_is_given_a_figure() -> None:
         (
             "[robin, images, dipole]",
             "[series]",
-            r'line 7: compare: "series" is no closed form',
+            r'line 7: compare: there is no closed form "series"',
         ),
-        ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*there is none for a torus"),
-        ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms here are those of point sources"),
+        ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*a torus has none"),
+        ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms exist for point sources only"),
         (
             "origin: [3, 0, 10]",
             "origin: [29, 0, 10]",

@@ -1,4 +1,4 @@
-"""The stress map in words: the worst figures by panel and variant, what breaks where, and what is refused."""
+"""The stress map as text: the worst figures by panel and variant, broken rules, and refused scenarios."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -27,14 +27,14 @@ HEADS = (
 
 
 NOTE = (
-    "Lowest fluence is by the largest, where the source has no first moment; overshoot is over the bound of the "
-    "maximum principle; the ledger is by the incident power; largest error is the relative L2 error of the exitance "
-    "against a closed form; iterations of 0 are direct solutions."
+    "Lowest fluence is relative to the largest, for sources without a first moment; overshoot is relative to the bound "
+    "of the maximum principle, ledger to the incident power; largest error is the relative L2 error of the exitance "
+    "against a closed form; 0 iterations mean a direct solver."
 )
 
 
 def as_markdown(trials: Sequence[Trial]) -> str:
-    """The table and what is to be read with it, as Markdown."""
+    """Write the whole report as Markdown."""
     groups = list(_groups(trials))
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|" + "---:|" * (len(HEADS) - 2)]
     lines += [f"| {' | '.join(_row(group))} |" for group in groups]
@@ -55,7 +55,7 @@ def _times(count: int) -> str:
 
 
 def _groups(trials: Sequence[Trial]) -> Iterator[list[Trial]]:
-    """Trials of one panel and one variant."""
+    """Group trials by panel and variant."""
     for name in dict.fromkeys(trial.panel.name for trial in trials):
         here = [trial for trial in trials if trial.panel.name == name]
         for variant in dict.fromkeys(trial.variant.name for trial in here):
@@ -89,7 +89,7 @@ def _row(group: list[Trial]) -> list[str]:
 
 
 def _ranges(group: list[Trial]) -> Iterator[str]:
-    """By rule: how many trials break it, and between which values of the axes."""
+    """Report for each rule how many trials break it, and the range of their axis values."""
     rules = dict.fromkeys(rule for trial in group for rule in broken_rules(trial))
     for rule in rules:
         here = [trial for trial in group if rule in broken_rules(trial)]
@@ -110,7 +110,7 @@ def _range(axis: Axis, values: list[Value]) -> str:
 
 
 def _place(trial: Trial) -> str:
-    """The place of a trial on the map."""
+    """Describe the position of a trial on the map."""
     values = ((trial.panel.x, trial.x), (trial.panel.y, trial.y))
     where = ", ".join(_range(axis, [value]) for axis, value in values)
     return f"{trial.panel.name}, {trial.variant.name}, at {where}"

@@ -11,7 +11,7 @@ from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import by_volume, region_at
+from tetlux.meshing.tets.regions import region_at, sort_by_volume
 
 # Crossings of a path with the surface of one region, at most.
 MOST_CROSSINGS = 200
@@ -102,7 +102,7 @@ class SurfacePartition:
         rays, enter, leave = _pieces_between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         regions = np.zeros(len(rays), dtype=np.int64)
-        for region in by_volume(self.surfaces):
+        for region in sort_by_volume(self.surfaces):
             distances, signs = crossings[region - 1]
             # A point is inside if the path leaves the region once more than it enters it from there on.
             inside = (signs[rays] * (distances[rays] > middles[:, None])).sum(axis=1) > 0

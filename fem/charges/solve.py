@@ -11,7 +11,7 @@ from tetlux.fem.charges.adapt import MOST
 from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.split import check_list
-from tetlux.fem.labelled import GivenMedia
+from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium

@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
