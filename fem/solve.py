@@ -17,7 +17,7 @@ from tetlux.fem.notes import notes_on
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes, media_by_channel
-from tetlux.fem.sources.deposit import Light
+from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

@@ -15,12 +15,15 @@ from tetlux.fem import (
     Disc,
     Emission,
     EnvironmentLight,
+    Ledger,
     Light,
     Medium,
+    MeshHints,
     PencilBeam,
     PointSource,
     Region,
     Solution,
+    SourceTerms,
     VaryingMedium,
     solve,
 )
@@ -116,7 +119,8 @@ class Wire:
     def deposit_in(self, body: Body) -> Deposit:
         points = np.column_stack([np.linspace(-4.0, 4.0, 9), np.zeros(9), np.full(9, -2.0)])
         finest = float(body.mean_free_paths(points).min())
-        return Deposit(incident=1.0, points=points, powers=np.full(9, 1.0 / 9.0), resolution=finest)
+        terms = SourceTerms(points=points, powers=np.full(9, 1.0 / 9.0))
+        return Deposit(Ledger(incident=1.0), terms, MeshHints(resolution=finest))
 
 
 def test_a_light_of_ones_own_is_told_the_medium_of_each_place() -> None:
@@ -125,7 +129,7 @@ def test_a_light_of_ones_own_is_told_the_medium_of_each_place() -> None:
     assert one.power.incident == 1.0
     assert abs(one.power.balance_error) < 1e-12
     deposit = Wire().deposit_in(Body(plate(0.0, 8.0), (CLEAR, DENSE), SurfacePartition([ABOVE])))
-    assert deposit.resolution == pytest.approx(DENSE.mean_free_path)
+    assert deposit.hints.resolution == pytest.approx(DENSE.mean_free_path)
 
 
 Depth = Callable[[FloatArray, FloatArray], FloatArray]
@@ -133,7 +137,7 @@ Depth = Callable[[FloatArray, FloatArray], FloatArray]
 
 def deposited(media: tuple[AnyMedium, ...], light: Light, *surfaces: Surface) -> tuple[FloatArray, FloatArray]:
     deposit = light.deposit_in(Body(plate(0.0, 8.0), media, SurfacePartition(surfaces)))
-    return deposit.points, deposit.powers
+    return deposit.terms.points, deposit.terms.powers
 
 
 @pytest.mark.parametrize("thickness", [1e-3, 0.1, 0.4, 0.6, 3.0])
@@ -178,7 +182,7 @@ def test_half_the_optical_depth_of_a_thin_body() -> None:
     body = box((16.0, 16.0, 0.6), center=(0.0, 0.0, -0.3))
     partition = SurfacePartition([plate(0.0, 0.2)])
     deposit = PencilBeam((0.0, 0.0, 5.0), DOWN).deposit_in(Body(body, (CLEAR, DENSE), partition))
-    assert deposit.points[0, 2] == pytest.approx(-0.5 * (0.2 * 2.05 + 0.4 * 0.402) / 2.05, abs=1e-9)
+    assert deposit.terms.points[0, 2] == pytest.approx(-0.5 * (0.2 * 2.05 + 0.4 * 0.402) / 2.05, abs=1e-9)
     assert "less than two mean free paths" in deposit.warnings[0]
 
 

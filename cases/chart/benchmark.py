@@ -9,7 +9,7 @@ from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.file.case import Case
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact.registry import ideal_sources
-from tetlux.fem.grading import lit_points
+from tetlux.fem.grading import places_to_resolve
 from tetlux.fem.lights import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError
@@ -48,13 +48,14 @@ class Benchmark:
 
     @property
     def lit(self) -> tuple[FloatArray, FloatArray]:
-        """Points where light is deposited, and the lengths to resolve there; see `tetlux.fem.grading.lit_points`."""
-        return lit_points(self.deposits)
+        """Points where light is deposited, and lengths to resolve there; see `tetlux.fem.grading.places_to_resolve`."""
+        return places_to_resolve(self.deposits)
 
     @property
     def sources(self) -> list[tuple[FloatArray, float]]:
         """Positions (3,) and powers, W, of all point deposits."""
-        return [(point, float(power)) for d in self.deposits for point, power in zip(d.points, d.powers, strict=True)]
+        terms = [deposit.terms for deposit in self.deposits]
+        return [(point, float(power)) for t in terms for point, power in zip(t.points, t.powers, strict=True)]
 
     @property
     def has_point_sources(self) -> bool:
@@ -79,7 +80,7 @@ def prepare_benchmark(case: Case, *, quick: bool = False) -> Benchmark:
         raise RunError("a chart needs one channel and one uniform medium; leave lists, regions and fields out.")
     surface, medium = case.surface, case.medium
     deposits = [light.deposit_in(Body(surface, (medium,))) for light in case.lights]
-    samples = surface_samples(surface, *lit_points(deposits))
+    samples = surface_samples(surface, *places_to_resolve(deposits))
     referenced = closed_form_reference(surface.shape, medium, deposits, samples)
     if referenced is None:
         # Triangles may stand for a smooth surface: move the samples onto it.

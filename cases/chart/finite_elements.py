@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.methods import Method, Outcome, fastest_run
-from tetlux.fem.grading import graded_towards
+from tetlux.fem.grading import grade_mesh
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
@@ -68,7 +68,7 @@ def _uniform_mesh(_benchmark: Benchmark, surface: Surface, refinements: float) -
 def graded_mesh(benchmark: Benchmark, surface: Surface, longest: float) -> TetMesh:
     """Make a mesh whose edges are at most `longest` times their distance from the light."""
     mesh = tetrahedralize(surface, cache=False)
-    return graded_towards(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest)
+    return grade_mesh(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest)
 
 
 def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:

@@ -46,7 +46,7 @@ def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) 
     ----------
     surface : Surface
     lit, resolutions : (s, 3), (s,) ndarray
-        Points where light is deposited, and the lengths to resolve there: see `tetlux.fem.grading.lit_points`.
+        Points where light is deposited, and the lengths to resolve there: see `tetlux.fem.grading.places_to_resolve`.
 
     Returns
     -------

@@ -98,7 +98,7 @@ def comparison_for(shape: Shape | None, medium: Medium, deposits: list[Deposit],
             raise
         raise InputError(error.text, remedy=f"{error.remedy}, or leave compare out") from error
     forms = {name: known[name] for name in names}
-    scattered_from_beam = any(d.specular > 0 or d.absorbed > 0 for d in deposits)
+    scattered_from_beam = any(d.ledger.specular > 0 or d.ledger.absorbed > 0 for d in deposits)
     note = "All use the same sources, isotropic points."
     return Comparison(
         _coordinate(shape, sources),

@@ -12,7 +12,7 @@ from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, Pe
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light
 from tetlux.fem.exact.registry import closed_forms
-from tetlux.fem.grading import lit_points
+from tetlux.fem.grading import places_to_resolve
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Sphere
@@ -80,7 +80,7 @@ def medium_for_decay(decay: float) -> Medium:
 
 def _samples(surface: Surface, medium: Medium, light: Light) -> Samples:
     """Sample a surface; samples of a ball are moved from its triangles to the exact sphere."""
-    samples = surface_samples(surface, *lit_points([light.deposit_in(Body(surface, (medium,)))]))
+    samples = surface_samples(surface, *places_to_resolve([light.deposit_in(Body(surface, (medium,)))]))
     return project_to_sphere(samples, surface.shape) if isinstance(surface.shape, Sphere) else samples
 
 
@@ -145,7 +145,7 @@ def diffuse_by_core_absorption_and_radius(absorption: float, radius: float) -> S
     """A ball of radius 10 and albedo .99 with a core, by the core's sigma_a over sigma_s' and its radius."""
     shell, core = medium_of_albedo(0.99), Medium(sigma_a=absorption, sigma_s_prime=1.0, eta=INDEX)
     surface, light, outer = shapes.sphere(10.0), DiffuseLight(1.0), 10.0
-    transmitted = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
+    transmitted = light.deposit_in(Body(surface, (shell,))).terms.transmitted_irradiance
     value = transmitted * concentric.diffuse_exitance(core, shell, core_radius=radius, radius=outer)
     truth = _uniform_truth(_samples(surface, shell, light), float(value))
     regions = (Region(shapes.sphere(radius), core),)
@@ -185,7 +185,7 @@ def beam_by_g_and_index(g: float, eta: float) -> Scenario:
     surface = shapes.sphere(radius)
     light = PencilBeam((0.0, 0.0, 2.0 * radius), (0.0, 0.0, -1.0), deposit="line")
     deposit = light.deposit_in(Body(surface, (medium,)))
-    entered = deposit.incident - deposit.specular
+    entered = deposit.ledger.incident - deposit.ledger.specular
     samples = _samples(surface, medium, light)
     samples = samples.where(np.hypot(*samples.points[:, :2].T) > medium.mean_free_path)
     truth = _truth_by_angle(
@@ -229,7 +229,7 @@ def two_balls(
     inner = CORE_LAYERS / LAYERS * radius
     surface, light, bound = shapes.sphere(radius), _light_of_two_balls(light_kind), None
     if light_kind == "diffuse":
-        transmitted = light.deposit_in(Body(surface, (shell,))).transmitted_irradiance
+        transmitted = light.deposit_in(Body(surface, (shell,))).terms.transmitted_irradiance
         value = transmitted * concentric.diffuse_exitance(core, shell, core_radius=inner, radius=radius)
         bound = 4.0 * shell.eta**2
     else:

@@ -12,7 +12,7 @@ from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.subdivide import quartered
@@ -57,7 +57,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     PatchTerms
     """
     mesh, charges, medium = patch.mesh, patch.charges, patch.charges.medium
-    sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
+    sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
     if not patch.cells.any():
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.ballistic.follow import optical_depths
+from tetlux.fem.ballistic.extinction import optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.tets.march import march

@@ -132,8 +132,9 @@ class Validity:
         return [self._entry_of(deposit) for deposit in self.deposits]
 
     def _entry_of(self, deposit: Deposit) -> "_Entry":
-        sources = len(deposit.entries) == 0
-        places = deposit.points if sources else deposit.entries
+        footprint = deposit.footprint
+        sources = len(footprint.entries) == 0
+        places = deposit.terms.points if sources else footprint.entries
         if len(places) == 0:
             return _Entry(None, self.below[np.zeros(0, dtype=np.int64)], np.inf, np.zeros((0, 6)))
         if sources:
@@ -144,9 +145,9 @@ class Validity:
             media = self.below[self.mesh.closest_boundary(places)[1]]
         # The deposit of a thin beam in one point is at fault itself where scattering is isotropic; a line is as good
         # there as either is where scattering is forward.
-        as_points = deposit.beams_as_points
+        as_points = footprint.beams_as_points
         rows = near_rows(media.albedo, None if sources else media.cosine if as_points else np.ones(len(places)))
-        breadth = deposit.breadth
+        breadth = footprint.radius
         if breadth is None:
             breadth = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
         return _Entry(cKDTree(places), media, breadth, rows, as_points and not sources)

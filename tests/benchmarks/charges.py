@@ -69,7 +69,7 @@ class Scene:
 
 def lit(name: str, surface: Surface, medium: Medium, beam: PencilBeam, radius: float | None = None) -> Scene:
     """A pencil beam as a point."""
-    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).points, radius)
+    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).terms.points, radius)
 
 
 def named(files: list[str]) -> list[Scene]:

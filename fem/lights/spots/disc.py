@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import beyond, squared, sunflower, with_middle
-from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.fem.lights.spots.plane import distances_to_disc, prepend_center, squared_distances, sunflower
+from tetlux.fem.lights.spots.spot import EDGE_SHARE, check_length
 from tetlux.meshing.arrays import FloatArray, Vector
 
 
@@ -41,9 +41,9 @@ class Disc:
         return self.radius / 2.0
 
     @property
-    def edge(self) -> float:
+    def edge_size(self) -> float:
         """See `Spot`."""
-        return 2.0 * EDGE * self.radius
+        return 2.0 * EDGE_SHARE * self.radius
 
     @property
     def area(self) -> float:
@@ -52,12 +52,12 @@ class Disc:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return np.where(squared(offsets, direction) <= self.radius**2, 1.0, 0.0)
+        return np.where(squared_distances(offsets, direction) <= self.radius**2, 1.0, 0.0)
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return beyond(offsets, direction, self.reach)
+        return distances_to_disc(offsets, direction, self.reach)
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return with_middle(sunflower(count, self.reach, direction))
+        return prepend_center(sunflower(count, self.reach, direction))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import beyond, squared, sunflower, with_middle
+from tetlux.fem.lights.spots.plane import distances_to_disc, prepend_center, squared_distances, sunflower
 from tetlux.fem.lights.spots.spot import check_length
 from tetlux.meshing.arrays import FloatArray, Vector
 
@@ -43,7 +43,7 @@ class Gaussian:
         """See `Spot`."""
         return self.radius / 4.0
 
-    edge = math.inf
+    edge_size = math.inf
 
     @property
     def area(self) -> float:
@@ -52,14 +52,14 @@ class Gaussian:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        across = squared(offsets, direction)
+        across = squared_distances(offsets, direction)
         share = np.exp(-2.0 * across / self.radius**2)
         return np.where(across <= self.reach**2, share, 0.0)
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return beyond(offsets, direction, self.reach)
+        return distances_to_disc(offsets, direction, self.reach)
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return with_middle(sunflower(count, self.reach, direction))
+        return prepend_center(sunflower(count, self.reach, direction))

@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import axes, outside, scattered
-from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.fem.lights.spots.plane import distances_to_rectangle, low_discrepancy, right_and_up
+from tetlux.fem.lights.spots.spot import EDGE_SHARE, check_length
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -91,9 +91,9 @@ class Image:
         return float(min(self.height / max(rows, 4), self.width / max(columns, 4)))
 
     @property
-    def edge(self) -> float:
+    def edge_size(self) -> float:
         """See `Spot`."""
-        return EDGE * min(self.width, self.height)
+        return EDGE_SHARE * min(self.width, self.height)
 
     @property
     def area(self) -> float:
@@ -102,7 +102,7 @@ class Image:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        right, up = axes(direction, self.up)
+        right, up = right_and_up(direction, self.up)
         rows, columns = self._coarse.shape
         row = np.floor((0.5 - (offsets @ up) / self.height) * rows).astype(np.int64)
         column = np.floor(((offsets @ right) / self.width + 0.5) * columns).astype(np.int64)
@@ -111,18 +111,18 @@ class Image:
         shares[inside] = self._coarse[row[inside], column[inside]]
         return shares
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return outside(offsets, axes(direction, self.up), (self.width, self.height))
+        return distances_to_rectangle(offsets, right_and_up(direction, self.up), (self.width, self.height))
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
         rows, columns = self._coarse.shape
         bright = np.flatnonzero(self._coarse.ravel() > 0)
         # In every bright pixel if there are few, else in some of each row.
         row, column = np.divmod(bright[np.arange(count) * len(bright) // count], columns)
-        within = scattered(count)
+        within = low_discrepancy(count)
         places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
-        return np.asarray(places * [self.width, self.height] @ np.stack(axes(direction, self.up)))
+        return np.asarray(places * [self.width, self.height] @ np.stack(right_and_up(direction, self.up)))
 
     __repr__ = one_line
