@@ -24,7 +24,7 @@ from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.solve import solve, solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
-from tetlux.meshing.notes import prefixed
+from tetlux.meshing.notes import add_prefix
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
@@ -200,7 +200,7 @@ def _warnings(results: Results) -> list[str]:
     return [
         *results.case.region_warnings,
         *(
-            warning if len(channels) == len(names) else prefixed(warning, f"in {' and '.join(channels)}: ")
+            warning if len(channels) == len(names) else add_prefix(warning, f"in {' and '.join(channels)}: ")
             for warning, channels in channels_by_warning.items()
         ),
     ]

@@ -14,7 +14,7 @@ from tetlux.fem.validity.notes import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Media by number or name of a label, each for one channel or a list for several.

@@ -26,7 +26,7 @@ from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import child as child_mesher
-from tetlux.meshing.mesher.cache import remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.cache import load_cached_mesh, store_cached_mesh
 
 CASE = """\
 name: ball
@@ -479,11 +479,11 @@ WRITER = """\
 import sys
 from pathlib import Path
 from tests.conftest import block
-from tetlux.meshing.mesher.cache import remember_mesh
+from tetlux.meshing.mesher.cache import store_cached_mesh
 
 while True:
     for number in (1, 2):
-        remember_mesh(str(number), Path(sys.argv[1]), block((20, 20, number), (1.0, 1.0, 1.0)))
+        store_cached_mesh(str(number), Path(sys.argv[1]), block((20, 20, number), (1.0, 1.0, 1.0)))
         print(number, flush=True)
 """
 
@@ -500,13 +500,13 @@ def test_a_cache_whose_writers_are_killed(tmp_path: Path) -> None:
                 time.sleep(0.007 * moment)
                 writer.kill()
             for key, size in sizes.items():
-                mesh = remembered_mesh(key, tmp_path, "mm")
+                mesh = load_cached_mesh(key, tmp_path, "mm")
                 assert mesh is None or len(mesh.tetrahedra) == size
         other.kill()
     for path in tmp_path.glob("*.part"):
         os.utime(path, (time.time() - 90_000,) * 2)
     for key in sizes:
-        remember_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
+        store_cached_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.npz", "2.npz"]
 
 

@@ -261,7 +261,7 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
         tested = [len(cells) for *_, cells in tree._near(segments.starts, segments.directions, segments.lengths)]
         # 2.7 and 2.1.
         assert sum(tested) < 4.0 * passed
-        assert max(tested) <= cell_tree.PORTION
+        assert max(tested) <= cell_tree.PAIRS_AT_ONCE
 
 
 def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:

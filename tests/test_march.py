@@ -241,7 +241,7 @@ def test_paths_that_end_outside_are_left_to_the_tree() -> None:
     assert load == pytest.approx(careful_load(mesh, FORWARD, segments), abs=CLOSE)
 
 
-@pytest.mark.parametrize("name", ["MOST_STALLS", "ASIDE"])
+@pytest.mark.parametrize("name", ["MOST_STALLS", "START_SLACK"])
 def test_paths_that_are_lost_are_left_to_the_tree(
     name: str, ball_mesh: TetMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -366,7 +366,7 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
 
 def test_only_so_many_parts_are_kept(ball_mesh: TetMesh, marches: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is looked through for every path; and what is marched to find a point is none."""
-    monkeypatch.setattr(path_cache, "MOST_PARTS", 3)
+    monkeypatch.setattr(path_cache, "MOST_CACHED_PARTS", 3)
     mesh = same_mesh(ball_mesh)
     several_segments = [from_facets(mesh, 20, seed) for seed in range(5)]
     for segments in several_segments:

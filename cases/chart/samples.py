@@ -8,8 +8,9 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface.solids import Sphere
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Exitance falls off like 1/r³ from the entry of light, so sampled pieces are no longer than PIECE times their distance
 # from the light, and no longer than LONGEST_PIECE times the body's diagonal.
@@ -63,7 +64,7 @@ def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) 
             limit = np.minimum(limit, PIECE * np.maximum(distance, 0.5 * resolutions[nearest]))
         small = longest_sides(corners) <= limit
         done.append((corners[small], normals[small]))
-        corners, normals = quartered(corners[~small]), np.repeat(normals[~small], 4, axis=0)
+        corners, normals = quarter_triangles(corners[~small]), np.repeat(normals[~small], 4, axis=0)
     pieces, of_pieces = (np.concatenate(parts) for parts in zip(*done, strict=True))
     across = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
     areas = 0.5 * np.linalg.norm(across, axis=1)

@@ -3,7 +3,8 @@
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface.surface import Surface, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 
 # Channels with these names in this order are shown as colours.
 RGB = ("red", "green", "blue")

@@ -14,7 +14,7 @@ from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.files.meshes import read_with_meshio
 from tetlux.meshing.host.filesystem import is_file, is_folder
-from tetlux.meshing.tets.given import unjoined
+from tetlux.meshing.tets.given import value_mesh
 
 # The largest value: single precision holds it and sums of many such values.
 LARGEST = 1e30
@@ -57,7 +57,9 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
         raise InputError(f'{path} holds no array "{name}"; the arrays there are: {known}.')
     try:
         # Nodes of other cells are left out: their values do not matter and may be invalid.
-        mesh, used = unjoined(scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks]))
+        mesh, used = value_mesh(
+            scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks])
+        )
         if name in data.point_data:
             return mesh_field(mesh, data.point_data[name][used], at="nodes")
         values = np.concatenate([data.cell_data[name][block] for block in blocks])

@@ -12,7 +12,7 @@ from tetlux.fem.ballistic.rays import Rays, join_rays
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 

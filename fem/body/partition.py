@@ -11,7 +11,7 @@ from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import by_volume, region_at
+from tetlux.meshing.tets.regions import region_at, sort_by_volume
 
 # A path crosses the surface of one region no more often than this.
 MOST_CROSSINGS = 200
@@ -89,7 +89,7 @@ class SurfacePartition:
         rays, enter, leave = _between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         regions = np.zeros(len(rays), dtype=np.int64)
-        for region in by_volume(self.surfaces):
+        for region in sort_by_volume(self.surfaces):
             distances, signs = crossings[region - 1]
             # Inside is what the path has yet to leave.
             inside = (signs[rays] * (distances[rays] > middles[:, None])).sum(axis=1) > 0

@@ -15,14 +15,15 @@ from tetlux.fem.lights.spots import IMMUTABLE_SPOTS, Spot
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.spots.triangles import sample_spot, split_for_spot
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.hints import MeshHints
 from tetlux.fem.sources.ledger import Ledger
-from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.surface import Surface, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Entries, at most, at which the penetration depth is computed.
@@ -160,9 +161,11 @@ class CollimatedBeam:
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= reach[lit]]
         facets, places = np.unique(facets[lit], return_inverse=True)
-        total = summed(places, powers[lit], len(facets))
+        total = sum_by_index(places, powers[lit], len(facets))
         # The power of all pieces of a facet starts at their centroid.
-        starts = np.column_stack([summed(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T])
+        starts = np.column_stack(
+            [sum_by_index(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T]
+        )
         directions = np.broadcast_to(direction, starts.shape)
         return Rays(starts, directions, total, mesh.boundary_cells[facets]), normals[facets]
 

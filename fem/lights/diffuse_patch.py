@@ -14,15 +14,16 @@ from tetlux.fem.lights.illumination import illumination_resolution
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.spots.triangles import triangle_samples
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.hints import MeshHints
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, Vector, summed
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Samples of the patch near which the mesh is fine.
@@ -142,12 +143,12 @@ def _areas_within(corners: FloatArray, radius: float) -> FloatArray:
     for split in range(MOST_SPLITS):
         distances, sizes = np.linalg.norm(corners, axis=2), longest_sides(corners)
         inside = distances.max(axis=1) <= radius
-        areas += summed(owner[inside], _areas(corners[inside]), len(areas))
+        areas += sum_by_index(owner[inside], _areas(corners[inside]), len(areas))
         crossed = ~inside & (distances.min(axis=1) <= radius + sizes)
         corners, owner, sizes = corners[crossed], owner[crossed], sizes[crossed]
         fine = sizes <= RIM_SHARE * radius if split < MOST_SPLITS - 1 else np.ones(len(sizes), dtype=bool)
-        areas += summed(owner[fine], _areas(corners[fine]) * _shares_within(corners[fine], radius), len(areas))
-        corners, owner = quartered(corners[~fine]), np.repeat(owner[~fine], 4)
+        areas += sum_by_index(owner[fine], _areas(corners[fine]) * _shares_within(corners[fine], radius), len(areas))
+        corners, owner = quarter_triangles(corners[~fine]), np.repeat(owner[~fine], 4)
         if len(corners) == 0:
             break
     return areas

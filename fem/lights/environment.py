@@ -12,11 +12,10 @@ from tetlux.fem.lights.diffuse import check_exact_boundary
 from tetlux.fem.lights.spots.image import check_pixels
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, Vector, summed
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -70,7 +69,8 @@ class EnvironmentLight:
         check_pixels(self.radiance)
         if np.linalg.norm(np.cross(unit_vector(self.up, "up"), unit_vector(self.front, "front"))) < 1e-6:
             raise InputError(
-                f"up and front of the environment are both along {as_text(self.up)}; give another front.", field="up"
+                f"up and front of the environment are both along {as_text(self.up)}; give another front.",
+                field="up",
             )
 
     @cached_property
@@ -78,8 +78,8 @@ class EnvironmentLight:
         """Unit vectors towards the light (d, 3), and the irradiance across each of them (d,), W/unit²."""
         towards, irradiance = self._pixels()
         nearest = np.asarray(cKDTree(_fibonacci_sphere(DIRECTIONS)).query(towards)[1])
-        total = summed(nearest, irradiance, DIRECTIONS)
-        mean = np.column_stack([summed(nearest, irradiance * axis, DIRECTIONS) for axis in towards.T])
+        total = sum_by_index(nearest, irradiance, DIRECTIONS)
+        mean = np.column_stack([sum_by_index(nearest, irradiance * axis, DIRECTIONS) for axis in towards.T])
         bright = total > 0
         return mean[bright] / np.linalg.norm(mean[bright], axis=1, keepdims=True), total[bright]
 

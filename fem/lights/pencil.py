@@ -18,11 +18,11 @@ from tetlux.fem.lights.spots import Disc
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.thin_line import line_of
 from tetlux.fem.lights.thin_points import points_of, shallowest_depth
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.ledger import Ledger
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface

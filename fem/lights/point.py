@@ -7,12 +7,12 @@ import numpy as np
 from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import as_vector, check_positive
 from tetlux.fem.lights.arrows import Arrows
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.hints import MeshHints
 from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import Vector
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 

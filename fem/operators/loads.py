@@ -16,7 +16,7 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
@@ -107,11 +107,11 @@ def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, point_cel
     if len(lost):
         cells[lost], weights[lost] = mesh.locate(points[lost])
     inside = cells >= 0
-    load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
+    load = sum_by_index(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
         # Between the surface and the mesh's facets, a hair outside the mesh.
         _, faces, corner = mesh.closest_boundary(points[~inside])
-        load += summed(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
+        load += sum_by_index(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
     return load
 
 

@@ -6,8 +6,8 @@ Offsets (q, 3) are relative to a point on the axis; `direction` is a unit vector
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.media.varying import as_text
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from tetlux.fem.lights.spots.plane import low_discrepancy
 from tetlux.fem.lights.spots.spot import Spot
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import longest_sides
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Splits in four of one triangle, at most.
 MOST_SPLITS = 16
@@ -53,7 +53,7 @@ def split_for_spot(spot: Spot, corners: FloatArray, direction: FloatArray) -> tu
         coarse &= split < MOST_SPLITS - 1
         pieces.append(corners[~coarse])
         owners.append(owner[~coarse])
-        corners, owner = quartered(corners[coarse]), np.repeat(owner[coarse], 4)
+        corners, owner = quarter_triangles(corners[coarse]), np.repeat(owner[coarse], 4)
         if len(corners) == 0:
             break
     return np.concatenate(pieces), np.concatenate(owners)
