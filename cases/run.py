@@ -72,6 +72,17 @@ def run_case(
     RunError
         If the mesher or the solver fails, memory runs out, another run is writing to the same folder, or the results
         cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tetlux.cases.file.load import load_cases
+    >>> from tetlux.cases.shipped import find_case_file
+    >>> (case,) = load_cases(find_case_file("sphere"))
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     folder = run_case(replace(case, outputs=()), Path(out))
+    ...     sorted(path.name for path in folder.iterdir())
+    ['compare.json', 'compare.png', 'summary.json']
     """
     started, target = time.perf_counter(), out / case.name
     try:
