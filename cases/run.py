@@ -131,7 +131,7 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
         solutions.append(solution)
-    seconds = {stage: sum(one.seconds[stage] for one in solutions) for stage in solutions[0].seconds}
+    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
@@ -185,6 +185,7 @@ def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureS
     case = results.case
     # Lights of all channels: one that is dark in the first may be bright in another.
     lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
+    inner = [region.surface for region in case.regions]
     return PictureScene(
         points=results.surface.points,
         triangles=results.surface.faces,
@@ -195,7 +196,9 @@ def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureS
         colours=results.preview if results.has_colours else None,
         up=case.up,
         toward=case.toward,
-        regions=tuple(RegionOutline(one.surface.name, one.surface.points, one.surface.faces) for one in case.regions),
+        regions=tuple(
+            RegionOutline(region.surface.name, region.surface.points, region.surface.faces) for region in case.regions
+        ),
         detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
     )
 

@@ -329,7 +329,7 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chart_module, "MESHLESS", LITTLE[:1])
     monkeypatch.setattr(chart_module, "FINITE_ELEMENTS", LITTLE[1:])
     monkeypatch.setattr(chart_module, "PEERS", ABSENT)
-    monkeypatch.setattr(chart_module, "monte_carlo_installed", lambda: False)
+    monkeypatch.setattr(chart_module, "has_monte_carlo", lambda: False)
     monkeypatch.setattr(chart_module, "_warm_up", lambda: None)
 
 
