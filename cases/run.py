@@ -185,7 +185,6 @@ def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureS
     case = results.case
     # Lights of all channels: one that is dark in the first may be bright in another.
     lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-    inner = [region.surface for region in case.regions]
     return PictureScene(
         points=results.surface.points,
         triangles=results.surface.faces,
