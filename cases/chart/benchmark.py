@@ -48,7 +48,7 @@ class Benchmark:
 
     @property
     def lit(self) -> tuple[FloatArray, FloatArray]:
-        """Points where light is deposited, and lengths to resolve there; see `tetlux.fem.grading.places_to_resolve`."""
+        """Points where light is deposited, and the lengths to resolve there; see `places_to_resolve`."""
         return places_to_resolve(self.deposits)
 
     @property
