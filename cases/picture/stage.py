@@ -179,10 +179,10 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     vertex = triangles.ravel()
     calm = np.flatnonzero(np.bincount(vertex)[vertex] <= MOST_NEIGHBOURS)
     at_vertex = csr_array((np.ones(len(calm)), (calm, vertex[calm])), shape=(count, int(vertex.max()) + 1))
-    one, other = (at_vertex @ at_vertex.T).tocoo().coords
-    alike = np.einsum("ij,ij->i", flat[owner[one]], flat[owner[other]]) > SHARP
-    one, other = one[alike], other[alike]
-    summed = csr_array((np.ones(len(one)), (one, owner[other])), shape=(count, len(triangles))) @ weighted
+    corner, other = (at_vertex @ at_vertex.T).tocoo().coords
+    alike = np.einsum("ij,ij->i", flat[owner[corner]], flat[owner[other]]) > SHARP
+    corner, other = corner[alike], other[alike]
+    summed = csr_array((np.ones(len(corner)), (corner, owner[other])), shape=(count, len(triangles))) @ weighted
     normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
     return np.asarray(unit(normals).reshape(-1, 3, 3))
 

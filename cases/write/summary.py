@@ -104,7 +104,7 @@ def _channel(
     }
     if several:
         lights = solutions_by_light(list(channel.lights), solution)
-        figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
+        figures["lights"] = [{"name": name, "power": _power(part.power)} for name, part in lights]
     return figures
 
 
