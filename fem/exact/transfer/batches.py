@@ -86,8 +86,8 @@ class Batches:
             specular=rows[:, kernel.SPECULAR],
             absorbed=rows[:, kernel.ABSORBED],
             ballistic=rows[:, kernel.BALLISTIC],
-            front=rows[:, kernel.LEDGER : kernel.LEDGER + bins],
-            back=rows[:, kernel.LEDGER + bins :],
+            front=rows[:, kernel.FIRST_BIN : kernel.FIRST_BIN + bins],
+            back=rows[:, kernel.FIRST_BIN + bins :],
         )
 
     def _run_batch(self, kernel: ModuleType, photons: int, seed: np.random.SeedSequence) -> FloatArray:

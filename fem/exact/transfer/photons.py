@@ -16,7 +16,7 @@ from tetlux.meshing.arrays import FloatArray, Vector
 # Kinds of light.
 PENCIL, BEAM, POINT = 0, 1, 2
 # The first entries of a tally; the bins of the front and of the back follow, each with one for values outside its bins.
-SPECULAR, ABSORBED, BALLISTIC, LEDGER = 0, 1, 2, 3
+SPECULAR, ABSORBED, BALLISTIC, FIRST_BIN = 0, 1, 2, 3
 # A packet below the first weight survives with the second probability.
 ROULETTE_WEIGHT, SURVIVAL = 0.01, 0.1
 
@@ -170,10 +170,10 @@ def trace(
 
     Returns
     -------
-    (LEDGER + 2 (b + 1),) ndarray
-        Sums of weights, see `LEDGER`.
+    (FIRST_BIN + 2 (b + 1),) ndarray
+        Sums of weights, see `FIRST_BIN`.
     """
-    tally = np.zeros(LEDGER + 2 * edges.size)
+    tally = np.zeros(FIRST_BIN + 2 * edges.size)
     for _ in range(photons):
         position, direction, specular = launch(rng, ball, size, light, depth, eta)
         tally[SPECULAR] += specular
@@ -212,7 +212,7 @@ def trace(
                 continue
             if scattered:
                 where = math.acos(min(max(normal[2], -1.0), 1.0)) if ball else math.hypot(position[0], position[1])
-                tally[LEDGER + (edges.size if back else 0) + bin_index(edges, where)] += weight
+                tally[FIRST_BIN + (edges.size if back else 0) + bin_index(edges, where)] += weight
             else:
                 tally[BALLISTIC] += weight
             weight = 0.0

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
@@ -34,10 +34,8 @@ def sunflower(count: int, radius: float, direction: FloatArray) -> FloatArray:
     """Places (count, 3) that cover a disc across a direction evenly, no two on one radius (Vogel 1979)."""
     index = np.arange(count)
     distance, angle = radius * np.sqrt((index + 0.5) / count), index * np.pi * (3.0 - np.sqrt(5.0))
-    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    across /= np.linalg.norm(across)
-    spread = np.outer(distance * np.cos(angle), across)
-    return np.asarray(spread + np.outer(distance * np.sin(angle), np.cross(direction, across)))
+    first, second = perpendicular_axes(direction)
+    return np.asarray(np.outer(distance * np.cos(angle), first) + np.outer(distance * np.sin(angle), second))
 
 
 def axes(direction: FloatArray, up: Vector) -> tuple[FloatArray, FloatArray]:
