@@ -160,8 +160,8 @@ def _in_sphere(shape: Sphere, medium: Medium, sources: IdealSources) -> list[Clo
 
     def series(points: FloatArray) -> FloatArray:
         def of_unit_power(position: FloatArray) -> FloatArray:
-            away, gamma = float(np.linalg.norm(position - center)), polar_angle(points, position, center)
-            return sphere.point_exitance(medium, radius=radius, source_radius=away, gamma=gamma)
+            distance, gamma = float(np.linalg.norm(position - center)), polar_angle(points, position, center)
+            return sphere.point_exitance(medium, radius=radius, source_radius=distance, gamma=gamma)
 
         return sources.sum_of_points(of_unit_power, len(points)) + uniform
 
@@ -225,8 +225,8 @@ def _in_cylinder(shape: Cylinder, medium: Medium, sources: IdealSources) -> list
         def of_unit_power(position: FloatArray) -> FloatArray:
             source = position - center
             theta = np.arctan2(x[:, 1], x[:, 0]) - math.atan2(source[1], source[0])
-            away, z = float(np.hypot(source[0], source[1])), x[:, 2] - source[2]
-            return cylinder.point_exitance(medium, radius=radius, source_radius=away, theta=theta, z=z)
+            distance, z = float(np.hypot(source[0], source[1])), x[:, 2] - source[2]
+            return cylinder.point_exitance(medium, radius=radius, source_radius=distance, theta=theta, z=z)
 
         return sources.sum_of_points(of_unit_power, len(points))
 
