@@ -215,7 +215,7 @@ def _check_depth(light: LightKind, depth: float | None, high: float, body: str) 
     if light not in ("pencil", "beam", "point"):
         raise InputError(f'light is "{light}"; it is "pencil", "beam" or "point".')
     if (light == "point") != (depth is not None):
-        raise InputError(f'light is "{light}" and depth is {depth}; a point needs a depth, a beam has none.')
+        raise InputError(f'light is "{light}" and depth is {depth}; a point needs its depth, a beam has none.')
     return 0.0 if depth is None else checks.number_within("depth", depth, 0.0, high, body)
 
 
