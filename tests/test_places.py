@@ -192,9 +192,9 @@ def test_optical_depth_in_coefficients_that_vary() -> None:
     ):
         body = Body(surface, (VaryingMedium(base=base, sigma_s_prime=sigma),))
         paths = body.paths(starts, directions, lengths)
-        assert paths.totals == pytest.approx(depth(lengths, cosines), rel=1e-3)
+        assert paths.total_depths == pytest.approx(depth(lengths, cosines), rel=1e-3)
         for wanted in (0.1, 1.0, 2.0):
-            assert depth(paths.place(np.full(8, wanted)), cosines) == pytest.approx(np.full(8, wanted), rel=1e-3)
+            assert depth(paths.distances_at(np.full(8, wanted)), cosines) == pytest.approx(np.full(8, wanted), rel=1e-3)
         assert paths.error <= 2e-3
         assert paths.albedo == pytest.approx(np.ones(8))
 
@@ -210,7 +210,7 @@ def test_a_mesh_knows_its_regions_as_their_surfaces_do() -> None:
     # Facets of the mesh lie up to 0.2 beside the core's surface, and what grazes it may meet the core or not.
     smaller, larger = (SurfacePartition([sphere(radius, subdivisions=3)]) for radius in (4.7, 5.1))
     least, found, most = (
-        Body(body, (CLEAR, DENSE), partition).paths(starts, directions, np.full(40, 9.0)).totals
+        Body(body, (CLEAR, DENSE), partition).paths(starts, directions, np.full(40, 9.0)).total_depths
         for partition in (smaller, MeshPartition(mesh), larger)
     )
     assert (least <= found + 1e-9).all()

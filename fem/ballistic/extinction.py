@@ -3,6 +3,7 @@
 import numpy as np
 
 from tetlux.fem.ballistic.rays import Rays
+from tetlux.fem.body.optical_paths import depths_before
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.cell_tree import PathSegments
@@ -30,12 +31,8 @@ def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: In
         return np.asarray(extinction * part.enter)
     depth = at_cells(extinction, cells) * (part.leave - part.enter)
     order = np.lexsort((part.enter, part.paths))
-    total = np.cumsum(depth[order])
-    before = total - depth[order]
-    first = np.diff(part.paths[order], prepend=-1) > 0
-    before -= before[first][np.cumsum(first) - 1]
-    result = np.empty(len(before))
-    result[order] = before
+    result = np.empty(len(depth))
+    result[order] = depths_before(part.paths[order], depth[order])
     return result
 
 

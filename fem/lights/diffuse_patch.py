@@ -12,7 +12,7 @@ from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.diffuse import diffuse_transmittance
 from tetlux.fem.lights.illumination import illumination_resolution
 from tetlux.fem.lights.spots.plane import sunflower
-from tetlux.fem.lights.spots.triangles import triangle_samples
+from tetlux.fem.lights.spots.triangles import area_vectors, triangle_samples
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
@@ -156,8 +156,7 @@ def _areas_within(corners: FloatArray, radius: float) -> FloatArray:
 
 def _areas(corners: FloatArray) -> FloatArray:
     """Areas of triangles (f, 3, 3), (f,)."""
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(sides, axis=1))
+    return np.asarray(np.linalg.norm(area_vectors(corners), axis=1))
 
 
 def _shares_within(corners: FloatArray, radius: float) -> FloatArray:

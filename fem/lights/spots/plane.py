@@ -10,6 +10,9 @@ from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
+# The golden angle, 137.5 degrees, in half turns: points that differ by it spread evenly around a circle.
+GOLDEN_ANGLE = 3.0 - np.sqrt(5.0)
+
 
 def low_discrepancy(count: int) -> FloatArray:
     """Points (count, 2) of the unit square, spread evenly also along each axis (Roberts' R2 sequence)."""
@@ -20,7 +23,7 @@ def low_discrepancy(count: int) -> FloatArray:
 def sunflower(count: int, radius: float, direction: FloatArray) -> FloatArray:
     """Offsets (count, 3) spread evenly over a disc across a direction, by the golden angle (Vogel 1979)."""
     index = np.arange(count)
-    distance, angle = radius * np.sqrt((index + 0.5) / count), index * np.pi * (3.0 - np.sqrt(5.0))
+    distance, angle = radius * np.sqrt((index + 0.5) / count), index * np.pi * GOLDEN_ANGLE
     across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
     across /= np.linalg.norm(across)
     first = np.outer(distance * np.cos(angle), across)
