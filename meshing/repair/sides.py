@@ -9,7 +9,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.repair.orient import flips_of
 from tetlux.meshing.repair.topology import Edges, compact, components, distinct_rows
 from tetlux.meshing.search.proximity import ClosestPoint, winding_number
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 # A sheet is the other side of a finer one if its vertices lie within the first share of the diagonal of it (text of six
 # digits rounds at 1e-6), the centroids of its triangles within the second, and it has at least the third share of its
