@@ -59,7 +59,7 @@ class Coefficients:
         return self.sigma_a + self.scattering
 
     @property
-    def escape(self) -> float:
+    def robin(self) -> float:
         """1/(2A) of the boundary condition."""
         return 0.5 / self.outer.boundary_factor
 
@@ -79,7 +79,7 @@ def condition_bound(one: Coefficients, other: Coefficients) -> float:
     sums differ by a factor between the least and the largest ratio. The bound is the largest over the least.
     """
     ratios = []
-    for name in ("diffusion", "sigma_a", "escape"):
+    for name in ("diffusion", "sigma_a", "robin"):
         first, second = np.broadcast_arrays(getattr(one, name), getattr(other, name))
         some = (first > 0) | (second > 0)
         with np.errstate(divide="ignore"):
