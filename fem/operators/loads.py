@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.fem.ballistic.follow import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.media.fresnel import moments
+from tetlux.fem.models.boundary import PartialCurrent
 from tetlux.fem.operators.operator import Operator
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
@@ -86,8 +86,8 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
             homes[: len(deposit.homes)] = deposit.homes
         load += _point_load(mesh, points, powers, homes)
     if np.any(deposit.transmitted_irradiance):
-        _, c2 = moments(coefficients.outer.eta)
-        load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
+        inflow = PartialCurrent(coefficients.outer).inflow(deposit.transmitted_irradiance)
+        load[mesh.boundary_nodes] += mesh.boundary_node_areas * inflow
     if np.any(deposit.emission):
         load += mesh.to_nodes(deposit.emission * mesh.volumes)
     return load

@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.model import Model
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import Fitting
 from tetlux.fem.operators.terms import Terms
@@ -22,8 +23,8 @@ class Operator:
     Attributes
     ----------
     mesh : TetMesh
-    coefficients : Coefficients
-        Of the media, on its tetrahedra.
+    model : Model
+        The equation, with the coefficients of the media on its tetrahedra.
     terms : Terms
         Of the matrix.
     solver : Solver
@@ -32,10 +33,15 @@ class Operator:
     """
 
     mesh: TetMesh
-    coefficients: Coefficients
+    model: Model
     terms: Terms
     solver: Solver
     fitting: Fitting | None
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """Of the media."""
+        return self.model.coefficients
 
     @property
     def absorbing(self) -> FloatArray:
@@ -50,16 +56,14 @@ class Operator:
     __repr__ = one_line
 
 
-def operator_of(
-    assembly: Assembly, coefficients: Coefficients, mass: Mass, loads: int, fitting: Fitting | None = None
-) -> Operator:
-    """The operator of given coefficients.
+def operator_of(assembly: Assembly, model: Model, mass: Mass, loads: int, fitting: Fitting | None = None) -> Operator:
+    """The operator of a model with one unknown.
 
     Parameters
     ----------
     assembly : Assembly
         Of the mesh.
-    coefficients : Coefficients
+    model : Model
     mass : {"lumped", "consistent"}
     loads : int
         How many right-hand sides are to come, roughly.
@@ -70,14 +74,14 @@ def operator_of(
     -------
     Operator
     """
-    sigma_a, robin = coefficients.sigma_a, coefficients.robin
+    ((block,),) = model.blocks
     if fitting is None:
-        terms = assembly.terms(coefficients.diffusion, sigma_a, robin, mass)
-        solver = assembly.solver(coefficients, terms.combine(), loads)
+        terms = assembly.terms(block.diffusion, block.sigma, block.robin, mass)
+        solver = assembly.solver(model.coefficients, terms.combine(), loads)
     else:
-        terms = assembly.terms(fitting.diffusion, sigma_a, robin, mass, fitting.absorption_scale)
+        terms = assembly.terms(fitting.diffusion, block.sigma, block.robin, mass, fitting.absorption_scale)
         solver = solver_for(terms.combine(), loads)
-    return Operator(assembly.mesh, coefficients, terms, solver, fitting)
+    return Operator(assembly.mesh, model, terms, solver, fitting)
 
 
 def solve_columns(
