@@ -8,12 +8,14 @@ from scipy.sparse import block_array, csr_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block, needs
+from tetlux.fem import Power, Solution
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.linear.direct import direct
 from tetlux.fem.linear.krylov import Method, Product, jacobi
 from tetlux.fem.linear.multigrid import Multigrid, multigrid
 from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.models.boundary import PartialCurrent
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.operators.terms import Mass, Terms
@@ -131,6 +133,24 @@ def test_power_is_kept_of_each_part(count: int, terms: Terms) -> None:
     fluence = solver_for(terms.combine(shift), count).solve(loads).x
     lost = terms.absorption.diagonal + terms.boundary.diagonal + shift * terms.mass.diagonal
     assert lost @ fluence == pytest.approx(loads.sum(axis=0), rel=1e-10, abs=1e-9)
+
+
+def test_a_solution_may_be_complex(terms: Terms) -> None:
+    """Its parts are those of two real solutions: nothing is cut off at zero, nothing imaginary lost."""
+    mesh = terms.mesh
+    fluence = np.exp(0.1 * (1.0 + 1.0j) * mesh.points[:, 0])
+    places = mesh.points.mean(axis=0) + np.random.default_rng(1).uniform(-8.0, 8.0, (20, 3))
+
+    def solution(values: np.ndarray) -> Solution:
+        return Solution(mesh, mesh.surface, PartialCurrent(TISSUE), values, Power(1.0, 0.0, 0.0, 1.0, 0.0))
+
+    whole, real, imaginary = solution(fluence), solution(fluence.real + 9.0), solution(fluence.imag + 9.0)
+    for name in ("fluence_at", "exitance_at"):
+        nine = getattr(solution(np.full(len(fluence), 9.0)), name)(places)
+        expected = getattr(real, name)(places) - nine + 1j * (getattr(imaginary, name)(places) - nine)
+        assert getattr(whole, name)(places) == pytest.approx(expected, abs=1e-12)
+    assert whole.exitance == pytest.approx(fluence[mesh.boundary_nodes] * COEFFICIENTS.robin)
+    assert repr(whole).startswith("Solution(720 nodes, exitance ")
 
 
 # A ball of radius 10 mm with a point source one mean free path below its surface, by the series of

@@ -35,11 +35,8 @@ def solution_of_light(
     """
     deposit, operator = load.deposit, load.operator
     mesh, limited_power = operator.mesh, 0.0
-    if (
-        limit
-        and operator.model.nonnegative
-        and not (load.has_first_moment or any(each.patch.charges.dips for each in subtractions))
-    ):
+    dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
+    if limit and operator.model.nonnegative and not dips:
         fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
     outside = mesh.boundary_node_areas * deposit.irradiance
     transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance

@@ -180,7 +180,7 @@ class Solution:
             guessed[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
         fluence = linear + (known - guessed)
         if np.iscomplexobj(fluence):
-            return fluence
+            return np.asarray(fluence)
         # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
         shares = (fluence < 0) & (linear >= 0) & (known >= 0) & (guessed > 0)
         fluence[shares] = linear[shares] * known[shares] / guessed[shares]
