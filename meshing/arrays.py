@@ -1,9 +1,13 @@
 """Array types of all signatures, sums by index, evenly spaced indices, and perpendicular axes."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+# Real or complex numbers.
+NumberArray = npt.NDArray[Any]
 IntArray = npt.NDArray[np.int64]
 # Half the memory of an IntArray, for large tables.
 IndexArray = npt.NDArray[np.int32]
