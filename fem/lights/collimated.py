@@ -73,7 +73,10 @@ class CollimatedBeam:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`."""
+        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         surface = body.surface
         entries = self.entries(surface)
         if len(entries) == 0:
@@ -90,7 +93,7 @@ class CollimatedBeam:
         )
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Several on the whole body, one on a spot."""
+        """Draw several on the whole body, one on a spot; see `HasArrows`."""
         direction = unit_vector(self.direction, "direction")
         return Arrows(self.entries(surface), direction, ARROWS if self.spot is None else 1)
 
