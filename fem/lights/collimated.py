@@ -160,7 +160,7 @@ class CollimatedBeam:
             facets = facets[owners]
         points, powers, reach = self._sample_pieces(corners, direction)
         lit = np.flatnonzero((powers > 0) & (reach > 0))
-        # Light that is stopped by another facet before it arrives is a shadow.
+        # A piece is in shadow if the way back to the light meets another facet.
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= reach[lit]]
         facets, places = np.unique(facets[lit], return_inverse=True)
