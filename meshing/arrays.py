@@ -1,4 +1,4 @@
-"""Array types of all signatures, sums by index, and evenly spaced indices."""
+"""Array types of all signatures, sums by index, evenly spaced indices, and perpendicular axes."""
 
 import numpy as np
 import numpy.typing as npt
@@ -19,3 +19,10 @@ def sum_by_index(indices: npt.NDArray[np.integer], values: FloatArray, count: in
 def spread_indices(count: int, most: int) -> IntArray:
     """Evenly spaced indices below `count`, at most `most` of them."""
     return np.arange(min(count, most)) * count // max(min(count, most), 1)
+
+
+def perpendicular_axes(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors perpendicular to each unit vector d, (..., 3) each: e and d x e."""
+    first = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=-1)])
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return first, np.cross(directions, first)

@@ -137,6 +137,69 @@ def test_a_two_sided_export_is_one_body(arrays: Arrays) -> None:
     assert surface.warnings == ()
 
 
+def _other_diagonals(cube: Surface) -> list[tuple[int, int, int]]:
+    """The sides of a cube, each cut along its other diagonal, oriented outward."""
+    found = []
+    for normal in np.unique(np.round(cube.normals), axis=0):
+        one, two = cube.faces[(np.round(cube.normals) == normal).all(axis=1)].tolist()
+        first = next(i for i in range(3) if one[i] not in two)
+        apex, start, end = (one[(first + i) % 3] for i in range(3))
+        across = next(i for i in two if i not in one)
+        found += [(apex, start, across), (apex, across, end)]
+    return found
+
+
+CUBE = box((10.0, 10.0, 10.0))
+# The other diagonals of its sides.
+OTHER = np.array([[a, b, c] for a, b, c in _other_diagonals(CUBE)])
+
+
+@pytest.mark.parametrize("turn", [-1, 1], ids=["turned over", "the same way round"])
+def test_two_sides_of_different_triangles_are_one_body(turn: int) -> None:
+    for arrays in (
+        (CUBE.points, np.vstack([CUBE.faces, OTHER[:, ::turn]])),
+        together((CUBE.points, CUBE.faces), (CUBE.points, OTHER[:, ::turn])),
+        together((CUBE.points, OTHER[:, ::turn]), (CUBE.points, CUBE.faces)),
+    ):
+        surface = surface_from_arrays(*arrays)
+        assert surface.volume == pytest.approx(1000.0)
+        assert len(surface.faces) == 12
+        assert "kept one side of a two-sided surface, and removed the 12 triangles of the other." in surface.repairs
+        assert surface.warnings == ()
+
+
+def test_of_two_sides_the_finer_is_kept() -> None:
+    for arrays in (
+        together((POINTS, FACES), (FINE.points, turned_over(FINE.faces))),
+        together((FINE.points, FINE.faces), (POINTS, turned_over(FACES))),
+    ):
+        surface = surface_from_arrays(*arrays)
+        assert surface.volume == pytest.approx(FINE.volume)
+        assert "kept one side of a two-sided surface, and removed the 320 triangles of the other." in surface.repairs
+
+
+def test_an_open_body_whose_sides_differ_is_capped_as_one() -> None:
+    top = CUBE.points[:, 2].max()
+    sides = [faces[(CUBE.points[faces][:, :, 2] < top).any(axis=1)] for faces in (CUBE.faces, OTHER)]
+    surface = surface_from_arrays(CUBE.points, np.vstack([sides[0], turned_over(sides[1])]), holes="close")
+    assert surface.volume == pytest.approx(1000.0)
+    assert surface.repairs[0] == "kept one side of a two-sided surface, and removed the 10 triangles of the other."
+
+
+def test_a_wall_whose_sides_differ_goes_and_a_thin_body_stays() -> None:
+    core, shell = 0.3 * CUBE.points, (POINTS, FACES)
+    surface = surface_from_arrays(*together(shell, (core, turned_over(CUBE.faces)), (core, OTHER)))
+    assert surface.volume == pytest.approx(BALL.volume)
+    assert surface.repairs[-1] == "removed 24 triangles of a wall inside the body."
+    corners = np.array([[0.0, 0, 0], [1, 0, 0.01], [1, 1, 0], [0, 1, 0.01]])
+    flat = surface_from_arrays(corners, [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    assert len(flat.faces) == 4
+    octahedron = np.vstack([np.eye(3), -np.eye(3)])
+    inscribed = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    cavity = together((FINE.points, FINE.faces), (10.0 * octahedron, turned_over(inscribed)))
+    assert len(surface_from_arrays(*cavity).faces) == len(FINE.faces) + 8
+
+
 def test_two_sides_of_several_bodies_and_of_one_with_a_hole() -> None:
     two = together((POINTS, FACES), (POINTS + 30.0, FACES))
     both = two[0], np.vstack([two[1], turned_over(two[1])])

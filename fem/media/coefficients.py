@@ -16,7 +16,7 @@ AnyMedium = Medium | VaryingMedium
 # Media by the regions or labels of a mesh that they fill: the body's own, or the outermost, first.
 MediaByLabel = Mapping[int, AnyMedium]
 # Barycentric coordinates of the points of a rule that is exact for quadratics, each of the same weight.
-_WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
+WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def coefficients_on(mesh: TetMesh, media: MediaByLabel | Sequence[AnyMedium]) ->
             values[:, inside] = np.array(found)[:, None]
             continue
         # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
-        points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
+        points = WITHIN @ mesh.points[mesh.tetrahedra[inside]]
         at = medium.at(points.reshape(-1, 3))
         absorption, reduced = (value.reshape(-1, 4).mean(axis=1) for value in at)
         peaked, forward = medium.delta_eddington(reduced)

@@ -1,5 +1,6 @@
 """All malformed inputs, each put through the command line."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -39,6 +40,10 @@ def check_made(folder: Path, count: int, number: int = 0) -> Iterator[Outcome]:
         yield _within_the_folder(outcome_of(f"made: {content!r}", ["check", str(path)]), path)
 
 
+class EnoughError(Exception):
+    """So many inputs are made as were asked for."""
+
+
 def made(count: int, number: int = 0) -> list[bytes]:
     """So many different case files, the same for a seed."""
     found: dict[bytes, None] = {}
@@ -54,11 +59,13 @@ def made(count: int, number: int = 0) -> list[bytes]:
     )
     @given(case_files())
     def collect(content: bytes) -> None:
-        if len(found) < count:
-            found[content] = None
+        found[content] = None
+        if len(found) >= count:
+            raise EnoughError
 
-    collect()
-    return list(found)
+    with contextlib.suppress(EnoughError):
+        collect()
+    return list(found)[:count]
 
 
 def _within_the_folder(outcome: Outcome, path: Path) -> Outcome:

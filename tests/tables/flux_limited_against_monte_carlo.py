@@ -50,7 +50,7 @@ from tests.tables.diffusion_against_monte_carlo import entered, head, medium_of,
 from tetlux.fem import Medium, PencilBeam
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
-from tetlux.fem.exact.monte_carlo import Estimate
+from tetlux.fem.exact.monte_carlo import SampleMean
 from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.linear.solver import solver_for
 from tetlux.fem.media.coefficients import coefficients_of
@@ -166,7 +166,7 @@ def pencils(photons: int) -> None:
     for albedo, eta, g, radius in BALLS:
         medium, edges = medium_of(albedo, g, eta), np.radians(degrees)
         run = monte_carlo.sphere(medium, radius=radius, light="pencil", edges=edges, photons=photons)
-        truth = [Estimate(*pair) for pair in zip(run.exitance, run.standard_error, strict=True)]
+        truth = [SampleMean(*pair) for pair in zip(run.exitance, run.standard_error, strict=True)]
         for model, exitance in zip(MODELS, exitances_of_ball(medium, radius, edges), strict=True):
             row(*(f"{value:g}" for value in (albedo, eta, g, radius)), model, *ratios(exitance.tolist(), truth))
 
