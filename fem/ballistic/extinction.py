@@ -70,7 +70,23 @@ def cells_of(
 def attenuate(
     mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Power that rays (r,) have after given lengths, and power absorbed on the way, (r,) each, W."""
+    """Attenuate rays along straight paths.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    coefficients : Coefficients
+    rays : Rays
+    lengths : (r,) ndarray
+        Of the paths, unit.
+
+    Returns
+    -------
+    ends : (r,) ndarray
+        Power that each ray has left, W.
+    absorbed : (r,) ndarray
+        Power that is absorbed on its way, W; the rest is scattered.
+    """
     extinction, sigma_a = coefficients.extinction, coefficients.sigma_a
     if coefficients.uniform:
         ends = rays.powers * np.exp(-extinction * lengths)

@@ -66,18 +66,51 @@ class Body:
         return self._first if len(self.media) == 1 and isinstance(self._first, Medium) else None
 
     def region_at(self, points: FloatArray) -> IntArray:
-        """Regions that points (q, 3) lie in, (q,)."""
+        """Find the regions that points lie in.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            unit.
+
+        Returns
+        -------
+        (q,) ndarray
+            Numbers or labels of the regions.
+        """
         if len(self.media) == 1:
             return np.full(len(points), next(iter(self.by_label)), dtype=np.int64)
         return self.partition.region_at(points)
 
     def just_inside(self, points: FloatArray) -> FloatArray:
-        """Places (q, 3) just below the surface, nearest to given points (q, 3)."""
+        """Find places just below the surface.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            unit.
+
+        Returns
+        -------
+        (q, 3) ndarray
+            `JUST_INSIDE` of the diagonal below the point of the surface nearest to each, unit.
+        """
         nearest, faces = self.surface.closest(points)
         return np.asarray(nearest - JUST_INSIDE * self.surface.diagonal * self.surface.normals[faces])
 
     def mean_free_paths(self, points: FloatArray) -> FloatArray:
-        """Transport mean free paths 1/sigma_t' at points (q, 3) inside, (q,), unit."""
+        """Compute transport mean free paths 1/sigma_t'.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            Inside the body, unit.
+
+        Returns
+        -------
+        (q,) ndarray
+            unit.
+        """
         regions, found = self.region_at(points), np.empty(len(points))
         for region in np.unique(regions).tolist():
             inside = regions == region

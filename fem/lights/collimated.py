@@ -73,7 +73,10 @@ class CollimatedBeam:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`."""
+        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         surface = body.surface
         entries = self.entries(surface)
         if len(entries) == 0:
@@ -90,7 +93,7 @@ class CollimatedBeam:
         )
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Several on the whole body, one on a spot."""
+        """Draw several on the whole body, one on a spot; see `HasArrows`."""
         direction = unit_vector(self.direction, "direction")
         return Arrows(self.entries(surface), direction, ARROWS if self.spot is None else 1)
 
@@ -157,7 +160,7 @@ class CollimatedBeam:
             facets = facets[owners]
         points, powers, reach = self._sample_pieces(corners, direction)
         lit = np.flatnonzero((powers > 0) & (reach > 0))
-        # Light that is stopped by another facet before it arrives is a shadow.
+        # A piece is in shadow if the way back to the light meets another facet.
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= reach[lit]]
         facets, places = np.unique(facets[lit], return_inverse=True)

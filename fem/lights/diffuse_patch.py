@@ -71,7 +71,10 @@ class DiffusePatch:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Choose where the mesh has to be fine; which of its facets are illuminated is found on the mesh."""
+        """Choose where the mesh has to be fine; which of its facets are illuminated is found on the mesh.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         transmitted = diffuse_transmittance(body.outer, "a diffuse patch") * self.irradiance
         places = self._places(body.surface)
         depth = float(body.mean_free_paths(body.just_inside(places)).min())
@@ -80,7 +83,7 @@ class DiffusePatch:
         return Deposit(hints=MeshHints(resolution, places), footprint=Footprint(places), on_mesh=on_mesh)
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Draw a point at its center."""
+        """Draw a point at its center; see `HasArrows`."""
         return Arrows(self._middle(surface)[0][None])
 
     def _middle(self, surface: Surface) -> tuple[FloatArray, FloatArray]:

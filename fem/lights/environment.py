@@ -106,7 +106,10 @@ class EnvironmentLight:
         return towards.reshape(-1, 3)[bright], irradiance[bright]
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Leave everything to a mesh: which of its facets are in shadow is found there."""
+        """Leave everything to a mesh: which of its facets are in shadow is found there.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         check_exact_boundary(body.outer, "environment light")
         return Deposit(on_mesh=self)
 

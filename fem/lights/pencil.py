@@ -111,11 +111,14 @@ class PencilBeam:
         return np.asarray(points[0])
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Draw one along its axis."""
+        """Draw one along its axis; see `HasArrows`."""
         return Arrows(self.entry(surface)[None], unit_vector(self.direction, "direction"))
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Refract it and scatter it, at points or along its path."""
+        """Refract it and scatter it, at points or along its path.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         self._check_outside(body.surface, as_vector(self.origin, "origin"))
         if self.deposit == "line" and self.radius > 0:
             return self._deposit_as_spot(body)

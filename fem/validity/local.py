@@ -40,12 +40,36 @@ class Validity:
     deposits: Sequence[Deposit]
 
     def at(self, points: FloatArray) -> FloatArray:
-        """1 minus the expected relative error, not below 0, at points (q, 3) of the surface, (q,)."""
+        """Compute the validity of the diffusion approximation.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            On the surface, unit.
+
+        Returns
+        -------
+        (q,) ndarray
+            1 minus the expected relative error of the exitance, not below 0.
+        """
         _, facets, _ = self.mesh.closest_boundary(points)
         return np.asarray(np.maximum(1.0 - self.errors(points, facets), 0.0))
 
     def errors(self, points: FloatArray, facets: IntArray) -> FloatArray:
-        """Expected relative errors at points (q, 3) on given boundary facets (q,), (q,)."""
+        """Compute the expected relative errors of the exitance.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            On the surface, unit.
+        facets : (q,) ndarray
+            The boundary facets that they lie on.
+
+        Returns
+        -------
+        (q,) ndarray
+            The largest of the errors by each cause.
+        """
         below = self.below[facets]
         causes = [wide_error(below.albedo, self.coefficients.outer.eta), self.thin_errors[facets]]
         causes += [self.far_errors(points, facets), self.near_errors(points)]

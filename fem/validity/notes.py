@@ -27,7 +27,12 @@ VOID = 0.1
 
 
 def check_scattering(medium: AnyMedium) -> None:
-    """Refuse a medium without scattering. A medium that varies is checked when its coefficients are computed.
+    """Refuse a medium without scattering.
+
+    Parameters
+    ----------
+    medium : Medium or VaryingMedium
+        A medium that varies is checked when its coefficients are computed.
 
     Raises
     ------
@@ -42,6 +47,10 @@ def check_scattering(medium: AnyMedium) -> None:
 
 def check_size(body: Body) -> None:
     """Refuse a body whose size and coefficients cannot be in the same unit.
+
+    Parameters
+    ----------
+    body : Body
 
     Raises
     ------

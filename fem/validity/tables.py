@@ -65,17 +65,40 @@ def near_rows(albedo: FloatArray, cosine: FloatArray | None) -> FloatArray:
 
 
 def near_error(rows: FloatArray, distance: FloatArray) -> FloatArray:
-    """Errors (n,) at distances (n,) from the entry of a thin beam, or a point source, by its row of rows (n, 6)."""
+    """Errors near the entry of a thin beam, or near a point source.
+
+    Parameters
+    ----------
+    rows : (n, 6) ndarray
+        See `near_rows`.
+    distance : (n,) ndarray
+        From the entry or source, mean free paths.
+
+    Returns
+    -------
+    (n,) ndarray
+    """
     return _interpolate_rows(
         (*_midpoints(NEAR_RINGS), NEAR_LIMIT), np.column_stack([rows, np.zeros(len(rows))]), distance
     )
 
 
 def far_error(albedo: FloatArray, distance: FloatArray) -> FloatArray:
-    """Errors (n,) at distances (n,) from the nearest light, in media of reduced albedo (n,).
+    """Errors far from all light.
 
     Beyond the table they grow: diffusion decays faster than radiative transfer by ``0.4 (1 - albedo) sigma_tr`` (Case
     and Zweifel 1967, for isotropic scattering, to first order).
+
+    Parameters
+    ----------
+    albedo : (n,) ndarray
+        Reduced albedo of the medium at each place.
+    distance : (n,) ndarray
+        From the nearest light, mean free paths.
+
+    Returns
+    -------
+    (n,) ndarray
     """
     at = _midpoints(FAR_RINGS)
     rows = _interpolate(np.array(FAR), _locate_albedo(albedo))
@@ -86,14 +109,39 @@ def far_error(albedo: FloatArray, distance: FloatArray) -> FloatArray:
 
 
 def wide_error(albedo: FloatArray, eta: float) -> FloatArray:
-    """Errors (n,) under a wide beam, in media of reduced albedo (n,) and a refractive index."""
+    """Errors under a wide beam.
+
+    Parameters
+    ----------
+    albedo : (n,) ndarray
+        Reduced albedo of the medium at each place.
+    eta : float
+        Relative refractive index.
+
+    Returns
+    -------
+    (n,) ndarray
+    """
     return _interpolate(np.array(WIDE), _locate(np.full(len(albedo), eta), INDICES), _locate_albedo(albedo))
 
 
 def thin_error(cosine: FloatArray, thickness: FloatArray, light: Spread) -> FloatArray:
-    """Errors (n,) where the mean cosine and the thickness of the body are (n,), beyond those of a thick body.
+    """Errors in thin parts of a body, beyond those of a thick body.
 
     A wide beam grazes large bodies too, which makes most of their error; for wide beams that error is included.
+
+    Parameters
+    ----------
+    cosine : (n,) ndarray
+        Mean cosine of scattering at each place.
+    thickness : (n,) ndarray
+        Of the body, mean free paths.
+    light : {"narrow", "wide", "everywhere"}
+        See `Spread`.
+
+    Returns
+    -------
+    (n,) ndarray
     """
     columns, table = (THICKNESSES, PLATE) if light == "narrow" else (DIAMETERS, THIN)
     rows = _interpolate(np.array(table), _locate(cosine, COSINES))
