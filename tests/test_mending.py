@@ -292,9 +292,11 @@ def test_a_tube_gets_a_cap_at_each_end() -> None:
 
 def test_the_largest_of_several_holes_is_named() -> None:
     height = heights(FINE)
-    arrays = cut(FINE, (height < 9.0) & (height > -5.0))
-    with pytest.raises(InputError, match=r"a hole of 92 edges, 24\.\d+ wide around .*-5.*\), the largest of 2; cap it"):
-        surface_from_arrays(*arrays)
+    for up, place in ((1.0, "-5"), (-1.0, "5")):
+        arrays = cut(FINE, (up * height < 9.0) & (up * height > -5.0))
+        words = rf"a hole of 92 edges, 24\.\d+ wide around .*, {place}.*\), the largest of 2; cap it"
+        with pytest.raises(InputError, match=words):
+            surface_from_arrays(*arrays)
     with pytest.raises(InputError, match='holes is "maybe"; give one of small, close, refuse'):
         surface_from_arrays(*arrays, holes="maybe")  # type: ignore[arg-type]
 
@@ -328,6 +330,33 @@ def test_a_hollow_rim_is_covered_once(count: int) -> None:
     twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     assert twice.sum() / 2 == pytest.approx(normal)
     assert np.abs(twice).sum() / 2 == pytest.approx(normal, rel=1e-9 if count < 300 else 1e-3)
+
+
+def outline(corners: list[tuple[float, float]], count: int) -> FloatArray:
+    """A flat polygon whose edges are cut into `count` pieces."""
+    start = np.array([(x, y, 0.0) for x, y in corners])
+    shares = np.arange(count)[:, None] / count
+    return np.vstack([a + shares * (b - a) for a, b in zip(start, np.roll(start, -1, axis=0), strict=True)])
+
+
+TEETH = [point for i in range(4) for point in ((8 - 2 * i, 5), (7 - 2 * i, 5), (7 - 2 * i, 1), (6 - 2 * i, 1))]
+CONCAVE = {
+    "L": [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)],
+    "comb": [(0, 0), (8, 0), *TEETH],
+    "star": [((1 + i % 2) * np.cos(0.5 * i), (1 + i % 2) * np.sin(0.5 * i)) for i in range(12)],
+}
+
+
+@pytest.mark.parametrize("count", [1, 10, 40])
+@pytest.mark.parametrize("name", CONCAVE)
+def test_the_cap_of_a_concave_flat_rim_does_not_leave_it(name: str, count: int) -> None:
+    rim = outline(CONCAVE[name], count)
+    inner, faces = cap(rim, np.arange(len(rim)), len(rim))
+    points = np.vstack([rim, inner])
+    twice = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    area = np.cross(rim, np.roll(rim, -1, axis=0)).sum(axis=0)[2] / 2
+    assert np.linalg.norm(twice, axis=1).sum() / 2 == pytest.approx(area, rel=1e-9)
+    assert np.abs(twice.sum(axis=0) / 2) == pytest.approx([0, 0, area], rel=1e-9)
 
 
 def test_holes_are_closed_by_the_case_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

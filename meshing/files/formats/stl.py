@@ -34,18 +34,18 @@ def read_stl(data: bytes) -> tuple[FloatArray, IntArray]:
     count = int.from_bytes(data[80:HEAD], "little") if len(data) >= HEAD else 0
     whole = HEAD + TRIANGLE.itemsize * count
     if len(data) != whole and _is_text(data):
-        corners = _of_text(data)
+        corners = _text_corners(data)
     elif len(data) < HEAD:
         raise ValueError("neither text nor long enough for a head")
     elif len(data) < whole:
         held = (len(data) - HEAD) // TRIANGLE.itemsize
         raise InputError(f"was cut short: it claims {count:,} triangles and holds {held:,}; export it again.")
     else:
-        corners = _of_binary(data, count)
+        corners = _binary_corners(data, count)
     return corners, np.arange(len(corners), dtype=np.int64).reshape(-1, 3)
 
 
-def _of_binary(data: bytes, count: int) -> FloatArray:
+def _binary_corners(data: bytes, count: int) -> FloatArray:
     every = np.frombuffer(data, TRIANGLE, (len(data) - HEAD) // TRIANGLE.itemsize, HEAD)["corners"]
     if _are_triangles(every[count:], every[:count]) and (len(data) - HEAD) % TRIANGLE.itemsize == 0:
         count = len(every)
@@ -58,18 +58,20 @@ def _of_binary(data: bytes, count: int) -> FloatArray:
 
 def _are_triangles(corners: NDArray[np.float32], others: NDArray[np.float32]) -> bool:
     """Whether rows (k, 3, 3) have three different corners each, of about the size of the others'."""
+    if len(corners) == 0:
+        return False
     largest = RANGE * float(np.abs(others).max()) if len(others) else LARGEST
     with np.errstate(invalid="ignore"):
         sensible = (np.abs(corners) <= largest).all() and (np.abs(corners).max(axis=(1, 2), initial=0.0) > TINY).all()
     distinct = (corners != corners[:, [1, 2, 0]]).any(axis=2).all()
-    return bool(len(corners) and sensible and distinct)
+    return bool(sensible and distinct)
 
 
 def _is_text(data: bytes) -> bool:
     return data[:1024].lstrip(b"\xef\xbb\xbf \t\r\n")[:5].lower() == b"solid" and FACET.search(data) is not None
 
 
-def _of_text(data: bytes) -> FloatArray:
+def _text_corners(data: bytes) -> FloatArray:
     found = VERTEX.findall(data)
     if len(found) != 3 * len(FACET.findall(data)):
         raise InputError("was cut short, or has facets that are no triangles; export it again.")
