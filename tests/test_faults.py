@@ -9,8 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stdout
-from multiprocessing import get_context
+from contextlib import contextmanager
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
@@ -18,6 +17,7 @@ import meshio
 import pytest
 
 from tests.conftest import block
+from tests.elsewhere import start_elsewhere
 from tetlux.cases import run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
@@ -95,18 +95,6 @@ def wait_until(true: Callable[[], bool], seconds: float = 20.0) -> bool:
     return true()
 
 
-# Starts processes by forking one that has everything imported, so that they are killed at their work.
-FORKS = get_context("forkserver")
-FORKS.set_forkserver_preload([__name__])
-
-
-def run_elsewhere(environment: dict[str, str], arguments: list[str]) -> None:
-    """The command line in a process of its own, quietly."""
-    os.environ.update(environment)
-    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere):
-        sys.exit(main(arguments))
-
-
 @linux
 @pytest.mark.parametrize("notes", [False, True], ids=["alone", "beside notes"])
 def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
@@ -118,9 +106,7 @@ def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
 
     def start(power: float) -> ForkServerProcess:
         written(tmp_path, power)
-        process = FORKS.Process(target=run_elsewhere, args=(environment, ["run", *options, "--no-cache"]))
-        process.start()
-        return process
+        return start_elsewhere(["run", *options, "--no-cache"], tmp_path, environment)
 
     def run_to_the_end(power: float) -> float:
         started, process = time.monotonic(), start(power)
@@ -500,6 +486,7 @@ WRITER = """\
 import sys
 from pathlib import Path
 from tests.conftest import block
+from tests.elsewhere import start_elsewhere
 from tetlux.meshing.mesher.cache import store_cached_mesh
 
 while True:
