@@ -52,6 +52,11 @@ def load_all(requests: Sequence[str]) -> list[Case]:
 def check_all(requests: Sequence[str]) -> int:
     """Print for each case file whether it is valid, and what it describes.
 
+    Parameters
+    ----------
+    requests : sequence of str
+        Case files, or names of those that ship.
+
     Returns
     -------
     int
@@ -97,6 +102,14 @@ def _describe_mesh(case: Case) -> list[str]:
 
 def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:
     """Run cases, and print a line for each stage.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    out : Path
+        Folder of all results.
+    cache : bool
+        Whether meshes are looked up and kept in the user's cache directory.
 
     Returns
     -------

@@ -72,6 +72,17 @@ def run_case(
     RunError
         If the mesher or the solver fails, memory runs out, another run is writing to the same folder, or the results
         cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tetlux.cases.file.load import load_cases
+    >>> from tetlux.cases.shipped import find_case_file
+    >>> (case,) = load_cases(find_case_file("sphere"))
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     folder = run_case(replace(case, outputs=()), Path(out))
+    ...     sorted(path.name for path in folder.iterdir())
+    ['compare.json', 'compare.png', 'summary.json']
     """
     started, target = time.perf_counter(), out / case.name
     try:
@@ -120,7 +131,7 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
         solutions.append(solution)
-    seconds = {stage: sum(one.seconds[stage] for one in solutions) for stage in solutions[0].seconds}
+    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
@@ -184,7 +195,9 @@ def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureS
         colours=results.preview if results.has_colours else None,
         up=case.up,
         toward=case.toward,
-        regions=tuple(RegionOutline(one.surface.name, one.surface.points, one.surface.faces) for one in case.regions),
+        regions=tuple(
+            RegionOutline(region.surface.name, region.surface.points, region.surface.faces) for region in case.regions
+        ),
         detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
     )
 

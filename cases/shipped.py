@@ -28,10 +28,24 @@ def shipped_cases() -> dict[str, str]:
 def find_case_file(request: str) -> Path:
     """Find a case file by its path or, if no such path exists, by the name of a shipped one.
 
+    Parameters
+    ----------
+    request : str
+        Path of a case file, or name of a shipped one.
+
+    Returns
+    -------
+    Path
+
     Raises
     ------
     InputError
         If it is neither, or is a surface file.
+
+    Examples
+    --------
+    >>> find_case_file("hare").name
+    'hare.yaml'
     """
     path = Path(request)
     # Path.exists raises where a name is too long for the file system.
@@ -60,6 +74,15 @@ def _refuse_surface(path: Path) -> None:
 
 def case_text(request: str) -> str:
     """Read the text of a case file; in a shipped one the path of its surface is made absolute, so that a copy runs.
+
+    Parameters
+    ----------
+    request : str
+        Path of a case file, or name of a shipped one.
+
+    Returns
+    -------
+    str
 
     Raises
     ------

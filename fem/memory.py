@@ -9,9 +9,9 @@ from pathlib import Path
 from tetlux.meshing.errors import RunError
 
 # Bytes. Measured as the growth of a process's peak memory while it solves and estimates the error, less IMPORTED; kB
-# for each tetrahedron, and in the last column what `required` gives:
+# for each tetrahedron, and in the last column what `estimate_memory` gives:
 #
-#   a given mesh, by its tetrahedra        48k    413k  1,296k   required
+#   a given mesh, by its tetrahedra        48k    413k  1,296k  estimate
 #   a point source                         .43     .92     .77   1.02
 #   eight                                          .97           1.16
 #   eight, and diffuse light                               .82   1.18
@@ -33,7 +33,7 @@ GIVEN, REFINED = 1000.0, 1600.0
 MATRIX, LIGHT = 120.0, 20.0
 
 
-def required(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
+def estimate_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
     """Estimate the memory that it takes to solve on a mesh and to estimate the error, bytes.
 
     Parameters
@@ -58,13 +58,13 @@ def _bytes_per_tetrahedron(matrices: int, lights: int, refined: bool) -> float:
 
 
 def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
-    """Refuse a mesh that takes more memory than is available; see `required`.
+    """Refuse a mesh that takes more memory than is available; see `estimate_memory`.
 
     Raises
     ------
     RunError
     """
-    needed, free = required(tetrahedra, matrices, lights), available()
+    needed, free = estimate_memory(tetrahedra, matrices, lights), available()
     if needed > free:
         raise RunError(
             f"{tetrahedra:,} tetrahedra need about {gigabytes(needed)} GB of memory, and {gigabytes(free)} GB are "
@@ -122,12 +122,12 @@ def _left_by_groups(root: Path) -> Iterator[float]:
             for folder in (group, *group.parents):
                 with suppress(OSError, ValueError):
                     left = int((folder / limit).read_text()) - int((folder / usage).read_text())
-                    yield float(left + _cached(folder))
+                    yield float(left + _reclaimable_cache(folder))
                 if folder == base:
                     break
 
 
-def _cached(folder: Path) -> int:
+def _reclaimable_cache(folder: Path) -> int:
     """File cache that counts as used by a control group, which the system reclaims when memory is needed."""
     lines = (folder / "memory.stat").read_text().splitlines()
     return next((int(line.split()[1]) for line in lines if line.startswith("inactive_file ")), 0)

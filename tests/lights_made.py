@@ -45,9 +45,9 @@ def lights_of_every_kind(
     """
     unit = np.array(direction) / np.linalg.norm(direction)
     x, y, z = (float(value) for value in np.array(inside) - 12.0 * scale * unit)
-    # Across the beam, or nearly so.
-    right, up, front = (float(value) for value in np.eye(3)[np.argmin(np.abs(unit))])
-    origin, across, irradiance = (x, y, z), (right, up, front), brightness / scale**2
+    # An axis that the beam is not along.
+    u, v, w = (float(value) for value in np.eye(3)[np.argmin(np.abs(unit))])
+    origin, across, irradiance = (x, y, z), (u, v, w), brightness / scale**2
     lights: dict[str, Light] = {
         "point": PointSource(inside, brightness),
         "pencil": PencilBeam(origin, direction, brightness),

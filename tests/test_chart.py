@@ -34,6 +34,7 @@ from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere
+from tetlux.fem.exact.checks import Face
 from tetlux.meshing import RunError, Surface, box, tetrahedralize
 
 NO_LIGHT = (np.zeros((0, 3)), np.zeros(0))
@@ -135,7 +136,7 @@ def test_the_slab_is_measured_on_both_faces() -> None:
     front = benchmark.samples.normals[:, 2] > 0
     assert np.allclose(benchmark.samples.points[:, 2], np.where(front, 0.0, -10.0), atol=1e-9)
     depth = -float(source[2])
-    sides: list[tuple[np.ndarray, slab.Face]] = [(front, "front"), (~front, "back")]
+    sides: list[tuple[np.ndarray, Face]] = [(front, "front"), (~front, "back")]
     for side, face in sides:
         total = power * slab.point_total(TISSUE, thickness=10.0, depth=depth, face=face)
         # The rest leaves beyond the samples: 0.09 % of the front's, 0.56 % of the back's.
@@ -329,7 +330,7 @@ def little(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chart_module, "MESHLESS", LITTLE[:1])
     monkeypatch.setattr(chart_module, "FINITE_ELEMENTS", LITTLE[1:])
     monkeypatch.setattr(chart_module, "PEERS", ABSENT)
-    monkeypatch.setattr(chart_module, "monte_carlo_installed", lambda: False)
+    monkeypatch.setattr(chart_module, "has_monte_carlo", lambda: False)
     monkeypatch.setattr(chart_module, "_warm_up", lambda: None)
 
 

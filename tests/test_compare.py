@@ -19,6 +19,7 @@ from tetlux.cases.run import run_case
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import slab as exact_slab
+from tetlux.fem.exact.checks import Face
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.meshing import InputError, RunError, slab, sphere
 
@@ -172,7 +173,7 @@ def test_the_registry_has_both_faces_of_a_slab() -> None:
     form = closed_forms(plate.shape, TISSUE, [deposit])["robin"]
     radius, weight = np.polynomial.legendre.leggauss(400)
     rho, weight = 10.0 * (radius + 1.0), 10.0 * weight
-    sides: tuple[tuple[float, exact_slab.Face], ...] = ((0.0, "front"), (-2.0, "back"))
+    sides: tuple[tuple[float, Face], ...] = ((0.0, "front"), (-2.0, "back"))
     for z, face in sides:
         places = np.column_stack([1.0 + rho, np.full(400, 2.0), np.full(400, z)])
         total = 2.0 * np.pi * (weight * rho) @ form.exitance(places)

@@ -64,7 +64,7 @@ def test_control_groups_of_the_first_version(tmp_path: Path) -> None:
 
 def test_a_mesh_that_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, light = block((8, 8, 8), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))]
-    needed = memory.required(len(mesh.tetrahedra))
+    needed = memory.estimate_memory(len(mesh.tetrahedra))
     monkeypatch.setattr(memory, "available", lambda: 1.01 * needed)
     solve(mesh, TISSUE, light)
     monkeypatch.setattr(memory, "available", lambda: 0.9 * needed)
@@ -77,7 +77,7 @@ def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.M
     light = [PointSource((0.0, 0.0, 9.0))]
     free = solve(ball, TISSUE, light, tolerance=0.003)
     assert not any("memory" in warning for warning in free.warnings)
-    monkeypatch.setattr(memory, "available", lambda: memory.required(9_000, refined=True))
+    monkeypatch.setattr(memory, "available", lambda: memory.estimate_memory(9_000, refined=True))
     tight = solve(ball, TISSUE, light, tolerance=0.003)
     assert len(tight.mesh.tetrahedra) < 9_000 < len(free.mesh.tetrahedra)
     (warning,) = [warning for warning in tight.warnings if "memory" in warning]
@@ -169,7 +169,7 @@ def test_the_need_is_what_is_measured(cells: int, lights: int, channels: int) ->
         check=True,
     )
     tetrahedra, peak = (int(word) for word in done.stdout.split())
-    assert 0.95 * peak <= memory.required(tetrahedra, channels, lights * channels) <= 1.5 * peak
+    assert 0.95 * peak <= memory.estimate_memory(tetrahedra, channels, lights * channels) <= 1.5 * peak
 
 
 MEASURE = """\

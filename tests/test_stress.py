@@ -160,7 +160,7 @@ def test_residuals_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch) ->
 
         return solve_once
 
-    for module in ("operators.assembly", "system"):
+    for module in ("operators.assembly", "operators.operator"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", lambda matrix, *_: linear.Solver(matrix, [sloppy]))
     monkeypatch.setattr(linear, "REFUSED", 1e-3)
     diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
@@ -182,7 +182,7 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     def iterate(matrix: Any, *_: Any) -> linear.Solver:
         return linear.Solver(matrix, [krylov.jacobi])
 
-    for module in ("operators.assembly", "system"):
+    for module in ("operators.assembly", "operators.operator"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)
     assert 5 < measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
 

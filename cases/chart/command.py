@@ -8,7 +8,7 @@ from tetlux.cases.batch import load_all
 from tetlux.cases.chart.benchmark import prepare_benchmark
 from tetlux.cases.chart.files import FILES, write_chart
 from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS
-from tetlux.cases.chart.meshless import MESHLESS, MONTE_CARLO, monte_carlo_installed
+from tetlux.cases.chart.meshless import MESHLESS, MONTE_CARLO, has_monte_carlo
 from tetlux.cases.chart.methods import Method
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.runs import MeasuredBenchmark, measure_methods
@@ -82,11 +82,11 @@ def _methods(report: Callable[[str], None]) -> list[Method]:
     """The methods that can run here; report those that cannot."""
     methods = [*MESHLESS, *FINITE_ELEMENTS]
     for peer in PEERS:
-        if peer.installed:
+        if peer.is_installed:
             methods += peer.methods
         else:
             report(f'{peer.name} is left out, since it is not installed; pip install "tetlux[peers]" installs it.')
-    if monte_carlo_installed():
+    if has_monte_carlo():
         methods.append(MONTE_CARLO)
     else:
         report('Monte Carlo is left out, since numba is not installed; pip install "tetlux[montecarlo]" installs it.')

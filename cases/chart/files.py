@@ -28,7 +28,7 @@ def write_chart(measured: Sequence[MeasuredBenchmark], out: Path) -> None:
         If they cannot be written.
     """
     with replace_files(out, FILES) as folder:
-        _write_table([run for one in measured for run in one.runs], folder / "chart.csv")
+        _write_table([run for entry in measured for run in entry.runs], folder / "chart.csv")
         draw_chart(measured, folder / "chart.png")
         text = json.dumps(as_data(measured), indent=2, allow_nan=False)
         (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
@@ -44,8 +44,8 @@ def _write_table(runs: Sequence[Measurement], path: Path) -> None:
 def as_data(measured: Sequence[MeasuredBenchmark]) -> dict[str, Any]:
     """Convert a chart to plain data."""
     return {
-        "cases": {one.benchmark.case.name: _case_as_data(one) for one in measured},
-        "runs": [asdict(run) for one in measured for run in one.runs],
+        "cases": {entry.benchmark.case.name: _case_as_data(entry) for entry in measured},
+        "runs": [asdict(run) for entry in measured for run in entry.runs],
         "seconds": "from the surface in memory to the exitance at the surface, without imports and mesh cache",
         "error": "relative L2 error of the exitance over the samples of the surface; for Monte Carlo, which solves "
         "radiative transfer, the difference between the two models",

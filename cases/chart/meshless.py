@@ -83,7 +83,7 @@ def _compile_monte_carlo(benchmark: Benchmark) -> Outcome:
     return _monte_carlo(benchmark, 1.0)
 
 
-def monte_carlo_installed() -> bool:
+def has_monte_carlo() -> bool:
     """Whether numba, which Monte Carlo needs, is installed."""
     return importlib.util.find_spec("numba") is not None
 

@@ -42,7 +42,7 @@ class Peer:
     methods: tuple[Method, ...]
 
     @property
-    def installed(self) -> bool:
+    def is_installed(self) -> bool:
         """Whether its package is installed; found out without importing it."""
         return importlib.util.find_spec(self.package) is not None
 

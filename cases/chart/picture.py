@@ -82,15 +82,15 @@ def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
     height = ROW * rows + foot
     figure = Figure(figsize=(WIDTH, height), dpi=125, facecolor="white")
     FigureCanvasAgg(figure)
-    for row, one in enumerate(measured):
+    for row, entry in enumerate(measured):
         bottom = foot + ROW * (rows - 1 - row) + BELOW
         left, middle, right, key = (
             figure.add_axes((x / WIDTH, bottom / height, width / WIDTH, (ROW - BELOW - ABOVE) / height))
             for x, width in PANELS
         )
-        _draw_runs(one.runs, left, middle, right)
-        _draw_reference(one.benchmark, left, middle)
-        _draw_key(one.runs, key)
+        _draw_runs(entry.runs, left, middle, right)
+        _draw_reference(entry.benchmark, left, middle)
+        _draw_key(entry.runs, key)
     figure.text(
         PANELS[0][0] / WIDTH, 0.2 / height, "\n".join(lines), fontsize=12.5, color=INK, va="bottom", linespacing=1.3
     )
@@ -100,9 +100,9 @@ def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
 def _notes(measured: Sequence[MeasuredBenchmark]) -> list[str]:
     """The lines of the notes below the picture."""
     lines = textwrap.wrap(NOTE, WIDEST)
-    if any(run.method == MONTE_CARLO.name for one in measured for run in one.runs):
+    if any(run.method == MONTE_CARLO.name for entry in measured for run in entry.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
-    if any(one.benchmark.reference.error > 0 for one in measured):
+    if any(entry.benchmark.reference.error > 0 for entry in measured):
         lines += textwrap.wrap(NOTE_OF_FINER_RUN, WIDEST)
     return lines
 

@@ -16,7 +16,7 @@ from tetlux.fem.labels import find_label, order_outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.media.region import Region
 from tetlux.fem.scenes import media_by_scene
-from tetlux.fem.validity.notes import check_media, check_size, check_together
+from tetlux.fem.validity.notes import check_compatible, check_media, check_size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface
@@ -104,7 +104,7 @@ def _read_regions(
         own = read_media(document, (*key, "medium"), region.medium, inner.points, inner.unit, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
-                check_together((outside, inside))
+                check_compatible((outside, inside))
         regions.append(Region(inner, own))
     with document.at(("regions",)):
         check_regions(surface, [region.surface for region in regions])

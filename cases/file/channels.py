@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from tetlux.cases.file.colours import RGB
-from tetlux.cases.file.document import Document, Key, dotted
+from tetlux.cases.file.document import Document, Key, format_key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.media import MaterialSpec, Media
 
@@ -30,8 +30,8 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
         if length != first[1]:
             raise document.error(
                 key,
-                f"this makes {_describe(length)}, and {dotted(first[0])} makes {_describe(first[1])}; give one value "
-                "for each channel, or a single one for all.",
+                f"this makes {_describe(length)}, and {format_key(first[0])} makes {_describe(first[1])}; give a "
+                "value for each channel, or a single one for all.",
             )
     count = first[1] if first else 1
     if spec.channels is None:

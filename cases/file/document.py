@@ -101,7 +101,7 @@ class Document:
         """An error that names this file, the line of a key, and the key."""
         line = self.line(key)
         where = f"{self.path}, line {line}" if line else f"{self.path}"
-        name = dotted(key)
+        name = format_key(key)
         if self.run is not None:
             message = f"in the run {self.run}: {message}"
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
@@ -129,7 +129,7 @@ class Document:
             raise self.error((*key, *within), str(error)) from error
 
 
-def dotted(key: Key) -> str:
+def format_key(key: Key) -> str:
     """Format a key as in ``lights[0].pencil.origin``."""
     text = ""
     for part in key:
@@ -185,9 +185,8 @@ def _collect_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int])
         for name, value in node.value:
             part: Key = (*key, str(name.value))
             if part in lines:
-                raise InputError(
-                    f"{path}, line {name.start_mark.line + 1}: {dotted(part)}: this key is given twice; give it once."
-                )
+                where = f"{path}, line {name.start_mark.line + 1}: {format_key(part)}"
+                raise InputError(f"{where}: this key is given twice; give it once.")
             lines[part] = name.start_mark.line + 1
             _collect_lines(path, value, part, lines)
     elif isinstance(node, yaml.SequenceNode):

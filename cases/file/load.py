@@ -43,6 +43,13 @@ def load_cases(path: Path) -> list[Case]:
     ------
     InputError
         With the file, the line and the key.
+
+    Examples
+    --------
+    >>> from tetlux.cases.shipped import find_case_file
+    >>> (case,) = load_cases(find_case_file("sphere"))
+    >>> case.name, case.channel_names, case.surface.unit
+    ('sphere', ('all',), 'mm')
     """
     document = read_document(path)
     spec = validate(document, document.data)

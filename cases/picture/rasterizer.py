@@ -101,10 +101,10 @@ def nearest_triangles(
     cuts = np.searchsorted(ends, np.arange(BATCH, int(columns @ rows), BATCH))
     for part in np.split(np.arange(len(strip)), cuts):
         long = columns[strip[part]]
-        one = np.repeat(part, long)
-        first = low[strip[one]]
-        pixels = np.column_stack([first[:, 0] + _concatenate_ranges(long), first[:, 1] + row[one]])
-        _keep_nearest(owner, nearness, placed, drawn[strip[one]], pixels)
+        strips = np.repeat(part, long)
+        first = low[strip[strips]]
+        pixels = np.column_stack([first[:, 0] + _concatenate_ranges(long), first[:, 1] + row[strips]])
+        _keep_nearest(owner, nearness, placed, drawn[strip[strips]], pixels)
     return owner, nearness
 
 

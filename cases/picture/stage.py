@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.cases.picture.view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
@@ -179,10 +179,10 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     vertex = triangles.ravel()
     calm = np.flatnonzero(np.bincount(vertex)[vertex] <= MOST_NEIGHBOURS)
     at_vertex = csr_array((np.ones(len(calm)), (calm, vertex[calm])), shape=(count, int(vertex.max()) + 1))
-    one, other = (at_vertex @ at_vertex.T).tocoo().coords
-    alike = np.einsum("ij,ij->i", flat[owner[one]], flat[owner[other]]) > SHARP
-    one, other = one[alike], other[alike]
-    summed = csr_array((np.ones(len(one)), (one, owner[other])), shape=(count, len(triangles))) @ weighted
+    corner, other = (at_vertex @ at_vertex.T).tocoo().coords
+    alike = np.einsum("ij,ij->i", flat[owner[corner]], flat[owner[other]]) > SHARP
+    corner, other = corner[alike], other[alike]
+    summed = csr_array((np.ones(len(corner)), (corner, owner[other])), shape=(count, len(triangles))) @ weighted
     normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
     return np.asarray(unit(normals).reshape(-1, 3, 3))
 
@@ -190,9 +190,9 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
 def _arrow(tail: FloatArray, tip: FloatArray, radius: float, sides: int = 24) -> tuple[FloatArray, FloatArray]:
     """Corners and normals (k, 3, 3) of an arrow with a shaft and a head that ends at `tip`."""
     axis = unit(tip - tail)
-    across = unit(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]))
+    across, up = perpendicular_axes(axis)
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
-    spoke = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across)
+    spoke = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up
     neck, head = tip - 7.0 * radius * axis, 2.6 * radius
     rings = [tail, tail + radius * spoke, neck + radius * spoke, neck + head * spoke, tip]
     slant = unit(spoke + head / (7.0 * radius) * axis)

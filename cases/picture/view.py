@@ -142,10 +142,10 @@ def choose_view(
     best, most = _oblique(lit, TURNS[0], up), -1
     for turn in TURNS:
         view = _oblique(lit, turn, up)
-        seen = int(in_view(corners, entries, view, diagonal).sum())
-        if seen > most:
-            best, most = view, seen
-        if seen == len(entries):
+        visible = int(in_view(corners, entries, view, diagonal).sum())
+        if visible > most:
+            best, most = view, visible
+        if visible == len(entries):
             break
     return best
 

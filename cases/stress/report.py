@@ -39,7 +39,7 @@ def as_markdown(trials: Sequence[Trial]) -> str:
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|" + "---:|" * (len(HEADS) - 2)]
     lines += [f"| {' | '.join(_row(group))} |" for group in groups]
     lines += ["", NOTE, "", "## Violations", ""]
-    found = [f"* {_place(one)}: {rule}, {figure}." for one in trials for rule, figure in violations(one).items()]
+    found = [f"* {_place(trial)}: {rule}, {figure}." for trial in trials for rule, figure in violations(trial).items()]
     lines += found or ["None."]
     lines += ["", "## What breaks where", ""]
     breaking = [line for group in groups for line in _ranges(group)]
@@ -67,23 +67,23 @@ def _row(group: list[Trial]) -> list[str]:
     found = [trial.diagnostics for trial in group if trial.diagnostics is not None]
 
     def most(value: Callable[[Diagnostics], float | None], form: str = ".1e") -> str:
-        values = [each for one in found if (each := value(one)) is not None]
+        values = [each for diagnostics in found if (each := value(diagnostics)) is not None]
         return format(max(values), form) if values else ""
 
-    lowest = [one.lowest for one in found if not one.may_be_negative]
-    errors = [one.error for one in found if one.error is not None]
+    lowest = [diagnostics.lowest for diagnostics in found if not diagnostics.may_be_negative]
+    errors = [diagnostics.error for diagnostics in found if diagnostics.error is not None]
     return [
         group[0].panel.name,
         group[0].variant.name,
         *(str(outcomes[outcome]) for outcome in ("ran", "refused", "failed")),
         str(sum(map(is_warned, found))),
         f"{min(lowest):.1e}" if lowest else "",
-        most(lambda one: one.overshoot),
-        most(lambda one: abs(one.ledger)),
-        most(lambda one: one.residual),
-        most(lambda one: one.iterations, "d"),
+        most(lambda d: d.overshoot),
+        most(lambda d: abs(d.ledger)),
+        most(lambda d: d.residual),
+        most(lambda d: d.iterations, "d"),
         f"{max(errors):.2g}" if errors else "",
-        most(lambda one: one.seconds, ".1f"),
+        most(lambda d: d.seconds, ".1f"),
         str(sum(bool(violations(trial)) for trial in group)) if group[0].variant.counts else "not counted",
     ]
 

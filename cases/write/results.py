@@ -93,7 +93,7 @@ class Results:
         for channel, solution in zip(self.case.channels, self.solutions, strict=True):
             found.append((channel.name, ALL, solution))
             if len(self.case.light_names) > 1:
-                found += [(channel.name, *one) for one in solutions_by_light(list(channel.lights), solution)]
+                found += [(channel.name, *part) for part in solutions_by_light(list(channel.lights), solution)]
         return found
 
     __repr__ = one_line
@@ -126,7 +126,7 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
         values |= {f"exitance_{light}": results.exitance(light=light) for light in lights}
     if len(channels) > 1 and len(lights) > 1:
         values |= {
-            f"exitance_{one}_{channel}": results.exitance(channel, one) for one in lights for channel in channels
+            f"exitance_{light}_{channel}": results.exitance(channel, light) for light in lights for channel in channels
         }
     if results.mesh_solutions:
         # The least over channels. It is computed on the facets of a mesh.
@@ -134,10 +134,10 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
             [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
         )
     if case.camera is not None:
-        seen = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
-        values["radiance"] = np.sum(seen, axis=0)
+        radiances = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        values["radiance"] = np.sum(radiances, axis=0)
         if len(channels) > 1:
-            values |= {f"radiance_{channel}": one for channel, one in zip(channels, seen, strict=True)}
+            values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}
     if results.has_colours:
         values |= dict(zip(RGB, results.preview[0].T, strict=True))
     return values
@@ -148,4 +148,4 @@ def volume_values(results: Results) -> dict[str, FloatArray]:
     names = results.case.channel_names
     if len(names) == 1:
         return {"fluence": results.mesh_solutions[0].fluence}
-    return {f"fluence_{name}": one.fluence for name, one in zip(names, results.mesh_solutions, strict=True)}
+    return {f"fluence_{name}": solution.fluence for name, solution in zip(names, results.mesh_solutions, strict=True)}

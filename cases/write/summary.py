@@ -104,7 +104,7 @@ def _channel(
     }
     if several:
         lights = solutions_by_light(list(channel.lights), solution)
-        figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
+        figures["lights"] = [{"name": name, "power": _power(part.power)} for name, part in lights]
     return figures
 
 
@@ -142,7 +142,7 @@ def _power(power: Power) -> dict[str, float]:
 
 def _validity(validity: Validity) -> dict[str, float]:
     """The validity of the diffusion approximation; means and shares are by surface area."""
-    valid = np.maximum(1.0 - validity.of_facets, 0.0)
+    valid = np.maximum(1.0 - validity.facet_errors, 0.0)
     return {
         "albedo": validity.albedo,
         "least_thickness_in_mean_free_paths": float(validity.thickness.min()),

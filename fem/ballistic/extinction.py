@@ -3,6 +3,7 @@
 import numpy as np
 
 from tetlux.fem.ballistic.rays import Rays
+from tetlux.fem.body.optical_paths import depths_before
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.cell_tree import PathSegments
@@ -30,12 +31,8 @@ def optical_depths(part: PathSegments, extinction: float | FloatArray, cells: In
         return np.asarray(extinction * part.enter)
     depth = at_cells(extinction, cells) * (part.leave - part.enter)
     order = np.lexsort((part.enter, part.paths))
-    total = np.cumsum(depth[order])
-    before = total - depth[order]
-    first = np.diff(part.paths[order], prepend=-1) > 0
-    before -= before[first][np.cumsum(first) - 1]
-    result = np.empty(len(before))
-    result[order] = before
+    result = np.empty(len(depth))
+    result[order] = depths_before(part.paths[order], depth[order])
     return result
 
 
@@ -73,7 +70,23 @@ def cells_of(
 def attenuate(
     mesh: TetMesh, coefficients: Coefficients, rays: Rays, lengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Power that rays (r,) have after given lengths, and power absorbed on the way, (r,) each, W."""
+    """Attenuate rays along straight paths.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    coefficients : Coefficients
+    rays : Rays
+    lengths : (r,) ndarray
+        Of the paths, unit.
+
+    Returns
+    -------
+    ends : (r,) ndarray
+        Power that each ray has left, W.
+    absorbed : (r,) ndarray
+        Power that is absorbed on its way, W; the rest is scattered.
+    """
     extinction, sigma_a = coefficients.extinction, coefficients.sigma_a
     if coefficients.uniform:
         ends = rays.powers * np.exp(-extinction * lengths)

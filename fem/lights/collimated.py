@@ -13,7 +13,7 @@ from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.illumination import ENTRY_RAYS, illumination_resolution
 from tetlux.fem.lights.spots import IMMUTABLE_SPOTS, Spot
 from tetlux.fem.lights.spots.plane import sunflower
-from tetlux.fem.lights.spots.triangles import sample_spot, split_for_spot
+from tetlux.fem.lights.spots.triangles import area_vectors, sample_spot, split_for_spot
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
@@ -73,7 +73,10 @@ class CollimatedBeam:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`."""
+        """Find where the light enters; its rays start on the facets of a mesh, see `deposit_on`.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         surface = body.surface
         entries = self.entries(surface)
         if len(entries) == 0:
@@ -90,7 +93,7 @@ class CollimatedBeam:
         )
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Several on the whole body, one on a spot."""
+        """Draw several on the whole body, one on a spot; see `HasArrows`."""
         direction = unit_vector(self.direction, "direction")
         return Arrows(self.entries(surface), direction, ARROWS if self.spot is None else 1)
 
@@ -98,8 +101,8 @@ class CollimatedBeam:
         """Least depth, over some of the entries, at which the beam has decayed to 1/e, unit."""
         some = body.just_inside(entries[:: -(-len(entries) // DEPTH_SAMPLES)])
         directions = np.broadcast_to(unit_vector(self.direction, "direction"), some.shape)
-        _, ends = body.ways_out(some, directions)
-        return float(body.paths(some, directions, ends).place(np.ones(len(some)), peaked=True).min())
+        _, ends = body.extents_along(some, directions)
+        return float(body.paths(some, directions, ends).distances_at(np.ones(len(some)), delta_eddington=True).min())
 
     def entries(self, surface: Surface) -> FloatArray:
         """Sample the places where the light first meets a surface.
@@ -157,7 +160,7 @@ class CollimatedBeam:
             facets = facets[owners]
         points, powers, reach = self._sample_pieces(corners, direction)
         lit = np.flatnonzero((powers > 0) & (reach > 0))
-        # Light that is stopped by another facet before it arrives is a shadow.
+        # A piece is in shadow if the way back to the light meets another facet.
         distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
         lit = lit[distances >= reach[lit]]
         facets, places = np.unique(facets[lit], return_inverse=True)
@@ -171,8 +174,7 @@ class CollimatedBeam:
 
     def _sample_pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Place, power at an irradiance of 1, and distance that light has travelled, for pieces of facets (p, 3, 3)."""
-        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        projected_areas = -0.5 * sides @ direction
+        projected_areas = -area_vectors(corners) @ direction
         if self.spot is None:
             return corners.mean(axis=1), projected_areas, np.full(len(corners), np.inf)
         points, brightness = sample_spot(self.spot, corners, direction)

@@ -40,7 +40,10 @@ class DiffuseLight:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Compute the transmitted irradiance; the power follows from the area of the mesh."""
+        """Compute the transmitted irradiance; the power follows from the area of the mesh.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         transmittance = diffuse_transmittance(body.outer, "diffuse light")
         return Deposit(
             terms=SourceTerms(irradiance=self.irradiance, transmitted_irradiance=self.irradiance * transmittance)

@@ -12,7 +12,7 @@ from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.diffuse import diffuse_transmittance
 from tetlux.fem.lights.illumination import illumination_resolution
 from tetlux.fem.lights.spots.plane import sunflower
-from tetlux.fem.lights.spots.triangles import triangle_samples
+from tetlux.fem.lights.spots.triangles import area_vectors, triangle_samples
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
@@ -71,7 +71,10 @@ class DiffusePatch:
         check_positive(self.irradiance, "irradiance", "W/unit²")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Choose where the mesh has to be fine; which of its facets are illuminated is found on the mesh."""
+        """Choose where the mesh has to be fine; which of its facets are illuminated is found on the mesh.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         transmitted = diffuse_transmittance(body.outer, "a diffuse patch") * self.irradiance
         places = self._places(body.surface)
         depth = float(body.mean_free_paths(body.just_inside(places)).min())
@@ -80,7 +83,7 @@ class DiffusePatch:
         return Deposit(hints=MeshHints(resolution, places), footprint=Footprint(places), on_mesh=on_mesh)
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Draw a point at its center."""
+        """Draw a point at its center; see `HasArrows`."""
         return Arrows(self._middle(surface)[0][None])
 
     def _middle(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
@@ -156,8 +159,7 @@ def _areas_within(corners: FloatArray, radius: float) -> FloatArray:
 
 def _areas(corners: FloatArray) -> FloatArray:
     """Areas of triangles (f, 3, 3), (f,)."""
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.asarray(0.5 * np.linalg.norm(sides, axis=1))
+    return np.asarray(np.linalg.norm(area_vectors(corners), axis=1))
 
 
 def _shares_within(corners: FloatArray, radius: float) -> FloatArray:

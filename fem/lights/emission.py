@@ -42,7 +42,10 @@ class Emission:
         check_positive(self.density, "density", "W/unit³")
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Emit everywhere, or in the tetrahedra that a mesh has in the region."""
+        """Emit everywhere, or in the tetrahedra that a mesh has in the region.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         del body
         if self.region is None:
             return Deposit(terms=SourceTerms(emission=self.density))

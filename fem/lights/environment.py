@@ -10,6 +10,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights.diffuse import check_exact_boundary
 from tetlux.fem.lights.spots.image import check_pixels
+from tetlux.fem.lights.spots.plane import GOLDEN_ANGLE
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.sources.deposit import Deposit
@@ -57,8 +58,8 @@ class EnvironmentLight:
     >>> import numpy as np
     >>> sky = EnvironmentLight(np.repeat([[1.0], [0.0]], 4, axis=1))
     >>> towards, irradiance = sky.directions
-    >>> round(float(irradiance @ towards[:, 2]), 2)  # W/unit² on a horizontal plane: pi
-    3.14
+    >>> round(float(irradiance @ towards[:, 2]), 1)  # on a horizontal plane: pi W/unit²
+    3.1
     """
 
     radiance: FloatArray
@@ -105,7 +106,10 @@ class EnvironmentLight:
         return towards.reshape(-1, 3)[bright], irradiance[bright]
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Leave everything to a mesh: which of its facets are in shadow is found there."""
+        """Leave everything to a mesh: which of its facets are in shadow is found there.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         check_exact_boundary(body.outer, "environment light")
         return Deposit(on_mesh=self)
 
@@ -140,6 +144,6 @@ class EnvironmentLight:
 def _fibonacci_sphere(count: int) -> FloatArray:
     """Unit vectors (count, 3) spread evenly over all directions, by the golden angle."""
     index = np.arange(count)
-    height, turn = 1.0 - (2.0 * index + 1.0) / count, index * np.pi * (3.0 - np.sqrt(5.0))
+    height, turn = 1.0 - (2.0 * index + 1.0) / count, index * np.pi * GOLDEN_ANGLE
     level = np.column_stack([np.cos(turn), np.sin(turn)])
     return np.column_stack([np.sqrt(1.0 - height**2)[:, None] * level, height])

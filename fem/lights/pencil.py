@@ -111,11 +111,14 @@ class PencilBeam:
         return np.asarray(points[0])
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Draw one along its axis."""
+        """Draw one along its axis; see `HasArrows`."""
         return Arrows(self.entry(surface)[None], unit_vector(self.direction, "direction"))
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Refract it and scatter it, at points or along its path."""
+        """Refract it and scatter it, at points or along its path.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         self._check_outside(body.surface, as_vector(self.origin, "origin"))
         if self.deposit == "line" and self.radius > 0:
             return self._deposit_as_spot(body)
@@ -154,7 +157,7 @@ class PencilBeam:
     def _warnings(self, beams: "_ThinBeams", body: Body) -> list[str]:
         warnings: list[str] = []
         if len(beams.entries) < beams.count:
-            warnings.append(_partly_missed(1 - len(beams.entries) / beams.count))
+            warnings.append(_missed_note(1 - len(beams.entries) / beams.count))
         spacing = self.radius * math.sqrt(math.pi / beams.count)
         if spacing > 0:
             spacing /= shallowest_depth(beams.inside, body)
@@ -184,7 +187,7 @@ class PencilBeam:
         if len(entries) == 0:
             raise self._miss(body.surface)
         missed = 1.0 - len(entries) / (ENTRY_RAYS + 1)
-        return replace(beam.deposit_in(body), warnings=(_partly_missed(missed),) if missed > 0 else ())
+        return replace(beam.deposit_in(body), warnings=(_missed_note(missed),) if missed > 0 else ())
 
     def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
         if surface.contains(origin[None])[0]:
@@ -222,6 +225,6 @@ class _ThinBeams:
     specular: float
 
 
-def _partly_missed(share: float) -> Note:
+def _missed_note(share: float) -> Note:
     text = f"{share:.0%} of the beam's cross-section misses the body; incident power counts the rest."
     return Note("beam-partly-missed", text, value=share)

@@ -57,12 +57,15 @@ class PointSource:
         check_positive(self.power, "power", "watts")
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Draw a point."""
+        """Draw a point; see `HasArrows`."""
         del surface
         return Arrows(as_vector(self.position, "position")[None])
 
     def deposit_in(self, body: Body) -> Deposit:
-        """Put all of the power at one point."""
+        """Put all of the power at one point.
+
+        See `tetlux.fem.Light` for parameters and result.
+        """
         surface, position = body.surface, as_vector(self.position, "position")
         if not surface.contains(position[None])[0]:
             raise InputError(

@@ -64,11 +64,11 @@ def line_of(rays: Rays, body: Body) -> Deposit:
 
 def _hints_along(rays: Rays, length: float, body: Body) -> MeshHints:
     """Places along a ray of a given length inside, and half its penetration depth to resolve there."""
-    begins, _ = body.ways_out(rays.starts, rays.directions)
+    begins, _ = body.extents_along(rays.starts, rays.directions)
     paths = body.paths(rays.starts, rays.directions, np.array([length]), begins)
-    resolution = 0.5 * float(paths.place(np.ones(1), peaked=True)[0])
+    resolution = 0.5 * float(paths.distances_at(np.ones(1), delta_eddington=True)[0])
     depths = np.linspace(0.0, LARGEST_DEPTH, PLACES)
-    along = np.minimum([paths.place(np.array([depth]), peaked=True)[0] for depth in depths], length)
+    along = np.minimum([paths.distances_at(np.array([depth]), delta_eddington=True)[0] for depth in depths], length)
     return MeshHints(resolution, rays.starts[0] + np.unique(along)[:, None] * rays.directions[0])
 
 

@@ -33,10 +33,10 @@ def points_of(rays: Rays, body: Body) -> Deposit:
     if len(rays) == 0:
         return Deposit()
     paths = _paths_inside(rays, body)
-    depths, albedo = paths.place(_optical_depths(paths)), paths.albedo
+    depths, albedo = paths.distances_at(_optical_depths(paths)), paths.albedo
     points = rays.starts + depths[:, None] * rays.directions
     warnings: tuple[str, ...] = ()
-    if (paths.totals < 2.0 * DEPTH).any():
+    if (paths.total_depths < 2.0 * DEPTH).any():
         warnings = (
             Note(
                 "too-thin-for-point",
@@ -56,18 +56,18 @@ def shallowest_depth(rays: Rays, body: Body) -> float:
     """Least distance along the beams at which the optical depth is 1, unit."""
     if len(rays) == 0:
         return body.shortest_mean_free_path
-    return float(_paths_inside(rays, body).place(np.full(len(rays), DEPTH)).min())
+    return float(_paths_inside(rays, body).distances_at(np.full(len(rays), DEPTH)).min())
 
 
 def _optical_depths(paths: OpticalPaths) -> FloatArray:
-    return np.minimum(DEPTH, 0.5 * paths.totals)
+    return np.minimum(DEPTH, 0.5 * paths.total_depths)
 
 
 def _paths_inside(rays: Rays, body: Body) -> OpticalPaths:
     """Optical paths from the surface to where the beams leave the body."""
-    begins, lengths = body.ways_out(rays.starts, rays.directions)
+    begins, lengths = body.extents_along(rays.starts, rays.directions)
     paths = body.paths(rays.starts, rays.directions, lengths, begins)
-    short = np.flatnonzero(body.surface.overlaps & (paths.totals < 2.0 * DEPTH)).tolist()
+    short = np.flatnonzero(body.surface.overlaps & (paths.total_depths < 2.0 * DEPTH)).tolist()
     if not short:
         return paths
     # Where the surface overlaps itself, the first triangle may lie inside the body.

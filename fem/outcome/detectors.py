@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.fem.inputs import as_vector
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
@@ -189,9 +189,7 @@ def _unit_disc(normal: FloatArray) -> FloatArray:
     # Every other circle is turned, so that points do not line up.
     turn = 0.5 * (np.arange(CIRCLES) % 2)
     angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + turn[:, None])
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across /= np.linalg.norm(across)
-    up = np.cross(normal, across)
+    across, up = perpendicular_axes(normal)
     spread = np.cos(angle)[:, :, None] * across + np.sin(angle)[:, :, None] * up
     return np.asarray((radius[:, None, None] * spread).reshape(-1, 3))
 

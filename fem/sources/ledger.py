@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Ledger:
-    """Power of a light that does not depend on the solution, W.
+    """Power of a light that does not depend on the solution, W; `tetlux.fem.Power` is that of a solution.
 
     Parameters
     ----------

@@ -1,19 +1,19 @@
-"""An even, round spot."""
+"""A uniform, round spot."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import distances_to_disc, prepend_center, squared_distances, sunflower
-from tetlux.fem.lights.spots.spot import EDGE_SHARE, check_length
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.fem.lights.spots.plane import squared_distances
+from tetlux.fem.lights.spots.round import RoundSpot
+from tetlux.fem.lights.spots.spot import EDGE_SHARE
+from tetlux.meshing.arrays import FloatArray
 
 
 @dataclass(frozen=True)
-class Disc:
-    """An even, round spot.
+class Disc(RoundSpot):
+    """A uniform, round spot.
 
     Parameters
     ----------
@@ -21,14 +21,19 @@ class Disc:
         A point on the beam's axis, unit.
     radius : float
         unit.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or a length not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import CollimatedBeam
+    >>> beam = CollimatedBeam(direction=(0.0, 0.0, -1.0), spot=Disc(center=(0.0, 0.0, 20.0), radius=2.0))
+    >>> round(beam.spot.area, 4)  # unit², power over irradiance
+    12.5664
     """
-
-    center: Vector
-    radius: float
-
-    def __post_init__(self) -> None:
-        as_vector(self.center, "center")
-        check_length(self.radius, "radius")
 
     @property
     def reach(self) -> float:
@@ -53,11 +58,3 @@ class Disc:
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
         return np.where(squared_distances(offsets, direction) <= self.radius**2, 1.0, 0.0)
-
-    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """See `Spot`."""
-        return distances_to_disc(offsets, direction, self.reach)
-
-    def samples(self, count: int, direction: FloatArray) -> FloatArray:
-        """See `Spot`."""
-        return prepend_center(sunflower(count, self.reach, direction))

@@ -1,4 +1,4 @@
-"""An even, rectangular spot."""
+"""A uniform, rectangular spot."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from tetlux.meshing.arrays import FloatArray, Vector
 
 @dataclass(frozen=True)
 class Rectangle:
-    """An even, rectangular spot.
+    """A uniform, rectangular spot.
 
     Parameters
     ----------
@@ -22,7 +22,17 @@ class Rectangle:
     width, height : float
         Across and along `up`, unit.
     up : (3,) floats
-        The direction that is up on it, not along the beam.
+        Direction of the height; its component along the beam does not count.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or a length not positive; and, when solved, if `up` is along the beam.
+
+    Examples
+    --------
+    >>> Rectangle(center=(0.0, 0.0, 20.0), width=4.0, height=1.0).area
+    4.0
     """
 
     center: Vector

@@ -44,20 +44,60 @@ class Spot(Protocol):
         ...
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """Irradiance at offsets (q, 3), relative to that of brightness 1, (q,)."""
+        """Compute the irradiance relative to that of the beam.
+
+        Parameters
+        ----------
+        offsets : (q, 3) ndarray
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q,) ndarray
+            0 where it is dark.
+        """
         ...
 
     def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """Lower bounds of the distances from offsets (q, 3) to the bright part of the plane, (q,), unit."""
+        """Bound the distances to the bright part of the plane from below.
+
+        Parameters
+        ----------
+        offsets : (q, 3) ndarray
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q,) ndarray
+            0 within it, unit.
+        """
         ...
 
     def samples(self, count: int, direction: FloatArray) -> FloatArray:
-        """About `count` offsets (q, 3) in bright places, the center first if it is bright."""
+        """Choose bright places.
+
+        Parameters
+        ----------
+        count : int
+            About how many.
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q, 3) ndarray
+            Offsets, that of the center first if it is bright.
+        """
         ...
 
 
 def check_length(value: float, name: str) -> None:
     """Refuse a length of a spot that is not positive and finite.
+
+    Parameters
+    ----------
+    value : float
+    name : str
+        What the message calls it.
 
     Raises
     ------

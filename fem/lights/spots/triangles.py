@@ -22,6 +22,11 @@ def triangle_samples(count: int) -> FloatArray:
     return np.column_stack([1.0 - u - v, u, v])
 
 
+def area_vectors(corners: FloatArray) -> FloatArray:
+    """Normals of triangles (p, 3, 3) with the length of their areas, (p, 3), unit²."""
+    return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def split_for_spot(spot: Spot, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
     """Split triangles until each resolves the spot, and drop those away from it.
 
