@@ -20,6 +20,8 @@ from tetlux.fem.operators.fitting import Fitting, fitting_of
 from tetlux.fem.operators.limiter import nonnegative
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.outcome.solution import Power, Solution, sum_solutions
+from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.solution import QuadraticLights, QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
@@ -99,6 +101,12 @@ class System:
         """The operator for diffuse and emitted light: layers along the boundary are fitted where the mesh is coarse."""
         fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
         return self.plain if fitting is None else self._operator(fitting)
+
+    @cached_property
+    def quadratic(self) -> QuadraticOperator:
+        """The operator that detectors are read by."""
+        inner = tuple(region.surface for region in self.regions)
+        return QuadraticOperator(self.mesh, self.body, inner, self.coefficients)
 
     def _operator(self, fitting: Fitting | None) -> "Operator":
         mesh, assembly, coefficients = self.mesh, self.assembly or Assembly(self.mesh), self.coefficients
@@ -194,8 +202,13 @@ class System:
             own = [i for i, owner in enumerate(sources.owners) if owner == light]
             its_patches, its_terms = [patches[i] for i in own], [terms[i] for i in own]
             of_lights.append(self._solution(deposit, operators[light], fluence, its_patches, its_terms))
+        read_by = QuadraticLights(self.quadratic, tuple(deposits), tuple(each.patches for each in of_lights))
+        of_lights = [
+            replace(each, quadratic=QuadraticSolution(read_by, (light,))) for light, each in enumerate(of_lights)
+        ]
         solution = replace(
             sum_solutions(of_lights),
+            quadratic=QuadraticSolution(read_by, tuple(range(len(of_lights)))),
             warnings=[operator.solver.note for operator in dict.fromkeys(operators) if operator.solver.note],
             validity=Validity(mesh, self.coefficients, sources.deposits),
             residual=max((result.residual for result in solved), default=0.0),

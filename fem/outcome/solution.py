@@ -9,6 +9,8 @@ import numpy as np
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
@@ -81,6 +83,10 @@ class Solution:
         Largest relative residual of the linear systems on `mesh`, computed anew from their solutions.
     iterations : int
         Most iterations that one of them took; 0 if all were solved directly.
+    readings : tuple of Reading
+        What the detectors read that were given to `tetlux.fem.solve`, in their order.
+    quadratic : QuadraticSolution, optional
+        The same in quadratic elements, which detectors are read by: see `tetlux.fem.quadratic`.
     """
 
     mesh: TetMesh
@@ -98,6 +104,8 @@ class Solution:
     validity: Validity | None = None
     residual: float = 0.0
     iterations: int = 0
+    readings: tuple[Reading, ...] = ()
+    quadratic: QuadraticSolution | None = None
 
     @cached_property
     def exitance(self) -> FloatArray:

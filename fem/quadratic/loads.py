@@ -44,7 +44,9 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, deposit: D
         entering[mesh.boundary_nodes] = 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
         load += surface_load(space, entering)
     if np.any(deposit.emission):
-        load += volume_load(space, np.broadcast_to(deposit.emission, len(mesh.tetrahedra)))
+        emitted = volume_load(space, np.broadcast_to(deposit.emission, len(mesh.tetrahedra)))
+        # Its power is known for flat facets.
+        load += emitted * float((mesh.volumes * deposit.emission).sum()) / emitted[: len(mesh.points)].sum()
     return load
 
 

@@ -91,6 +91,20 @@ class QuadraticSpace:
             weights = weights + np.column_stack([-step.sum(axis=1), step])
         return face, weights
 
+    def within(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
+        """The tetrahedra that points (q, 3) of the body lie in or next to, (q,), and their places there, (q, 4)."""
+        mesh = self.mesh
+        cells, weights = mesh.locate(points)
+        lost = np.flatnonzero(cells < 0)
+        if len(lost):
+            cells[lost] = mesh.boundary_cells[mesh.closest_boundary(points[lost])[1]]
+            weights[lost] = mesh.barycentric(points[lost], cells[lost])
+        bends = self.bends[mesh.tetrahedron_edges[cells]]
+        for _ in range(STEPS if bends.any() else 0):
+            moved = np.einsum("qe,qei->qi", functions(weights)[:, 4:], bends)
+            weights = mesh.barycentric(points - moved, cells)
+        return cells, weights
+
     def bending(self, cells: IntArray, weights: FloatArray) -> FloatArray:
         """How the maps of tetrahedra (c,) stretch space at barycentric coordinates (q, 4) or (c, q, 4), (c, q, 3, 3)."""
         mesh = self.mesh
