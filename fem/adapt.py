@@ -7,14 +7,17 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split
+from tetlux.fem.error.readings import ReadingError, read_with_error
+from tetlux.fem.error.tolerance import cells_for_readings, cells_to_split
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.outcome.detectors import View
 from tetlux.fem.scene import Scene
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
+from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
@@ -27,6 +30,59 @@ SLOW = 8.0
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
 SceneSolver = Callable[[int, Step | None], Step]
+
+
+@dataclass(frozen=True, eq=False)
+class Aims:
+    """What a mesh is refined for.
+
+    Attributes
+    ----------
+    exitance : float, optional
+        Wanted relative L2 error of the exitance.
+    readings : float, optional
+        Wanted relative error of what each detector reads.
+    views : tuple of View
+        The detectors.
+    """
+
+    exitance: float | None
+    readings: float | None = None
+    views: tuple[View, ...] = ()
+
+    def read(self, step: Step) -> list[ReadingError]:
+        """What is read of a step, if readings have a tolerance."""
+        quadratic = step.solution.quadratic
+        if self.readings is None or quadratic is None:
+            return []
+        quadratic.operator.duals([view.sight for view in self.views])
+        return [read_with_error(quadratic, view.sight) for view in self.views]
+
+    def distance(self, step: Step) -> float:
+        """How many times its tolerance the worst error of a step is."""
+        worst = [0.0]
+        if self.exitance is not None:
+            worst.append(step.estimate.error / self.exitance)
+        if self.readings is not None:
+            worst += [reading.relative / self.readings for reading in self.read(step)]
+        return float(max(worst))
+
+    def cells_to_split(self, steps: list[Step]) -> BoolArray:
+        """Whether to split each tetrahedron of the mesh of some steps, (m,)."""
+        marked = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=bool)
+        if self.exitance is not None:
+            marked |= cells_to_split((step.estimate for step in steps), self.exitance)
+        if self.readings is not None:
+            errors = [error for step in steps for error in self.read(step)]
+            marked |= cells_for_readings(errors, self.readings, len(marked))
+        return marked
+
+    def describe(self, steps: list[Step]) -> str:
+        """The largest estimated errors of some steps, in words."""
+        words = [f"estimated error {max(step.estimate.error for step in steps):.2%}"]
+        if self.readings is not None:
+            words.append(f"of readings {max(error.relative for step in steps for error in self.read(step)):.2%}")
+        return ", ".join(words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,16 +153,16 @@ def _report_if_slow(report: Report) -> Iterator[None]:
 
 
 def solve_and_refine(
-    mesh: TetMesh, problem: Problem, tolerance: float, most_tetrahedra: int, report: Report
+    mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report
 ) -> list[Step]:
-    """Solve for all scenes on one mesh, refined until each meets the tolerance or the mesh is as large as it may be.
+    """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
 
     Parameters
     ----------
     mesh : TetMesh
         To begin with.
     problem : Problem
-    tolerance : float
+    aims : Aims
     most_tetrahedra : int
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
@@ -124,11 +180,12 @@ def solve_and_refine(
     steps = best = {first: solve_on(first, None)}
     least = np.inf
     while True:
-        worst = max(step.estimate.error for step in steps.values())
+        with problem.watch.stage("solve"):
+            worst = max(aims.distance(step) for step in steps.values())
+            marked = aims.cells_to_split(list(steps.values()))
         if worst < least:
             best, least = steps, worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
-        marked = cells_to_split((step.estimate for step in steps.values()), tolerance)
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {aims.describe(list(steps.values()))}")
         fine_enough = not marked.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):

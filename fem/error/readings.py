@@ -6,7 +6,7 @@ local error in it. With quadratic elements and their gradients averaged by R ove
     eta_K = D ∫_K (grad phi_h - R grad phi_h) . (grad z_h - R grad z_h)
 
 These have either sign and cancel mostly, like the steps of a random walk: the error is ``SIZE sqrt(sum eta_K²)``.
-What facets leave between them and the true surface adds, with moduli, the terms of `tetlux.fem.error.facets`.
+Points that lie off the mesh, where its bent facets miss the true surface, add what the fluence changes by on the way.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import at_cells
+from tetlux.fem.quadratic.roughness import roughness
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.fem.quadratic.solution import QuadraticSolution
-from tetlux.fem.quadratic.roughness import roughness
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
@@ -32,20 +32,17 @@ class ReadingError:
     ----------
     value : float
         W/unit².
-    shares : (m,) ndarray
-        Squares of the shares of tetrahedra in its error.
-    rest : float
-        The part of the error that no tetrahedron has, W/unit².
+    squares : (m,) ndarray
+        Squares of what tetrahedra add to its error.
     """
 
     value: float
-    shares: FloatArray
-    rest: float
+    squares: FloatArray
 
     @property
     def error(self) -> float:
         """Estimated error, W/unit²."""
-        return float(np.sqrt(self.shares.sum())) + self.rest
+        return float(np.sqrt(self.squares.sum()))
 
     @property
     def relative(self) -> float:
@@ -64,9 +61,10 @@ def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
     local *= operator.coefficients.diffusion * mesh.volumes
     value = solution.read(sight)
     seen = sight.on(space, operator.coefficients)
-    rest = 0.0
+    squares = (SIZE * local) ** 2
     if not sight.inside:
-        # A point that lies off the mesh reads what is there along the extrapolation length.
+        # Along the normal fluence changes by itself over the extrapolation length.
         steepness = operator.coefficients.escape / at_cells(operator.coefficients.diffusion, seen.cells)
-        rest = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
-    return ReadingError(value, (SIZE * local) ** 2, rest)
+        off = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
+        squares[seen.cells[0]] += off**2
+    return ReadingError(value, squares)

@@ -1,10 +1,11 @@
-"""The tolerance of the exitance: its range, and which tetrahedra to split to meet it."""
+"""Tolerances of the exitance and of readings: their range, and which tetrahedra to split to meet them."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
+from tetlux.fem.error.readings import ReadingError
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.errors import InputError
 
@@ -17,7 +18,12 @@ SAFETY, POWER_SAFETY = 0.65, 0.4
 WORTH_A_MESH = 1.05
 
 
-def check_tolerance(tolerance: float) -> None:
+# The same for readings: errors add up by their squares there, and quadratic elements gain more. Their aim, as a share
+# of the tolerance, leaves room for errors of more than the bar.
+READING_GAIN, READING_SHARES, READING_SAFETY = 0.85, (0.5, 0.95), 0.6
+
+
+def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
     """Refuse a tolerance that is no sensible relative error.
 
     Raises
@@ -25,7 +31,7 @@ def check_tolerance(tolerance: float) -> None:
     InputError
     """
     if not 1e-4 <= tolerance < 1:
-        raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+        raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
 def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray:
@@ -43,5 +49,20 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray
         part = float(np.clip((1.0 - aim / error) / GAIN, LEAST_SHARE, SPLIT_SHARE))
         order = np.argsort(-shares)
         reached = np.cumsum(shares[order])
+        marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
+    return marked
+
+
+def cells_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> BoolArray:
+    """Whether to split each of so many tetrahedra, (m,), to bring every reading to its aim."""
+    marked = np.zeros(cells, dtype=bool)
+    for reading in readings:
+        aim = READING_SAFETY * tolerance
+        if not reading.relative > WORTH_A_MESH * aim:
+            continue
+        wanted = (1.0 - min(aim / reading.relative, 1.0) ** 2) / READING_GAIN
+        order = np.argsort(-reading.squares)
+        reached = np.cumsum(reading.squares[order])
+        part = float(np.clip(wanted, *READING_SHARES))
         marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
     return marked
