@@ -1,6 +1,6 @@
 """Mesh a body, solve, estimate the error and refine, until the tolerance is met for every scene."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Timer
@@ -50,39 +50,47 @@ class Aims:
     readings: float | None = None
     views: tuple[View, ...] = ()
 
-    def read(self, step: Step) -> list[ReadingError]:
-        """What is read of a step, if readings have a tolerance."""
+    def assess(self, steps: Sequence[Step]) -> "Assessment":
+        """Say how far steps on one mesh are from the aims."""
+        marked = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=bool)
+        error = max(step.estimate.error for step in steps)
+        worst, words = 0.0, f"estimated error {error:.2%}"
+        if self.exitance is not None:
+            worst = error / self.exitance
+            marked |= cells_to_split((step.estimate for step in steps), self.exitance)
+        if self.readings is not None:
+            readings = [reading for step in steps for reading in self._read(step)]
+            of_readings = max((reading.relative for reading in readings), default=0.0)
+            worst = max(worst, of_readings / self.readings)
+            words += f", of readings {of_readings:.2%}"
+            marked |= cells_for_readings(readings, self.readings, len(marked))
+        return Assessment(worst, marked, words)
+
+    def _read(self, step: Step) -> list[ReadingError]:
         quadratic = step.solution.quadratic
-        if self.readings is None or quadratic is None:
-            return []
+        assert quadratic is not None
+        # All duals at once.
         quadratic.operator.duals([view.sight for view in self.views])
         return [read_with_error(quadratic, view.sight) for view in self.views]
 
-    def distance(self, step: Step) -> float:
-        """How many times its tolerance the worst error of a step is."""
-        worst = [0.0]
-        if self.exitance is not None:
-            worst.append(step.estimate.error / self.exitance)
-        if self.readings is not None:
-            worst += [reading.relative / self.readings for reading in self.read(step)]
-        return float(max(worst))
 
-    def cells_to_split(self, steps: list[Step]) -> BoolArray:
-        """Whether to split each tetrahedron of the mesh of some steps, (m,)."""
-        marked = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=bool)
-        if self.exitance is not None:
-            marked |= cells_to_split((step.estimate for step in steps), self.exitance)
-        if self.readings is not None:
-            errors = [error for step in steps for error in self.read(step)]
-            marked |= cells_for_readings(errors, self.readings, len(marked))
-        return marked
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How far steps on one mesh are from what it is refined for.
 
-    def describe(self, steps: list[Step]) -> str:
-        """The largest estimated errors of some steps, in words."""
-        words = [f"estimated error {max(step.estimate.error for step in steps):.2%}"]
-        if self.readings is not None:
-            words.append(f"of readings {max(error.relative for step in steps for error in self.read(step)):.2%}")
-        return ", ".join(words)
+    Attributes
+    ----------
+    worst : float
+        The largest of their errors, by its tolerance.
+    marked : (m,) ndarray of bool
+        Whether to split each tetrahedron.
+    words : str
+        Their errors in words.
+    """
+
+    worst: float
+    marked: BoolArray
+    words: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,22 +189,21 @@ def solve_and_refine(
     least = np.inf
     while True:
         with problem.watch.stage("solve"):
-            worst = max(aims.distance(step) for step in steps.values())
-            marked = aims.cells_to_split(list(steps.values()))
-        if worst < least:
-            best, least = steps, worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {aims.describe(list(steps.values()))}")
-        fine_enough = not marked.any()
+            found = aims.assess(list(steps.values()))
+        if found.worst < least:
+            best, least = steps, found.worst
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.words}")
+        fine_enough = not found.marked.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = refine(mesh, marked, problem.scene.surface, problem.scene.inner)
+                finer = refine(mesh, found.marked, problem.scene.surface, problem.scene.inner)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, problem.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
-            found = steps if fine_enough else best
-            return [found[scene] for scene in range(len(bodies))]
+            chosen = steps if fine_enough else best
+            return [chosen[scene] for scene in range(len(bodies))]
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf
