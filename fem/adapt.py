@@ -8,7 +8,7 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.readings import ReadingError, read_with_error
-from tetlux.fem.error.tolerance import cells_for_readings, cells_to_split
+from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import graded_towards, lit_points
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
@@ -17,7 +17,7 @@ from tetlux.fem.outcome.detectors import View
 from tetlux.fem.scene import Scene
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
@@ -26,6 +26,9 @@ from tetlux.meshing.tets.refine import refine
 MOST_TETRAHEDRA = 1_000_000
 # After this many seconds in the mesher a progress line appears.
 SLOW = 8.0
+
+# A tetrahedron is split often enough if its volume is at most this many times what halving makes of it.
+FULLY_SPLIT = 1.5
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
@@ -52,19 +55,19 @@ class Aims:
 
     def assess(self, steps: Sequence[Step]) -> "Assessment":
         """Say how far steps on one mesh are from the aims."""
-        marked = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=bool)
+        splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         worst, words = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
             worst = error / self.exitance
-            marked |= cells_to_split((step.estimate for step in steps), self.exitance)
+            splits += cells_to_split((step.estimate for step in steps), self.exitance)
         if self.readings is not None:
             readings = [reading for step in steps for reading in self._read(step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
             worst = max(worst, of_readings / self.readings)
             words += f", of readings {of_readings:.2%}"
-            marked |= cells_for_readings(readings, self.readings, len(marked))
-        return Assessment(worst, marked, words)
+            splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
+        return Assessment(worst, splits, words)
 
     def _read(self, step: Step) -> list[ReadingError]:
         quadratic = step.solution.quadratic
@@ -82,14 +85,14 @@ class Assessment:
     ----------
     worst : float
         The largest of their errors, by its tolerance.
-    marked : (m,) ndarray of bool
-        Whether to split each tetrahedron.
+    splits : (m,) ndarray of int
+        How often to split each tetrahedron.
     words : str
         Their errors in words.
     """
 
     worst: float
-    marked: BoolArray
+    splits: IntArray
     words: str
 
 
@@ -193,10 +196,10 @@ def solve_and_refine(
         if found.worst < least:
             best, least = steps, found.worst
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.words}")
-        fine_enough = not found.marked.any()
+        fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = refine(mesh, found.marked, problem.scene.surface, problem.scene.inner)
+                finer = _split(mesh, found.splits, problem.scene, most_tetrahedra)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, problem.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
@@ -207,3 +210,17 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf
+
+
+def _split(mesh: TetMesh, splits: IntArray, scene: Scene, most_tetrahedra: int) -> TetMesh:
+    """Split each tetrahedron so often, (m,), unless the mesh gets too large before that."""
+    finer = refine(mesh, splits > 0, scene.surface, scene.inner)
+    for times in range(1, int(splits.max())):
+        parents, _ = mesh.locate(finer.points[finer.tetrahedra].mean(axis=1))
+        # Between a bent surface and the facets of the coarser mesh there is none.
+        again = (splits[parents] > times) & (parents >= 0)
+        again &= finer.volumes > FULLY_SPLIT * mesh.volumes[parents] * 0.5 ** splits[parents]
+        if not again.any() or len(finer.tetrahedra) > most_tetrahedra:
+            break
+        finer = refine(finer, again, scene.surface, scene.inner)
+    return finer

@@ -60,7 +60,7 @@ def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
     local = np.einsum("mij,mij->m", solution.unresolved, roughness(space, dual)) / 4.0
     local *= operator.coefficients.diffusion * mesh.volumes
     value = solution.read(sight)
-    seen = sight.on(space, operator.coefficients)
+    seen = operator.see(sight)
     squares = (SIZE * local) ** 2
     if not sight.inside:
         # Along the normal fluence changes by itself over the extrapolation length.

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
 from tetlux.fem.error.readings import ReadingError
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 
 # Splitting tetrahedra removes the share GAIN of their error. Split those that hold enough of it to reach the aim, but
@@ -18,9 +18,10 @@ SAFETY, POWER_SAFETY = 0.65, 0.4
 WORTH_A_MESH = 1.05
 
 
-# The same for readings: errors add up by their squares there, and quadratic elements gain more. Their aim, as a share
-# of the tolerance, leaves room for errors of more than the bar.
-READING_GAIN, READING_SHARES, READING_SAFETY = 0.85, (0.5, 0.95), 0.6
+# The aim of refinement for readings, as a share of the tolerance, leaves room for errors of more than the bar. There
+# errors add up by their squares: splitting a tetrahedron leaves this share of its square. It is split this often at
+# most before the next solution.
+READING_SAFETY, LEFT, MOST_SPLITS = 0.6, 0.15, 3
 
 
 def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
@@ -53,16 +54,21 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray
     return marked
 
 
-def cells_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> BoolArray:
-    """Whether to split each of so many tetrahedra, (m,), to bring every reading to its aim."""
-    marked = np.zeros(cells, dtype=bool)
+def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
+    """How often to split each of so many tetrahedra, (m,), to bring every reading to its aim.
+
+    Tetrahedra are split until none adds more than a level to the square of the error, at which these sum to the aim.
+    """
+    splits = np.zeros(cells, dtype=np.int64)
     for reading in readings:
-        aim = READING_SAFETY * tolerance
-        if not reading.relative > WORTH_A_MESH * aim:
+        aim = READING_SAFETY * tolerance * abs(reading.value)
+        if not reading.error > WORTH_A_MESH * aim:
             continue
-        wanted = (1.0 - min(aim / reading.relative, 1.0) ** 2) / READING_GAIN
-        order = np.argsort(-reading.squares)
-        reached = np.cumsum(reading.squares[order])
-        part = float(np.clip(wanted, *READING_SHARES))
-        marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
-    return marked
+        ascending = np.sort(reading.squares)
+        # What all sum to if the level is the square of each tetrahedron in turn.
+        sums = np.cumsum(ascending) + ascending * np.arange(cells - 1, -1, -1)
+        level = ascending[max(int(np.searchsorted(sums, aim**2)) - 1, 0)]
+        level = max(float(level), aim**2 / cells)
+        over = np.maximum(reading.squares / level, 1.0)
+        splits = np.maximum(splits, np.ceil(np.log(over) / np.log(1.0 / LEFT)).astype(np.int64))
+    return np.minimum(splits, MOST_SPLITS)

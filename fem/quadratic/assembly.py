@@ -13,54 +13,33 @@ from tetlux.meshing.host.blocks import in_blocks
 BLOCK = 2048
 
 
-def matrix_of(
-    space: QuadraticSpace, coefficients: Coefficients, cells: IntArray | None = None, faces: IntArray | None = None
-) -> csr_array:
-    """The matrix of a space, or the part of it that given tetrahedra and boundary triangles (f, 3) make.
-
-    Parameters
-    ----------
-    space : QuadraticSpace
-    coefficients : Coefficients
-        Of its mesh.
-    cells : (c,) ndarray of int, optional
-    faces : (f, 3) ndarray of int, optional
-        Node numbers.
-
-    Returns
-    -------
-    (size, size) csr_array
-        Symmetric.
-    """
-    inside = np.arange(len(space.mesh.tetrahedra)) if cells is None else cells
-    of_faces = space.faces(space.mesh.boundary_faces if faces is None else faces)
-    values = _of_cells(space, coefficients, inside)
-    escaping = coefficients.escape * _of_faces(space, of_faces)
-    whole = _scattered(space.cells[inside], values, space.size) + _scattered(of_faces, escaping, space.size)
-    return csr_array(whole)
+def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
+    """The matrix of a space, (size, size), symmetric, by its `element_matrices`."""
+    faces = space.faces(space.mesh.boundary_faces)
+    escaping = coefficients.escape * face_matrices(space, faces)
+    return csr_array(_scattered(space.cells, elements, space.size) + _scattered(faces, escaping, space.size))
 
 
 def _scattered(places: IntArray, values: FloatArray, size: int) -> csr_array:
     """The sum of element matrices (m, c, c) at places (m, c)."""
     count = places.shape[1]
-    rows = np.repeat(places, count, axis=1).ravel()
-    columns = np.tile(places, count).ravel()
+    rows = np.repeat(places.astype(np.int32), count, axis=1).ravel()
+    columns = np.tile(places.astype(np.int32), count).ravel()
     return csr_array(coo_array((values.ravel(), (rows, columns)), shape=(size, size)))
 
 
-def _of_cells(space: QuadraticSpace, coefficients: Coefficients, cells: IntArray) -> FloatArray:
-    """Element matrices of tetrahedra, (c, 10, 10)."""
-    mesh = space.mesh
-    diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
-    hats, volumes = mesh.hat_gradients[cells], mesh.volumes[cells]
+def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> FloatArray:
+    """Matrices of the tetrahedra of a mesh, without its boundary, (m, 10, 10)."""
+    mesh, curved = space.mesh, space.curved
+    every = np.arange(len(mesh.tetrahedra))
+    diffusion, sigma_a = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma_a))
+    hats, volumes = mesh.hat_gradients, mesh.volumes
     products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
     values = products @ STIFFNESS + (sigma_a * volumes)[:, None] * MASS
     values = values.reshape(-1, 10, 10)
-    curved = np.flatnonzero(np.isin(cells, space.curved, assume_unique=True))
-
     def integrate(block: slice) -> None:
         some = curved[block]
-        slopes, weights = gradients(space, cells[some], TETRAHEDRON[0], TETRAHEDRON[1])
+        slopes, weights = gradients(space, some, TETRAHEDRON[0], TETRAHEDRON[1])
         own = np.einsum("cq,cqai,cqbi->cab", diffusion[some, None] * weights, slopes, slopes, optimize=True)
         hats_there = functions(TETRAHEDRON[0])
         pairs = (hats_there[:, :, None] * hats_there[:, None, :]).reshape(-1, 100)
@@ -83,7 +62,7 @@ def gradients(
     return slopes @ np.linalg.inv(bending), volumes
 
 
-def _of_faces(space: QuadraticSpace, faces: IntArray) -> FloatArray:
+def face_matrices(space: QuadraticSpace, faces: IntArray) -> FloatArray:
     """Integrals of products of the functions over triangles (f, 6), (f, 6, 6)."""
     hats = functions(TRIANGLE[0], TRIANGLE_EDGES)
     areas = TRIANGLE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE[0]), axis=2)

@@ -12,8 +12,9 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.quadratic.assembly import face_normals, gradients, matrix_of, surface_load, volume_load
-from tetlux.fem.quadratic.elements import TRIANGLE, TRIANGLE_EDGES, derivatives, functions
+from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
+from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, derivatives, functions
+from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -110,14 +111,14 @@ class QuadraticPatch:
     load: FloatArray
 
 
-def quadratic_patch(space: QuadraticSpace, patch: Patch) -> QuadraticPatch:
+def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
     """A patch with its load, as `tetlux.fem.known.patch_terms` has it for linear elements.
 
     Across inner faces of the patch the fluence jumps by what the interpolant of the charges is off. Dual solutions feel
     that jump by ``∮ (G - I G) D dz/dn``, which is added to the load, so that it does no harm to readings.
     """
-    mesh, charges, medium = patch.mesh, patch.charges, patch.charges.medium
-    coefficients = coefficients_of(medium)
+    space, coefficients = operator.space, coefficients_of(patch.charges.medium)
+    mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
         sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
         return QuadraticPatch(patch, np.zeros(space.size), quadratic_load(space, coefficients, sources))
@@ -128,9 +129,9 @@ def quadratic_patch(space: QuadraticSpace, patch: Patch) -> QuadraticPatch:
     outer = np.flatnonzero((neighbours < 0) | ~patch.cells[neighbours])
     cell, face = np.divmod(outer, 4)
     corners, on_boundary = mesh.tetrahedra[inside[cell, None], FACES[face]], neighbours.reshape(-1)[outer] < 0
-    matrix = matrix_of(space, coefficients, inside, corners[on_boundary])
-    load = matrix @ guess
-    faces = space.faces(corners)
+    faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
+    load = _product(operator.elements[inside], space.cells[inside], guess)
+    load += _product(coefficients.escape * face_matrices(space, leaving_faces), leaving_faces, guess)
     value, flux = _integrals(space, faces, charges)
     leaving = flux + (coefficients.escape * on_boundary)[:, None] * value
     load -= np.bincount(faces.ravel(), leaving.ravel(), space.size)
@@ -138,6 +139,12 @@ def quadratic_patch(space: QuadraticSpace, patch: Patch) -> QuadraticPatch:
     if within.any():
         load += _jump_load(space, charges, guess, inside[cell[within]], face[within])
     return QuadraticPatch(patch, guess, load)
+
+
+def _product(matrices: FloatArray, places: IntArray, function: FloatArray) -> FloatArray:
+    """Element matrices (c, k, k) at places (c, k) times a function (size,)."""
+    values = np.einsum("cab,cb->ca", matrices, function[places])
+    return np.asarray(np.bincount(places.ravel(), values.ravel(), len(function)), dtype=np.float64)
 
 
 def _jump_load(

@@ -11,8 +11,8 @@ from tetlux.fem.linear import krylov
 from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, dots
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.operators.assembly import Assembly
-from tetlux.fem.quadratic.assembly import matrix_of
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
+from tetlux.fem.quadratic.sight import Seen, Sight
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
@@ -48,6 +48,7 @@ class QuadraticOperator:
     inner: Sequence[Surface]
     coefficients: Coefficients
     _duals: dict[Sight, FloatArray] = field(default_factory=dict)
+    _seen: dict[Sight, Seen] = field(default_factory=dict)
 
     @cached_property
     def space(self) -> QuadraticSpace:
@@ -55,9 +56,14 @@ class QuadraticOperator:
         return quadratic_space(self.mesh, self.surface, self.inner)
 
     @cached_property
+    def elements(self) -> FloatArray:
+        """The matrices of tetrahedra, (m, 10, 10)."""
+        return element_matrices(self.space, self.coefficients)
+
+    @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size)."""
-        return matrix_of(self.space, self.coefficients)
+        return matrix_of(self.space, self.coefficients, self.elements)
 
     @cached_property
     def _product(self) -> Product:
@@ -89,11 +95,17 @@ class QuadraticOperator:
         found = at_once(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 
+    def see(self, sight: Sight) -> Seen:
+        """A sight on the mesh."""
+        if sight not in self._seen:
+            self._seen[sight] = sight.on(self.space, self.coefficients)
+        return self._seen[sight]
+
     def duals(self, sights: Sequence[Sight]) -> list[FloatArray]:
         """Dual solutions (size,) of what is read; each is solved for once."""
         new = [sight for sight in dict.fromkeys(sights) if sight not in self._duals]
         if new:
-            loads = np.column_stack([sight.on(self.space, self.coefficients).load for sight in new])
+            loads = np.column_stack([self.see(sight).load for sight in new])
             self._duals.update(zip(new, self.solve(loads).T.copy(), strict=True))
         return [self._duals[sight] for sight in sights]
 

@@ -36,7 +36,7 @@ class QuadraticLights:
     @cached_property
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
-        return tuple(tuple(quadratic_patch(self.operator.space, each) for each in own) for own in self.linear)
+        return tuple(tuple(quadratic_patch(self.operator, each) for each in own) for own in self.linear)
 
     @cached_property
     def loads(self) -> FloatArray:
@@ -101,7 +101,7 @@ class QuadraticSolution:
 
     def read(self, sight: Sight) -> float:
         """The mean exitance, W/unit², or fluence inside."""
-        seen = sight.on(self.operator.space, self.operator.coefficients)
+        seen = self.operator.see(sight)
         dual = self.operator.duals([sight])[0]
         values = seen.scale * self.at(seen)
         if not sight.inside:

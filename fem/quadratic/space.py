@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from tetlux.fem.quadratic.elements import TETRAHEDRON, TRIANGLE_EDGES, derivatives, functions
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
@@ -110,6 +111,24 @@ class QuadraticSpace:
         mesh = self.mesh
         slopes = derivatives(weights)[..., 4:, :] @ mesh.hat_gradients[cells][:, None]
         return np.eye(3) + self.bends[mesh.tetrahedron_edges[cells]].transpose(0, 2, 1)[:, None] @ slopes
+
+    @cached_property
+    def straightening(self) -> FloatArray:
+        """Inverses of `bending` at the corners of curved tetrahedra, (c, 4, 3, 3)."""
+        return np.linalg.inv(self.bending(self.curved, np.eye(4)))
+
+    @cached_property
+    def averaging(self) -> tuple[IntArray, csr_array]:
+        """Numbers of corners, the same at one node in one region, (m, 4), and the matrix of means by volume there."""
+        mesh, groups = self.mesh, self.mesh.tetrahedra
+        if mesh.regions.any():
+            first = int(mesh.regions.min())
+            keys = groups * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
+            groups = np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
+        volumes = np.repeat(mesh.volumes, 4)
+        shares = volumes / np.bincount(groups.ravel(), volumes)[groups.ravel()]
+        shape = (int(groups.max()) + 1, groups.size)
+        return groups, csr_array((shares, (groups.ravel(), np.arange(groups.size))), shape=shape)
 
     __repr__ = one_line
 
