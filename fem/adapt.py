@@ -9,7 +9,7 @@ import numpy as np
 
 from tetlux.fem.error.readings import ReadingError, read_with_error
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
-from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.grading import graded_between, graded_towards, lit_points
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
@@ -20,15 +20,12 @@ from tetlux.fem.system import Step
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import refine
+from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
 # After this many seconds in the mesher a progress line appears.
 SLOW = 8.0
-
-# A tetrahedron is split often enough if its volume is at most this many times what halving makes of it.
-FULLY_SPLIT = 1.5
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
@@ -138,14 +135,20 @@ class Problem:
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
-def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
-    """The mesher's mesh of a body, refined towards its lights."""
+def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+    """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
     scene = problem.scene
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scene.surface, scene.inner, cache=cache)
         lit = lit_points([deposit for sources in problem.sources for deposit in sources.deposits])
         mesh = graded_towards(mesh, scene.surface, *lit, most_tetrahedra, inner=scene.inner)
+        if aims.readings is not None:
+            seen = np.array([view.position for view in aims.views])
+            for media in dict.fromkeys(problem.media):
+                mesh = graded_between(
+                    mesh, scene.surface, scene.inner, media, lit[0], seen, aims.readings, most_tetrahedra
+                )
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
@@ -199,7 +202,8 @@ def solve_and_refine(
         fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = _split(mesh, found.splits, problem.scene, most_tetrahedra)
+                scene = problem.scene
+                finer = refine_often(mesh, found.splits, scene.surface, scene.inner, most_tetrahedra)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, problem.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
@@ -211,16 +215,3 @@ def solve_and_refine(
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf
 
-
-def _split(mesh: TetMesh, splits: IntArray, scene: Scene, most_tetrahedra: int) -> TetMesh:
-    """Split each tetrahedron so often, (m,), unless the mesh gets too large before that."""
-    finer = refine(mesh, splits > 0, scene.surface, scene.inner)
-    for times in range(1, int(splits.max())):
-        parents, _ = mesh.locate(finer.points[finer.tetrahedra].mean(axis=1))
-        # Between a bent surface and the facets of the coarser mesh there is none.
-        again = (splits[parents] > times) & (parents >= 0)
-        again &= finer.volumes > FULLY_SPLIT * mesh.volumes[parents] * 0.5 ** splits[parents]
-        if not again.any() or len(finer.tetrahedra) > most_tetrahedra:
-            break
-        finer = refine(finer, again, scene.surface, scene.inner)
-    return finer

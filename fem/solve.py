@@ -251,7 +251,7 @@ def solve_each(
     given = mesh is not None
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *problem.size)
     if mesh is None:
-        mesh = first_mesh(problem, most_tetrahedra, report, cache=cache)
+        mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size)
     steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
     where = "on the mesh given" if given else where
