@@ -7,21 +7,26 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.sensors import readings, write_readings
+from tetlux.cases.file.sensors import described, readings, write_readings
 from tetlux.cases.picture.arrows import rays
 from tetlux.cases.picture.draw import Scene, Shape, draw
+from tetlux.cases.picture.readings import draw_readings
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import cannot_write, claimed, publish
 from tetlux.cases.write.results import AnySolution, Results, results_of, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.media.region import Region
 from tetlux.fem.scene import media_of
 from tetlux.fem.solve import solve, solve_each
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import prefixed
@@ -31,10 +36,12 @@ FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.p
 # The same surface for VTK, PyVista and ParaView, which show no values of a PLY.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
+# Drawn where there are so many detectors.
+READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary last: see `publish`.
-ALL_FILES = (*FILES.values(), VTP, READINGS, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 def run_case(
@@ -78,7 +85,7 @@ def run_case(
         with claimed(out, case.name) as folder:
             solutions = _solve(case, report, cache=cache)
             try:
-                warnings = _write(results_of(case, solutions), folder, started)
+                warnings, found = _write(results_of(case, solutions), folder, started)
                 publish(folder, target, ALL_FILES)
             except OSError as error:
                 raise cannot_write(target, error) from error
@@ -86,6 +93,8 @@ def run_case(
         if not memory_ran_out(error):
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
+    for line in described(found, case.surface.unit):
+        report(line)
     for warning in warnings:
         if note is None:
             report(f"note: {warning}")
@@ -104,6 +113,8 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
         [list(channel.lights.values()) for channel in case.channels],
         regions=case.regions,
         tolerance=case.tolerance,
+        detectors=[sensor.detector for sensor in case.sensors],
+        detector_tolerance=case.detector_tolerance,
         cache=cache,
         report=report,
     )
@@ -112,6 +123,7 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     """A solution for each channel, each with the seconds of all."""
     solutions = []
+    assert case.tolerance is not None
     media = media_of([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
@@ -124,8 +136,8 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
-def _write(results: Results, folder: Path, started: float) -> list[str]:
-    """Write all files of a run into a folder, and return its warnings."""
+def _write(results: Results, folder: Path, started: float) -> tuple[list[str], list[dict[str, Any]]]:
+    """Write all files of a run into a folder, and return its warnings and readings."""
     writing = time.perf_counter()
     case, first = results.case, results.solutions[0]
     unit = case.surface.unit
@@ -139,6 +151,8 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         warnings += draw(_scene(results, found), folder / FILES["picture"])
     if found:
         write_readings(found, unit, folder / READINGS)
+        if len(case.sensors) >= ENOUGH_TO_DRAW:
+            draw_readings(found, _lit(case), case.name, unit, folder / READINGS_PICTURE)
     compared = None
     if case.comparison is not None:
         compared = compare(case.comparison, results.with_mesh[0])
@@ -153,7 +167,14 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
-    return warnings
+    return warnings, found
+
+
+def _lit(case: Case) -> FloatArray:
+    """Where the lights of a case meet the body, or shine from, (p, 3)."""
+    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
+    places = [light.arrows(case.surface).places for light in lights.values() if isinstance(light, HasArrows)]
+    return np.vstack([np.zeros((0, 3)), *places])
 
 
 def _write_surface(results: Results, folder: Path) -> None:

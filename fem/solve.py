@@ -15,7 +15,7 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import check_memory, limited_by_memory
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
-from tetlux.fem.outcome.detectors import Detector, read, view_of
+from tetlux.fem.outcome.detectors import Detector, read_all, view_of
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scene import channels_of, scene_of
@@ -176,7 +176,7 @@ def solve(
         if tolerance is None:
             raise InputError('model "charges" needs a tolerance of the exitance; give one.')
         found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-        return replace(found, readings=tuple(read(detector, found) for detector in detectors))
+        return replace(found, readings=read_all(detectors, found))
     channels, several = channels_of(body, mesh, medium)
     solutions = solve_each(
         body,
@@ -258,7 +258,7 @@ def solve_each(
     found = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
-            readings = tuple(read(detector, step.solution) for detector in detectors)
+            readings = read_all(detectors, step.solution)
         notes = notes_on(step.solution, sources[number], tolerance, where)
         notes += notes_on_readings(readings, detector_tolerance, where)
         notes += scene.warnings(number, step.solution, given=given)

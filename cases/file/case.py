@@ -69,7 +69,10 @@ class Case:
         Of all lights, in their order.
     regions : tuple of Region
         Each with one medium for each channel; its surface bears its name.
-    tolerance : float
+    tolerance : float, optional
+        Of the exitance.
+    detector_tolerance : float, optional
+        Of what detectors read.
     outputs : tuple of str
     sensors : tuple of Sensor
         The detectors, by name.
@@ -97,10 +100,11 @@ class Case:
     channels: tuple[Channel, ...]
     light_names: tuple[str, ...]
     regions: tuple[Region, ...]
-    tolerance: float
+    tolerance: float | None
     outputs: tuple[str, ...]
     spec: CaseSpec
     swept: Mapping[str, float | str]
+    detector_tolerance: float | None = None
     sensors: tuple[Sensor, ...] = ()
     camera: Vector | None = None
     up: Vector = UPRIGHT
@@ -215,7 +219,8 @@ def _case(document: Document, spec: CaseSpec, name: str, reader: Reader, values:
         light_names=names,
         regions=body.regions,
         mesh=body.mesh,
-        tolerance=spec.tolerance,
+        tolerance=spec.tolerances.exitance,
+        detector_tolerance=spec.tolerances.detectors,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         spec=spec,
         swept=values,

@@ -48,6 +48,8 @@ def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
             key = (*key, context["key"])
         if first["type"] == "body":
             key = () if "name" in context else ("mesh",)
+        if first["type"] == "tolerance":
+            key = ("tolerance",)
         raise document.error(key, _sentence(first["type"], first["msg"], first.get("input"), key)) from failure
 
 
@@ -65,7 +67,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "body", "no_mesh"):
+    if kind in ("unknown_key", "one_of", "scale", "body", "no_mesh", "tolerance"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"

@@ -1,6 +1,7 @@
 """Detectors on the surface: what they read of a solution."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,6 +142,13 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         model = float(view.sight.weights @ (1.0 - solution.valid_on(view.sight.points)))
     power = None if view.area is None else view.share * exitance * view.area
     return Reading(view.position, view.normal, exitance, view.area, power, error, model)
+
+
+def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
+    """`read` several detectors, which takes less time together."""
+    if isinstance(solution, Solution) and solution.quadratic is not None:
+        solution.quadratic.operator.duals([view_of(detector, solution).sight for detector in detectors])
+    return tuple(read(detector, solution) for detector in detectors)
 
 
 @dataclass(frozen=True, eq=False)
