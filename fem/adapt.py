@@ -166,9 +166,7 @@ def _report_if_slow(report: Report) -> Iterator[None]:
         timer.cancel()
 
 
-def solve_and_refine(
-    mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report
-) -> list[Step]:
+def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report) -> list[Step]:
     """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
 
     Parameters
@@ -214,4 +212,3 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf
-

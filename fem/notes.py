@@ -58,11 +58,11 @@ def notes_on_readings(readings: Sequence[Reading], tolerance: float | None, wher
     if not missed:
         return []
     worst = max((error for error in errors if error is not None), default=np.inf)
-    which = ", ".join(map(str, missed))
+    which = f"{'reading' if len(missed) == 1 else 'readings'} {', '.join(map(str, missed))}"
     return [
         Note(
             "detector-tolerance-missed",
-            f"the tolerance of {tolerance:g} for detectors was not met by {'reading' if len(missed) == 1 else 'readings'} "
+            f"the tolerance of {tolerance:g} for detectors was not met by "
             f"{which}: the largest estimated error is {worst:.2g}, {where}.",
             value=float(worst),
         )

@@ -267,9 +267,7 @@ def solve_each(
     return [replace(solution, seconds=seconds) for solution in found]
 
 
-def _check_tolerances(
-    tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None
-) -> None:
+def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
     """Refuse tolerances that are not sensible or do not go with the detectors.
 
     Raises

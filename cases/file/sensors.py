@@ -14,7 +14,6 @@ from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, 
 from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
 from tetlux.meshing.surface.surface import Surface
 
-
 # Columns of errors of a reading, relative.
 ERRORS = ("relative_error", "model_error")
 # Readings that are printed at the end of a run.

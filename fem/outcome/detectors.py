@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.error.readings import read_with_error
 from tetlux.fem.inputs import as_vector
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.outcome.exitance_field import ExitanceField
-from tetlux.fem.error.readings import read_with_error
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution

@@ -1,4 +1,4 @@
-"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of its functions."""
+"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of functions."""
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -37,6 +37,7 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
     products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
     values = products @ STIFFNESS + (sigma_a * volumes)[:, None] * MASS
     values = values.reshape(-1, 10, 10)
+
     def integrate(block: slice) -> None:
         some = curved[block]
         slopes, weights = gradients(space, some, TETRAHEDRON[0], TETRAHEDRON[1])

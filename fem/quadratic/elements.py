@@ -54,5 +54,5 @@ def _mass() -> FloatArray:
 
 
 # From the products of the gradients of the barycentric coordinates, (m, 16), to integrals of products of gradients of
-# the functions over a straight tetrahedron of unit volume, (m, 100); and those of the products of the functions, (100,).
+# the functions over a straight tetrahedron of unit volume, (m, 100); and those of the products of functions, (100,).
 STIFFNESS, MASS = _stiffness(), _mass()

@@ -1,4 +1,4 @@
-"""What lights put on quadratic functions: the right-hand side of `tetlux.fem.operators.loads`, for their patches too."""
+"""What lights put on quadratic functions: the right-hand side as in `tetlux.fem.operators.loads`, for patches too."""
 
 from dataclasses import dataclass
 
@@ -211,5 +211,3 @@ def _add_rule(
     amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)
     np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, hats))
     np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, hats))
-
-

@@ -107,7 +107,7 @@ class QuadraticSpace:
         return cells, weights
 
     def bending(self, cells: IntArray, weights: FloatArray) -> FloatArray:
-        """How the maps of tetrahedra (c,) stretch space at barycentric coordinates (q, 4) or (c, q, 4), (c, q, 3, 3)."""
+        """How the maps of tetrahedra (c,) stretch at barycentric coordinates (q, 4) or (c, q, 4), (c, q, 3, 3)."""
         mesh = self.mesh
         slopes = derivatives(weights)[..., 4:, :] @ mesh.hat_gradients[cells][:, None]
         return np.eye(3) + self.bends[mesh.tetrahedron_edges[cells]].transpose(0, 2, 1)[:, None] @ slopes

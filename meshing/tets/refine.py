@@ -57,9 +57,7 @@ def refine(
     return _refine(mesh, marked, surface, regions)[0]
 
 
-def refine_often(
-    mesh: TetMesh, splits: IntArray, surface: Surface, regions: Sequence[Surface], most: int
-) -> TetMesh:
+def refine_often(mesh: TetMesh, splits: IntArray, surface: Surface, regions: Sequence[Surface], most: int) -> TetMesh:
     """Bisect each tetrahedron and its parts several times.
 
     Parameters

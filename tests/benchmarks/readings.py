@@ -1,4 +1,4 @@
-"""Readings far from the light: are their error bars honest, and tolerances met? ``python -m tests.benchmarks.readings``.
+"""Readings far from the light: are error bars honest, and tolerances met? ``python -m tests.benchmarks.readings``.
 
 Without arguments: random scenes of ten detectors each, `--scenes` of them from number `--first` on, at a detector
 tolerance of .01: a ball, a plate, a cylinder or a ball in a ball, a source .3 to 10 mean free paths deep, detectors 1

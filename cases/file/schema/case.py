@@ -178,7 +178,9 @@ class CaseSpec(Section):
         found = self.tolerances
         if found.exitance is None and (found.detectors is None or self.model == "charges"):
             needed = "of the exitance" if self.model == "charges" else "of exitance or detectors"
-            raise PydanticCustomError("tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed})
+            raise PydanticCustomError(
+                "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
+            )
         if found.detectors is not None and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
         if found.detectors is not None and self.model == "charges":
