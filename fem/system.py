@@ -182,7 +182,8 @@ class System:
             own = [each for each in subtractions if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
         patches = tuple(each.patches for each in of_lights)
-        quadratic = QuadraticLights(self.quadratic, tuple(load.deposit for load in loads), patches)
+        deposits, guesses = tuple(load.deposit for load in loads), tuple(each.fluence for each in of_lights)
+        quadratic = QuadraticLights(self.quadratic, deposits, patches, guesses)
         for light, each in enumerate(of_lights):
             of_lights[light] = replace(each, quadratic=QuadraticSolution(quadratic, (light,)))
         whole = self._sum(of_lights, loads, results, sources)

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.fem.known.patch import Patch
+from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.quadratic.loads import QuadraticPatch, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.operator import QuadraticOperator
@@ -14,6 +14,10 @@ from tetlux.fem.quadratic.sight import Seen, Sight
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
+
+
+# Charges are subtracted where they are at most this many times brighter than the fluence.
+BRIGHTER = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +30,23 @@ class QuadraticLights:
     deposits : tuple of Deposit
         What each light leaves on the mesh.
     linear : tuple of tuple of Patch
-        The patches of each light.
+        The patches of each light in linear elements.
+    guesses : tuple of (n,) ndarray
+        The fluence of each light in linear elements, by which patches are chosen anew.
     """
 
     operator: QuadraticOperator
     deposits: tuple[Deposit, ...]
     linear: tuple[tuple[Patch, ...], ...]
+    guesses: tuple[FloatArray, ...]
 
     @cached_property
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
-        return tuple(tuple(quadratic_patch(self.operator, each) for each in own) for own in self.linear)
+        return tuple(
+            tuple(quadratic_patch(self.operator, _widened(patch, guess)) for patch in own)
+            for own, guess in zip(self.linear, self.guesses, strict=True)
+        )
 
     @cached_property
     def loads(self) -> FloatArray:
@@ -53,6 +63,15 @@ class QuadraticLights:
         return self.operator.solve(self.loads)
 
     __repr__ = one_line
+
+
+def _widened(patch: Patch, fluence: FloatArray) -> Patch:
+    """The patch of tetrahedra where charges are not much brighter than the fluence (n,) in linear elements.
+
+    Its borders, across which the fluence jumps, are then fewer and farther from the light than those of linear elements.
+    """
+    wide = patch_of(patch.mesh, patch.charges, patch.at_nodes <= BRIGHTER * np.abs(fluence), patch.at_nodes)
+    return wide if wide.cells.sum() > patch.cells.sum() else patch
 
 
 @dataclass(frozen=True, eq=False)
