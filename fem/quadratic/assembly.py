@@ -6,7 +6,7 @@ from scipy.sparse import coo_array, csr_array
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.quadratic.elements import MASS, STIFFNESS, TETRAHEDRON, TRIANGLE, TRIANGLE_EDGES, derivatives, functions
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.host.blocks import in_blocks
 
 # Curved tetrahedra that are integrated at once.
@@ -86,7 +86,7 @@ def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     curved = space.curved
     volumes = mesh.volumes[curved][:, None] * TETRAHEDRON[1] * np.linalg.det(space.bending(curved, TETRAHEDRON[0]))
     values[curved] = density[curved, None] * (volumes @ functions(TETRAHEDRON[0]))
-    return np.bincount(space.cells.ravel(), values.ravel(), space.size)
+    return summed(space.cells, values, space.size)
 
 
 def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
@@ -95,4 +95,4 @@ def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
     faces = space.faces(corners)
     areas = TRIANGLE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE[0]), axis=2)
     values = (areas * (at_nodes[corners] @ TRIANGLE[0].T)) @ functions(TRIANGLE[0], TRIANGLE_EDGES)
-    return np.bincount(faces.ravel(), values.ravel(), space.size)
+    return summed(faces, values, space.size)

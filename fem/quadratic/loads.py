@@ -17,7 +17,7 @@ from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, derivatives, functions
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.surface.subdivide import quartered
 from tetlux.meshing.surface.surface import longest_sides
 from tetlux.meshing.tets.march import march
@@ -57,11 +57,11 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     cells, weights = mesh.locate(points)
     inside, outside = cells >= 0, np.flatnonzero(cells < 0)
     values = powers[inside, None] * functions(weights[inside])
-    load += np.bincount(space.cells[cells[inside]].ravel(), values.ravel(), space.size)
+    load += summed(space.cells[cells[inside]], values, space.size)
     if len(outside):
         face, weights = space.on_boundary(points[outside])
         values = powers[outside, None] * functions(weights, TRIANGLE_EDGES)
-        load += np.bincount(space.faces(mesh.boundary_faces[face]).ravel(), values.ravel(), space.size)
+        load += summed(space.faces(mesh.boundary_faces[face]), values, space.size)
     return load
 
 
@@ -86,7 +86,7 @@ def _line_load(
             hats = functions(places)
             along = np.einsum("qap,qp->qa", derivatives(places), part.slopes[~outside])
             values = left[~outside, None] * (hats + forward[~outside, None] * along)
-            load += np.bincount(space.cells[part.cells[~outside]].ravel(), values.ravel(), space.size)
+            load += summed(space.cells[part.cells[~outside]], values, space.size)
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
         points.append(deposit.starts[paths] + middle[:, None] * deposit.directions[paths])
         powers.append(lost[outside])
@@ -134,7 +134,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     load += _product(coefficients.escape * face_matrices(space, leaving_faces), leaving_faces, guess)
     value, flux = _integrals(space, faces, charges)
     leaving = flux + (coefficients.escape * on_boundary)[:, None] * value
-    load -= np.bincount(faces.ravel(), leaving.ravel(), space.size)
+    load -= summed(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():
         load += _jump_load(space, charges, guess, inside[cell[within]], face[within])
@@ -144,7 +144,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
 def _product(matrices: FloatArray, places: IntArray, function: FloatArray) -> FloatArray:
     """Element matrices (c, k, k) at places (c, k) times a function (size,)."""
     values = np.einsum("cab,cb->ca", matrices, function[places])
-    return np.asarray(np.bincount(places.ravel(), values.ravel(), len(function)), dtype=np.float64)
+    return summed(places, values, len(function))
 
 
 def _jump_load(
@@ -164,7 +164,7 @@ def _jump_load(
         np.put_along_axis(places, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
     slopes, _ = gradients(space, cells, places, weights)
     values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", off, slopes, normals)
-    return np.bincount(space.cells[cells].ravel(), values.ravel(), space.size)
+    return summed(space.cells[cells], values, space.size)
 
 
 def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[FloatArray, FloatArray]:

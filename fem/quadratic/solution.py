@@ -15,7 +15,6 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
-
 # Charges are subtracted where they are at most this many times brighter than the fluence.
 BRIGHTER = 4.0
 

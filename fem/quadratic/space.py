@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.quadratic.elements import TETRAHEDRON, TRIANGLE_EDGES, derivatives, functions
-from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -44,10 +44,10 @@ class QuadraticSpace:
         return len(self.mesh.points) + len(self.bends)
 
     @cached_property
-    def cells(self) -> IndexArray:
+    def cells(self) -> IntArray:
         """The functions of each tetrahedron, (m, 10)."""
-        edges = self.mesh.tetrahedron_edges + np.int32(len(self.mesh.points))
-        return np.hstack([self.mesh.tetrahedra.astype(np.int32), edges])
+        edges = self.mesh.tetrahedron_edges.astype(np.int64) + len(self.mesh.points)
+        return np.hstack([self.mesh.tetrahedra, edges])
 
     @cached_property
     def curved(self) -> IntArray:
@@ -62,7 +62,7 @@ class QuadraticSpace:
     @cached_property
     def middles(self) -> FloatArray:
         """The middles of the edges, (e, 3)."""
-        return self.mesh.points[self.mesh.edges].mean(axis=1) + self.bends
+        return np.asarray(self.mesh.points[self.mesh.edges].mean(axis=1) + self.bends)
 
     def faces(self, corners: IntArray) -> IntArray:
         """The functions of triangles (f, 3) of nodes, (f, 6)."""
@@ -115,7 +115,7 @@ class QuadraticSpace:
     @cached_property
     def straightening(self) -> FloatArray:
         """Inverses of `bending` at the corners of curved tetrahedra, (c, 4, 3, 3)."""
-        return np.linalg.inv(self.bending(self.curved, np.eye(4)))
+        return np.asarray(np.linalg.inv(self.bending(self.curved, np.eye(4))))
 
     @cached_property
     def averaging(self) -> tuple[IntArray, csr_array]:
@@ -172,4 +172,4 @@ def _spoiled(space: QuadraticSpace) -> IntArray:
     corners = np.vstack([np.eye(4), TETRAHEDRON[0]])
     cells = space.curved
     shares = np.linalg.det(space.bending(cells, corners)) if len(cells) else np.ones((0, 1))
-    return cells[shares.min(axis=1, initial=1.0) < LEAST_SHARE]
+    return np.asarray(cells[shares.min(axis=1, initial=1.0) < LEAST_SHARE])

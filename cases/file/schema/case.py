@@ -171,7 +171,9 @@ class CaseSpec(Section):
     @property
     def tolerances(self) -> ToleranceSpec:
         """Those of each quantity."""
-        return self.tolerance if isinstance(self.tolerance, ToleranceSpec) else ToleranceSpec(exitance=self.tolerance)
+        if isinstance(self.tolerance, ToleranceSpec):
+            return self.tolerance
+        return ToleranceSpec(exitance=self.tolerance, detectors=None)
 
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
