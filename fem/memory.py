@@ -31,9 +31,11 @@ IMPORTED = 80e6
 GIVEN, REFINED = 1000.0, 1600.0
 # For each further medium, a matrix and its solver; for each light of each scene, its fluence and its patch.
 MATRIX, LIGHT = 120.0, 20.0
+# Quadratic elements, where detectors are read, on 74,000 tetrahedra.
+READING = 3750.0
 
 
-def need(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
+def need(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False, reading: bool = False) -> float:
     """Memory that it takes to solve on a mesh and to estimate the error, bytes.
 
     Parameters
@@ -45,22 +47,25 @@ def need(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool =
         Those of all scenes.
     refined : bool
         Whether the mesh is one of several, each finer than the one before.
+    reading : bool
+        Whether detectors are read.
     """
-    return IMPORTED + tetrahedra * _each(matrices, lights, refined)
+    return IMPORTED + tetrahedra * _each(matrices, lights, refined=refined, reading=reading)
 
 
-def _each(matrices: int, lights: int, refined: bool) -> float:
-    return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights
+def _each(matrices: int, lights: int, *, refined: bool, reading: bool) -> float:
+    of_readings = READING if reading else 0.0
+    return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights + of_readings
 
 
-def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
+def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> None:
     """Refuse a mesh that there is not enough memory for; see `need`.
 
     Raises
     ------
     RunError
     """
-    needed, there = need(tetrahedra, matrices, lights), available()
+    needed, there = need(tetrahedra, matrices, lights, reading=reading), available()
     if needed > there:
         raise RunError(
             f"{tetrahedra:,} tetrahedra need about {gigabytes(needed)} GB of memory, and {gigabytes(there)} GB are "
@@ -68,10 +73,10 @@ def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
         )
 
 
-def limited_by_memory(most: int, matrices: int = 1, lights: int = 1) -> tuple[int, str]:
+def limited_by_memory(most: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> tuple[int, str]:
     """How many tetrahedra a mesh may be refined to, `most` at the most, and in words what the limit is."""
     there = available()
-    affordable = max(0.0, there - IMPORTED) / _each(matrices, lights, refined=True)
+    affordable = max(0.0, there - IMPORTED) / _each(matrices, lights, refined=True, reading=reading)
     if affordable >= most:
         return most, f"at the limit of {most:,} tetrahedra"
     return int(affordable), f"at the {affordable:,.0f} tetrahedra that {gigabytes(there)} GB of memory suffice for"

@@ -249,10 +249,10 @@ def solve_each(
         aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
     problem = Problem(scene, sources, mass, limit, watch)
     given = mesh is not None
-    most_tetrahedra, where = limited_by_memory(most_tetrahedra, *problem.size)
+    most_tetrahedra, where = limited_by_memory(most_tetrahedra, *problem.size, reading=len(detectors) > 0)
     if mesh is None:
         mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
-    check_memory(len(mesh.tetrahedra), *problem.size)
+    check_memory(len(mesh.tetrahedra), *problem.size, reading=len(detectors) > 0)
     steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
     where = "on the mesh given" if given else where
     found = []

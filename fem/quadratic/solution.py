@@ -67,7 +67,7 @@ class QuadraticLights:
 def _widened(patch: Patch, fluence: FloatArray) -> Patch:
     """The patch of tetrahedra where charges are not much brighter than the fluence (n,) in linear elements.
 
-    Its borders, across which the fluence jumps, are then fewer and farther from the light than those of linear elements.
+    Its borders, across which the fluence jumps, are then farther from the light than those of linear elements.
     """
     wide = patch_of(patch.mesh, patch.charges, patch.at_nodes <= BRIGHTER * np.abs(fluence), patch.at_nodes)
     return wide if wide.cells.sum() > patch.cells.sum() else patch
