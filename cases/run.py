@@ -12,6 +12,7 @@ import numpy as np
 from tetlux.cases.compare.differences import as_json, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
+from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.sensors import described, readings, write_readings
 from tetlux.cases.picture.arrows import rays
 from tetlux.cases.picture.draw import Scene, Shape, draw
@@ -152,7 +153,8 @@ def _write(results: Results, folder: Path, started: float) -> tuple[list[str], l
     if found:
         write_readings(found, unit, folder / READINGS)
         if len(case.sensors) >= ENOUGH_TO_DRAW:
-            draw_readings(found, _lit(case), case.name, unit, folder / READINGS_PICTURE)
+            whole = [row for row in found if row["light"] == ALL]
+            draw_readings(whole, _lit(case), case.name, unit, folder / READINGS_PICTURE)
     compared = None
     if case.comparison is not None:
         compared = compare(case.comparison, results.with_mesh[0])

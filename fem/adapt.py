@@ -7,13 +7,13 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.readings import ReadingError, read_with_error
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import graded_between, graded_towards, lit_points
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.outcome.detectors import View
+from tetlux.fem.quadratic.error import ReadingError, read_with_error
 from tetlux.fem.scene import Scene
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step

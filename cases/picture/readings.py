@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from tetlux.cases.file.channels import ALL
 from tetlux.meshing.arrays import FloatArray
 
 COLORS = ("#d1495b", "#2e86ab", "#3a7d44", "#edae49", "#6d597a", "#30343f")
@@ -18,12 +17,12 @@ LEAST = 0.01
 
 
 def draw_readings(rows: Sequence[dict[str, Any]], lit: FloatArray, title: str, unit: str, path: Path) -> None:
-    """Draw what detectors read of all lights together, a colour for each channel.
+    """Draw what detectors read, a colour for each channel.
 
     Parameters
     ----------
     rows : sequence of dict
-        As `tetlux.cases.file.sensors.readings` returns them.
+        As `tetlux.cases.file.sensors.readings` returns them, of all lights together.
     lit : (p, 3) ndarray
         Where the lights meet the body. If there are no such places, readings are drawn in the detectors' order.
     title, unit : str
@@ -33,10 +32,9 @@ def draw_readings(rows: Sequence[dict[str, Any]], lit: FloatArray, title: str, u
     figure = Figure(figsize=(11.2, 7.2), dpi=125, facecolor="white")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    whole = [row for row in rows if row["light"] == ALL]
-    names = list(dict.fromkeys(row["channel"] for row in whole))
+    names = list(dict.fromkeys(row["channel"] for row in rows))
     for number, channel in enumerate(names):
-        own = [row for row in whole if row["channel"] == channel]
+        own = [row for row in rows if row["channel"] == channel]
         values = np.array([row["exitance"] for row in own])
         errors = np.array([row["relative_error"] or 0.0 for row in own]) * np.abs(values)
         lower = np.minimum(errors, (1.0 - LEAST) * np.abs(values))

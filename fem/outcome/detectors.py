@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.error.readings import read_with_error
 from tetlux.fem.inputs import as_vector
 from tetlux.fem.media.varying import as_text
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line

@@ -22,7 +22,7 @@ class Reading:
     power : float or None
         Exitance times area, and for a fibre the share of it within its aperture, W; None for a point.
     relative_error : float or None
-        Estimated numerical error of this reading, relative: see `tetlux.fem.error.readings`. None where it is not
+        Estimated numerical error of this reading, relative: see `tetlux.fem.quadratic.error`. None where it is not
         estimated, as without a mesh.
     model_error : float or None
         Expected relative error of the diffusion approximation there, which no mesh makes smaller: see

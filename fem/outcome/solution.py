@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.fem.error.readings import read_with_error
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
@@ -248,7 +248,7 @@ class Solution:
         fluence : (q,) ndarray
             W/unit²; nan outside the body.
         relative_error : (q,) ndarray
-            Estimated numerical error, relative: see `tetlux.fem.error.readings`.
+            Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
         """
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
         found = np.full((2, len(queries)), np.nan)

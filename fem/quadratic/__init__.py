@@ -15,4 +15,5 @@ boundary and of interfaces are bent onto the true surface, and with them the tet
     operator    the matrix with its solver, and the dual solutions of what is read
     solution    the fluence of lights, and what is read of it
     roughness   what a function does not resolve
+    error       how far off a reading is, by its dual solution
 """

@@ -47,7 +47,7 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
         values[some] = own + ((sigma_a[some, None] * weights) @ pairs).reshape(-1, 10, 10)
 
     in_blocks(integrate, len(curved), BLOCK)
-    return values
+    return np.asarray(values)
 
 
 def gradients(

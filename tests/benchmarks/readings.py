@@ -188,7 +188,7 @@ def print_fits(kept: bool) -> None:
         medium = Medium(sigma_a=start[0], sigma_s_prime=start[1], eta=1.4)
         mesh = solve(surface, medium, [beam], tolerance=None, detectors=detectors, detector_tolerance=0.005).mesh
     started = time.process_time()
-    found = least_squares(residuals, np.log(start), diff_step=0.02, x_scale=1.0, xtol=1e-4)
+    found = least_squares(residuals, np.log(start), diff_step=[0.02, 0.02], x_scale=1.0, xtol=1e-4)
     off = np.exp(found.x) / right - 1.0
     how = "kept mesh" if kept else "meshes made anew"
     print(

@@ -21,7 +21,7 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
 # Calibrated so that the true error is within twice the bar for 95 % of readings (`tests.benchmarks.readings`).
-SIZE = 0.5
+SIZE = 0.65
 
 
 @dataclass(frozen=True, eq=False)
