@@ -28,6 +28,11 @@ from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.fem.solve import solve, solve_each
+from tetlux.fem.sources.footprint import Footprint
+from tetlux.fem.sources.hints import MeshHints
+from tetlux.fem.sources.ledger import Ledger
+from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 
 __all__ = [
@@ -42,10 +47,13 @@ __all__ = [
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
+    "Footprint",
     "Gaussian",
     "Image",
+    "Ledger",
     "Light",
     "Medium",
+    "MeshHints",
     "PencilBeam",
     "PointDetector",
     "PointSource",
@@ -53,7 +61,9 @@ __all__ = [
     "Reading",
     "Rectangle",
     "Region",
+    "Segments",
     "Solution",
+    "SourceTerms",
     "System",
     "VaryingMedium",
     "grid_field",

@@ -25,7 +25,7 @@ from tetlux.fem.operators.fitting import Fitting
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.blocks import at_once
+from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -119,7 +119,7 @@ def estimate_error(
         shares += interface_layers(mesh, coefficients, smooth, at_corners)
         return shares + FACETS * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
 
-    shares, power_shares = at_once(shares_by, list(duals.T))
+    shares, power_shares = map_in_threads(shares_by, list(duals.T))
     return Estimate(shares + ripple(mesh, coefficients, load, norm), power_shares)
 
 

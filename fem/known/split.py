@@ -11,7 +11,9 @@ from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.light import Light
+from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -31,14 +33,14 @@ class Sources:
         The points among that, where these are subtracted.
     owners : tuple of int
         The light of each of these.
-    on_mesh : tuple of Deposit
-        What of each light is left to be put on the nodes.
+    remaining : tuple of Deposit
+        What of each light is not subtracted: the right-hand side on the mesh.
     """
 
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
-    on_mesh: tuple[Deposit, ...]
+    remaining: tuple[Deposit, ...]
 
     @property
     def warnings(self) -> list[str]:
@@ -79,7 +81,7 @@ def sources_of(
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
-    on_mesh: list[Deposit] = []
+    remaining: list[Deposit] = []
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract == "half-space"
     for number, light in enumerate(lights):
@@ -94,8 +96,8 @@ def sources_of(
         charges += found
         owners += [number] * len(found)
         deposits.append(known)
-        on_mesh.append(rest)
-    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+        remaining.append(rest)
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(remaining))
 
 
 def check_list(lights: Sequence[Light]) -> None:
@@ -136,11 +138,12 @@ def _charges_in_one_medium(
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
-    if len(deposit.starts):
+    if len(deposit.terms.segments):
         trials.insert(0, (*beam_as_charges(deposit, medium), images))
     for bright, faint, with_images in trials:
-        if 0 < len(bright.points) <= most:
-            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=most)
+        points, powers = bright.terms.points, bright.terms.powers
+        if 0 < len(points) <= most:
+            some = charges_of(points, powers, surface, medium, images=with_images, most=most)
             if some is not None:
                 return bright, faint, [some]
     return deposit, deposit, []
@@ -154,17 +157,18 @@ def _charges_in_several(
     What is subtracted solves the equation of the region's medium and no other, so it ends where the region does. Images
     serve where that region is also what bounds the body nearest to the source.
     """
-    if len(deposit.points) == 0:
+    points, powers = deposit.terms.points, deposit.terms.powers
+    if len(points) == 0:
         return deposit, deposit, []
-    places = body.region_at(deposit.points)
-    outermost = body.region_at(body.just_inside(deposit.points)) == places
+    places = body.region_at(points)
+    outermost = body.region_at(body.just_inside(points)) == places
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
         medium, inside = body.by_label[region], places == region
         if isinstance(medium, Medium) and most > 0:
             some = charges_of(
-                deposit.points[inside],
-                deposit.powers[inside],
+                points[inside],
+                powers[inside],
                 body.surface,
                 medium,
                 images=images & outermost[inside],
@@ -175,8 +179,12 @@ def _charges_in_several(
                 most -= len(some.positions)
                 rest &= ~inside
                 found.append(some)
-    return deposit, replace(deposit, points=deposit.points[rest], powers=deposit.powers[rest]), found
+    return deposit, _keep_points(deposit, rest), found
 
 
 def _without_points(deposit: Deposit) -> Deposit:
-    return replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])
+    return _keep_points(deposit, np.zeros(len(deposit.terms.points), dtype=bool))
+
+
+def _keep_points(deposit: Deposit, some: BoolArray) -> Deposit:
+    return replace(deposit, terms=deposit.terms.select_points(some))

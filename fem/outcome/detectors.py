@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
@@ -15,7 +14,7 @@ from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.meshing.arrays import FloatArray, Vector
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
 # How far from the surface a point may be, as a share of the body's diagonal.

@@ -6,8 +6,8 @@ from scipy.sparse import coo_array, csr_array
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.quadratic.elements import MASS, STIFFNESS, TETRAHEDRON, TRIANGLE, TRIANGLE_EDGES, derivatives, functions
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
-from tetlux.meshing.host.blocks import in_blocks
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.host.blocks import run_in_blocks
 
 # Curved tetrahedra that are integrated at once.
 BLOCK = 2048
@@ -46,7 +46,7 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
         pairs = (hats_there[:, :, None] * hats_there[:, None, :]).reshape(-1, 100)
         values[some] = own + ((sigma_a[some, None] * weights) @ pairs).reshape(-1, 10, 10)
 
-    in_blocks(integrate, len(curved), BLOCK)
+    run_in_blocks(integrate, len(curved), BLOCK)
     return np.asarray(values)
 
 
@@ -86,7 +86,7 @@ def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     curved = space.curved
     volumes = mesh.volumes[curved][:, None] * TETRAHEDRON[1] * np.linalg.det(space.bending(curved, TETRAHEDRON[0]))
     values[curved] = density[curved, None] * (volumes @ functions(TETRAHEDRON[0]))
-    return summed(space.cells, values, space.size)
+    return sum_by_index(space.cells, values, space.size)
 
 
 def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
@@ -95,4 +95,4 @@ def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
     faces = space.faces(corners)
     areas = TRIANGLE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE[0]), axis=2)
     values = (areas * (at_nodes[corners] @ TRIANGLE[0].T)) @ functions(TRIANGLE[0], TRIANGLE_EDGES)
-    return summed(faces, values, space.size)
+    return sum_by_index(faces, values, space.size)

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from skfem.quadrature import get_quadrature
 from skfem.refdom import RefTri
 
-from tetlux.fem.ballistic.follow import cells_of, optical_depths
+from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
@@ -16,10 +16,11 @@ from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, derivatives, functions
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import longest_sides
+from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.terms import SourceTerms
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.topology import FACES
 
@@ -31,23 +32,23 @@ RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.
 CUTS = 12
 
 
-def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, deposit: Deposit) -> FloatArray:
-    """Load of a deposit, as it is on the mesh of a space, (size,)."""
+def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
+    """Load of source terms, as they are on the mesh of a space, (size,)."""
     mesh, load = space.mesh, np.zeros(space.size)
-    if len(deposit.points) or len(deposit.starts):
-        lines, points, powers = _line_load(space, coefficients, deposit)
+    if len(terms.points) or len(terms.segments):
+        lines, points, powers = _line_load(space, coefficients, terms.segments)
         load += lines
-        points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
+        points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
         load += _point_load(space, points, powers)
-    if np.any(deposit.transmitted_irradiance):
+    if np.any(terms.transmitted_irradiance):
         _, c2 = moments(coefficients.outer.eta)
         entering = np.zeros(len(mesh.points))
-        entering[mesh.boundary_nodes] = 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
+        entering[mesh.boundary_nodes] = 2.0 * terms.transmitted_irradiance / (1.0 + 3.0 * c2)
         load += surface_load(space, entering)
-    if np.any(deposit.emission):
-        emitted = volume_load(space, np.broadcast_to(deposit.emission, len(mesh.tetrahedra)))
+    if np.any(terms.emission):
+        emitted = volume_load(space, np.broadcast_to(terms.emission, len(mesh.tetrahedra)))
         # Its power is known for flat facets.
-        load += emitted * float((mesh.volumes * deposit.emission).sum()) / emitted[: len(mesh.points)].sum()
+        load += emitted * float((mesh.volumes * terms.emission).sum()) / emitted[: len(mesh.points)].sum()
     return load
 
 
@@ -57,25 +58,25 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     cells, weights = mesh.locate(points)
     inside, outside = cells >= 0, np.flatnonzero(cells < 0)
     values = powers[inside, None] * functions(weights[inside])
-    load += summed(space.cells[cells[inside]], values, space.size)
+    load += sum_by_index(space.cells[cells[inside]], values, space.size)
     if len(outside):
         face, weights = space.on_boundary(points[outside])
         values = powers[outside, None] * functions(weights, TRIANGLE_EDGES)
-        load += summed(space.faces(mesh.boundary_faces[face]), values, space.size)
+        load += sum_by_index(space.faces(mesh.boundary_faces[face]), values, space.size)
     return load
 
 
 def _line_load(
-    space: QuadraticSpace, coefficients: Coefficients, deposit: Deposit
+    space: QuadraticSpace, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, by Gauss points along them in every tetrahedron; stretches outside of all as points and powers."""
     mesh, load = space.mesh, np.zeros(space.size)
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
-    for part in march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells):
-        cells = cells_of(mesh, coefficients, part, deposit.starts, deposit.directions)
+    for part in march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells):
+        cells = cells_of(mesh, coefficients, part, segments.starts, segments.directions)
         extinction, scattering = (at_cells(each, cells) for each in (coefficients.extinction, coefficients.scattering))
         forward = at_cells(coefficients.cosine / coefficients.sigma_t_prime, cells)
-        arriving = deposit.fluxes[part.paths] * np.exp(-optical_depths(part, coefficients.extinction, cells))
+        arriving = segments.fluxes[part.paths] * np.exp(-optical_depths(part, coefficients.extinction, cells))
         step, outside = part.leave - part.enter, part.cells < 0
         lost = np.zeros(len(step))
         for node, weight in zip(0.5 * (1.0 + ALONG[0]), 0.5 * ALONG[1], strict=True):
@@ -86,9 +87,9 @@ def _line_load(
             hats = functions(places)
             along = np.einsum("qap,qp->qa", derivatives(places), part.slopes[~outside])
             values = left[~outside, None] * (hats + forward[~outside, None] * along)
-            load += summed(space.cells[part.cells[~outside]], values, space.size)
+            load += sum_by_index(space.cells[part.cells[~outside]], values, space.size)
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
-        points.append(deposit.starts[paths] + middle[:, None] * deposit.directions[paths])
+        points.append(segments.starts[paths] + middle[:, None] * segments.directions[paths])
         powers.append(lost[outside])
     return load, np.concatenate(points), np.concatenate(powers)
 
@@ -120,7 +121,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     space, coefficients = operator.space, coefficients_of(patch.charges.medium)
     mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
-        sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
+        sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
         return QuadraticPatch(patch, np.zeros(space.size), quadratic_load(space, coefficients, sources))
     guess = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
@@ -134,7 +135,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     load += _product(coefficients.escape * face_matrices(space, leaving_faces), leaving_faces, guess)
     value, flux = _integrals(space, faces, charges)
     leaving = flux + (coefficients.escape * on_boundary)[:, None] * value
-    load -= summed(faces, leaving, space.size)
+    load -= sum_by_index(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():
         load += _jump_load(space, charges, guess, inside[cell[within]], face[within])
@@ -144,7 +145,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
 def _product(matrices: FloatArray, places: IntArray, function: FloatArray) -> FloatArray:
     """Element matrices (c, k, k) at places (c, k) times a function (size,)."""
     values = np.einsum("cab,cb->ca", matrices, function[places])
-    return summed(places, values, len(function))
+    return sum_by_index(places, values, len(function))
 
 
 def _jump_load(
@@ -164,7 +165,7 @@ def _jump_load(
         np.put_along_axis(places, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
     slopes, _ = gradients(space, cells, places, weights)
     values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", off, slopes, normals)
-    return summed(space.cells[cells], values, space.size)
+    return sum_by_index(space.cells[cells], values, space.size)
 
 
 def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
@@ -188,7 +189,7 @@ def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tupl
                 _add_rule(value, flux, owner[now], shapes[owner[now]], where, share, charges)
         if done.all():
             break
-        owner, place = np.repeat(owner[~done], 4), quartered(place[~done])
+        owner, place = np.repeat(owner[~done], 4), quarter_triangles(place[~done])
     return value, flux
 
 

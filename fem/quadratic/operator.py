@@ -16,7 +16,7 @@ from tetlux.fem.quadratic.sight import Seen, Sight
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.blocks import at_once
+from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -92,7 +92,7 @@ class QuadraticOperator:
         size[size == 0] = 1.0
         scaled = loads / size
         groups = [np.ascontiguousarray(scaled[:, i : i + TOGETHER]) for i in range(0, loads.shape[1], TOGETHER)]
-        found = at_once(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
+        found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 
     def see(self, sight: Sight) -> Seen:

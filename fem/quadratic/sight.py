@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, functions
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 
 
@@ -78,7 +78,7 @@ class Seen:
     def load(self) -> FloatArray:
         """What it reads of each function, (size,)."""
         values = self.scale * self.sight.weights[:, None] * self.hats
-        return summed(self.places, values, self.space.size)
+        return sum_by_index(self.places, values, self.space.size)
 
     def values(self, function: FloatArray) -> FloatArray:
         """A function (size,) at the points, (q,)."""

@@ -51,7 +51,7 @@ class QuadraticLights:
     def loads(self) -> FloatArray:
         """The load of each light, (size, k), W."""
         space, coefficients = self.operator.space, self.operator.coefficients
-        loads = [quadratic_load(space, coefficients, deposit) for deposit in self.deposits]
+        loads = [quadratic_load(space, coefficients, deposit.terms) for deposit in self.deposits]
         return np.column_stack(
             [load + sum(each.load for each in own) for load, own in zip(loads, self.patches, strict=True)]
         )
@@ -138,7 +138,7 @@ class QuadraticSolution:
     def _unscattered(self, seen: Seen) -> FloatArray:
         """Exitance beside ``phi/(2A)`` under diffuse light, (q,), as `Solution.exitance` has it."""
         mesh = self.operator.mesh
-        given = sum(self.of.deposits[light].transmitted_irradiance for light in self.lights)
+        given = sum(self.of.deposits[light].terms.transmitted_irradiance for light in self.lights)
         if not np.any(given):
             return np.zeros(len(seen.cells))
         transmitted = np.zeros(len(mesh.points))

@@ -35,7 +35,7 @@ from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair.pipeline import surface_from_arrays
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
 DARKER = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
@@ -69,7 +69,7 @@ class Scene:
 
 def lit(name: str, surface: Surface, medium: Medium, beam: PencilBeam, radius: float | None = None) -> Scene:
     """A pencil beam as a point."""
-    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).points, radius)
+    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).terms.points, radius)
 
 
 def named(files: list[str]) -> list[Scene]:

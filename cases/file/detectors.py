@@ -1,4 +1,4 @@
-"""Detectors of a case: by name, and what they read."""
+"""Detectors of a case: built from the case file, read, and written as ``detectors.csv``."""
 
 import csv
 import math
@@ -21,7 +21,7 @@ MOST_LINES = 20
 
 
 @dataclass(frozen=True)
-class Sensor:
+class NamedDetector:
     """A detector with its name and kind."""
 
     name: str
@@ -29,13 +29,13 @@ class Sensor:
     detector: Detector
 
 
-def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
-    """A detector that is known to lie on the surface.
+def build_detector(spec: DetectorSpec, surface: Surface, medium: Medium) -> NamedDetector:
+    """Build a detector and check that it lies on the surface.
 
     Raises
     ------
     InputError
-        If it does not, or a number is wrong.
+        If it does not lie on the surface, or a number is out of range.
     """
     detector: Detector
     if spec.point is not None:
@@ -45,52 +45,55 @@ def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
     else:
         assert spec.fibre is not None
         detector = FibreDetector(spec.fibre.center, spec.fibre.radius, spec.fibre.numerical_aperture)
-    # It is read once in the dark, so that what is wrong with its place is said before anything is solved.
+    # Reading a dark field checks the position before anything is solved.
     read(detector, Dark(surface, medium))
-    return Sensor(spec.name, spec.kind, detector)
+    return NamedDetector(spec.name, spec.kind, detector)
 
 
-def readings(sensors: Sequence[Sensor], solutions: Sequence[tuple[str, str, ExitanceField]]) -> list[dict[str, Any]]:
-    """What detectors read, a row for each of them and each solution.
+def read_detectors(
+    detectors: Sequence[NamedDetector], solutions: Sequence[tuple[str, str, ExitanceField]]
+) -> list[dict[str, Any]]:
+    """Read all detectors in all solutions.
 
     Parameters
     ----------
-    sensors : sequence of Sensor
+    detectors : sequence of NamedDetector
     solutions : sequence of (str, str, Solution or another ExitanceField)
-        With the names of channel and light.
+        Names of channel and light, and their solution.
 
     Returns
     -------
     list of dict
-        ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²), ``power`` (W; None for a point),
-        ``relative_error`` and ``model_error`` (None where not known).
+        A row for each detector and solution: ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²),
+        ``power`` (W; None for a point), ``relative_error`` and ``model_error`` (None where they are not known).
     """
     rows = []
-    read_of = [read_all([sensor.detector for sensor in sensors], solution) for _, _, solution in solutions]
-    for number, sensor in enumerate(sensors):
-        for (channel, light, _), readings_of in zip(solutions, read_of, strict=True):
-            found = readings_of[number]
+    plain = [entry.detector for entry in detectors]
+    by_solution = [read_all(plain, solution) for _, _, solution in solutions]
+    for number, entry in enumerate(detectors):
+        for (channel, light, _), readings in zip(solutions, by_solution, strict=True):
+            reading = readings[number]
             rows.append(
                 {
-                    "name": sensor.name,
-                    "kind": sensor.kind,
+                    "name": entry.name,
+                    "kind": entry.kind,
                     "channel": channel,
                     "light": light,
-                    "position": list(found.position),
-                    "exitance": found.exitance,
-                    "power": found.power,
-                    "relative_error": _known(found.relative_error),
-                    "model_error": _known(found.model_error),
+                    "position": list(reading.position),
+                    "exitance": reading.exitance,
+                    "power": reading.power,
+                    "relative_error": _finite(reading.relative_error),
+                    "model_error": _finite(reading.model_error),
                 }
             )
     return rows
 
 
-def _known(value: float | None) -> float | None:
+def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
-def described(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
+def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
     """Lines on what is read of all lights together, for the terminal."""
     whole = [row for row in rows if row["light"] == ALL]
     several = len({row["channel"] for row in whole}) > 1
@@ -107,7 +110,7 @@ def described(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
 
 
 def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> None:
-    """Write readings as a table, units in its head."""
+    """Write readings as CSV, with units in the header."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         axes = [f"{axis} [{unit}]" for axis in "xyz"]
