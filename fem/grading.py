@@ -18,6 +18,9 @@ from tetlux.meshing.tets.refine import refine
 # tolerance of .01: the error of quadratic elements goes with its fourth power. Off the straight way light gets fainter
 # by e^{-k excess}, with what its way is longer, and edges may be longer by the root of that.
 FADING, AT_TOLERANCE = 1.5, 0.01
+# Near a detector, where its dual solution is steep, edges are shorter by the first factor, and as far away as the second
+# in these lengths they are as everywhere.
+AT_DETECTOR, NEAR_DETECTOR = 0.4, 2.0
 # So many lit points are looked at.
 MOST_LIT = 32
 # Longest edge of a tetrahedron on the first mesh, relative to its distance from the nearest source, or to the length
@@ -141,6 +144,8 @@ def grade_between(
         for light, length in enumerate(lengths):
             excess = np.minimum(excess, (from_light[:, [light]] + to_detector - length).min(axis=1))
         wanted = FADING * (tolerance / AT_TOLERANCE) ** 0.25 * np.exp(0.25 * decay * excess)
+        near = decay * to_detector.min(axis=1) / NEAR_DETECTOR
+        wanted *= np.minimum(AT_DETECTOR + (1.0 - AT_DETECTOR) * near, 1.0)
         marked = mesh.longest_edges * decay > wanted
         if not marked.any():
             break
