@@ -24,6 +24,8 @@ from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
 from tetlux.fem.outcome.of_light import solution_of_light
 from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.solution import QuadraticLights, QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -118,6 +120,12 @@ class System:
         return operator_of(self._assembly, self.model, self.mass, self._loads_expected, fitting)
 
     @cached_property
+    def quadratic(self) -> QuadraticOperator:
+        """The operator that detectors are read by."""
+        inner = tuple(region.surface for region in self.regions)
+        return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
+
+    @cached_property
     def _assembly(self) -> Assembly:
         return self.assembly or Assembly(self.mesh)
 
@@ -181,7 +189,14 @@ class System:
             fluence = fluences[:, owners == light].sum(axis=1)
             own = [each for each in subtractions if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
-        return _Solved(loads, of_lights, self._sum(of_lights, loads, results, sources), good)
+        patches = tuple(each.patches for each in of_lights)
+        deposits, guesses = tuple(load.deposit for load in loads), tuple(each.fluence for each in of_lights)
+        quadratic = QuadraticLights(self.quadratic, deposits, patches, guesses)
+        for light, each in enumerate(of_lights):
+            of_lights[light] = replace(each, quadratic=QuadraticSolution(quadratic, (light,)))
+        whole = self._sum(of_lights, loads, results, sources)
+        whole = replace(whole, quadratic=QuadraticSolution(quadratic, tuple(range(len(loads)))))
+        return _Solved(loads, of_lights, whole, good)
 
     def _loads(self, sources: Sources) -> list[Load]:
         """The load of each light: with the fitted operator where it is spread evenly, else with the plain one."""

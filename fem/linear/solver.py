@@ -79,6 +79,17 @@ class Solver:
         first = self._prepared[0]
         return first.cycle if isinstance(first, Multigrid) else None
 
+    @property
+    def preconditioner(self) -> Preconditioner:
+        """What preconditions larger matrices that hold this one: its cycle, its factors, or its diagonal."""
+        first = self._prepared[0]
+        if isinstance(first, Multigrid):
+            return first.cycle
+        if self._methods[0] is direct:
+            return lambda rest: first(rest)[0]
+        inverse = 1.0 / self.matrix.diagonal()[:, None]
+        return lambda rest: inverse * rest
+
     def solve(self, load: NumberArray) -> LinearResult:
         """Solve for one right-hand side or for several.
 

@@ -5,10 +5,15 @@ from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import Boundary
+from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.quadratic.error import read_with_error
+from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import count
@@ -83,6 +88,10 @@ class Solution:
         Largest relative residual of the linear systems on `mesh`, computed anew from their solutions.
     iterations : int
         Most iterations that one of them took; 0 if all were solved directly.
+    readings : tuple of Reading
+        What the detectors read that were given to `tetlux.fem.solve`, in their order.
+    quadratic : QuadraticSolution, optional
+        The same in quadratic elements, which detectors are read by: see `tetlux.fem.quadratic`.
     """
 
     mesh: TetMesh
@@ -100,6 +109,8 @@ class Solution:
     validity: Validity | None = None
     residual: float = 0.0
     iterations: int = 0
+    readings: tuple[Reading, ...] = ()
+    quadratic: QuadraticSolution | None = None
 
     @cached_property
     def exitance(self) -> NumberArray:
@@ -222,6 +233,35 @@ class Solution:
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
         return fluence
+
+    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Fluence at given points by quadratic elements, and how far it may be off.
+
+        Each point needs a dual solution of its own, so that thousands take minutes.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+
+        Returns
+        -------
+        fluence : (q,) ndarray
+            W/unit²; nan outside the body.
+        relative_error : (q,) ndarray
+            Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
+        """
+        queries = np.asarray(points, dtype=float).reshape(-1, 3)
+        found = np.full((2, len(queries)), np.nan)
+        if self.quadratic is None:
+            raise InputError("this solution was not made by solve, and has no errors of single points.")
+        inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
+        inside = inside[self.surface.contains(queries[inside])]
+        sights = [Sight(queries[[i]], np.ones(1), inside=True) for i in inside]
+        self.quadratic.operator.duals(sights)
+        for i, sight in zip(inside, sights, strict=True):
+            reading = read_with_error(self.quadratic, sight)
+            found[:, i] = reading.value, reading.relative
+        return found[0], found[1]
 
     def __repr__(self) -> str:
         low, high = self.exitance.real.min(), self.exitance.real.max()
