@@ -18,7 +18,7 @@ from tetlux.cases.write.publish import cannot_write, claimed, publish
 from tetlux.cases.write.results import AnySolution, Results, results_of, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
-from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.media.region import Region
 from tetlux.fem.scene import media_of
 from tetlux.fem.solve import solve, solve_each

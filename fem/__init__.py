@@ -1,7 +1,7 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,

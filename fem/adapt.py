@@ -77,7 +77,7 @@ def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache:
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scene.surface, scene.inner, cache=cache)
-        lit = lit_points([deposit for sources in problem.sources for deposit in sources.deposits])
+        lit = lit_points([deposit for sources in problem.sources for deposit in sources.left])
         mesh = graded_towards(mesh, scene.surface, *lit, most_tetrahedra, inner=scene.inner)
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tetlux.fem.error.estimate import ROUNDING
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.split import Sources
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warnings_for
@@ -126,7 +127,7 @@ def _on_shallow_sources(solution: Solution) -> Iterator[Note]:
     """At most one note: on the first patch with a source whose depth differs much between facets and surface."""
     for patch in solution.patches:
         sources = patch.charges.positions[: patch.charges.sources]
-        if len(sources) == 0:
+        if len(sources) == 0 or isinstance(patch, FittedPatch):
             continue
         depths = np.linalg.norm(solution.surface.closest(sources)[0] - sources, axis=1)
         below_facets = np.linalg.norm(solution.mesh.closest_boundary(sources)[0] - sources, axis=1)

@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Any, Literal, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, solve_and_refine
-from tetlux.fem.charges.solution import ChargeSolution
-from tetlux.fem.charges.solve import solve_with_charges
+from tetlux.fem.meshless.solution import ChargeSolution
+from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of
+from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
+from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
 from tetlux.fem.labelled import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
@@ -83,7 +84,7 @@ def solve(
     tolerance: float = 0.02,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
-    subtract: Subtract = "half-space",
+    subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
@@ -112,9 +113,11 @@ def solve(
         Use this mesh of the body as it is.
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
-    subtract : {"half-space", "free-space", "nothing"}
-        The closed form that is subtracted from the fluence of point sources before the rest is solved for, see
-        `tetlux.fem.known`.
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        What is subtracted from the fluence of point sources before the rest is solved for, see `tetlux.fem.known`.
+        "fitted" is charges fitted to the surface, for points and beams that are points in one even medium, where a
+        `Surface` says what the true one is; all other light, and light for which they would not do, has "half-space".
+        Where they are is kept with the mesh of a solution: on the same `mesh` exitance depends smoothly on the medium.
     limit : bool
         Whether the fluence is limited to be nonnegative where lumping alone does not make it so, see
         `tetlux.fem.operators.limiter`.
@@ -189,7 +192,7 @@ def solve_each(
     tolerance: float = 0.02,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
-    subtract: Subtract = "half-space",
+    subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
@@ -225,7 +228,13 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         scene = scene_of(body, mesh, medium, regions, len(scenes))
-        sources = [sources_of(lights, each, subtract) for lights, each in zip(scenes, scene.bodies, strict=True)]
+        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        if isinstance(body, TetMesh):
+            subtract = without_fit(subtract)
+        sources = [
+            sources_of(lights, each, subtract, tolerance=tolerance, kept=kept)
+            for lights, each in zip(scenes, scene.bodies, strict=True)
+        ]
     problem = Problem(scene, sources, mass, limit, watch)
     given = mesh is not None
     most_tetrahedra, where = limited_by_memory(most_tetrahedra, *problem.size)
@@ -233,6 +242,7 @@ def solve_each(
         mesh = first_mesh(problem, most_tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size)
     steps = solve_and_refine(mesh, problem, tolerance, 0 if given else most_tetrahedra, report)
+    keep_with(steps[0].solution.mesh, kept)
     found = []
     for number, step in enumerate(steps):
         notes = notes_on(step.solution, sources[number], tolerance, "on the mesh given" if given else where)

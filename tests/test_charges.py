@@ -21,7 +21,7 @@ from tetlux.fem import (
     read,
     solve,
 )
-from tetlux.fem.charges import ChargeSolution, solve_with_charges
+from tetlux.fem.meshless import ChargeSolution, solve_with_charges
 from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_charges
 from tetlux.fem.charges.check import norm, quality_of
 from tetlux.fem.charges.field import ChargeField

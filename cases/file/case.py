@@ -16,7 +16,7 @@ from tetlux.cases.file.sensors import Sensor, sensor_of
 from tetlux.cases.file.sweep import LONGEST_NAME, swept
 from tetlux.cases.file.validation import validated
 from tetlux.cases.picture.view import UPRIGHT, toward_camera
-from tetlux.fem.charges.solve import check_deposit, check_simple, even_medium
+from tetlux.fem.meshless.solve import check_deposit, check_simple, even_medium
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of

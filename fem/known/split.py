@@ -1,22 +1,26 @@
 """What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.fitted import FittedLight, fit_light
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
+from tetlux.fem.known.kept import KeptPlaces
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit, Light
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 
-Subtract = Literal["half-space", "free-space", "nothing"]
+Subtract = Literal["fitted", "half-space", "free-space", "nothing"]
+# Fitted charges of all lights; lights that come later are left to the half-space.
+MOST_FITTED = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,9 +32,11 @@ class Sources:
     deposits : tuple of Deposit
         What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
-        The points among that, where these are subtracted.
+        The points among that, where these are subtracted near by.
     owners : tuple of int
         The light of each of these.
+    fitted : mapping of int to FittedLight
+        Lights from which charges are subtracted that were fitted to the surface.
     on_mesh : tuple of Deposit
         What of each light is left to be put on the nodes.
     """
@@ -38,12 +44,18 @@ class Sources:
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
+    fitted: Mapping[int, FittedLight]
     on_mesh: tuple[Deposit, ...]
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know of the lights."""
         return [warning for deposit in self.deposits for warning in deposit.warnings]
+
+    @property
+    def left(self) -> list[Deposit]:
+        """Of the lights that are not fitted, which a mesh has to resolve."""
+        return [deposit for light, deposit in enumerate(self.deposits) if light not in self.fitted]
 
     @property
     def dips(self) -> bool:
@@ -57,6 +69,9 @@ def sources_of(
     lights: Sequence[Light],
     body: Body,
     subtract: Subtract,
+    *,
+    tolerance: float = 0.02,
+    kept: KeptPlaces | None = None,
 ) -> Sources:
     """Let lights fall into a body.
 
@@ -64,15 +79,20 @@ def sources_of(
     ----------
     lights : sequence of Light
     body : Body
-    subtract : {"half-space", "free-space", "nothing"}
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        "fitted" is for a body whose surface is the true one; what cannot be fitted has "half-space".
+    tolerance : float
+        Relative L2 error of the exitance, of what is fitted and the mesh together.
+    kept : KeptPlaces, optional
+        Choices to follow, and to add to.
 
     Raises
     ------
     InputError
         If there is no light, or one of them does not go with the body or the medium.
     """
-    if subtract not in ("half-space", "free-space", "nothing"):
-        raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
+    if subtract not in get_args(Subtract):
+        raise InputError(f'subtract is "{subtract}"; it is "fitted", "half-space", "free-space" or "nothing".')
     check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
@@ -80,10 +100,18 @@ def sources_of(
     charges: list[Charges] = []
     owners: list[int] = []
     on_mesh: list[Deposit] = []
+    fitted: dict[int, FittedLight] = {}
     left = 0 if subtract == "nothing" else MOST_CHARGES
-    images = subtract == "half-space"
+    images = subtract in ("fitted", "half-space")
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
+        if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
+            found_fit = _fitted(light, deposit, body, tolerance, kept)
+            if found_fit is not None:
+                fitted[number] = found_fit
+                deposits.append(deposit)
+                on_mesh.append(_without_points(deposit))
+                continue
         if body.only_medium is not None:
             known, rest, found = _charges_in_one_medium(
                 deposit, body.surface, body.only_medium, images=images, most=left
@@ -95,7 +123,30 @@ def sources_of(
         owners += [number] * len(found)
         deposits.append(known)
         on_mesh.append(rest)
-    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(on_mesh))
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(on_mesh))
+
+
+def _fitted(
+    light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptPlaces | None
+) -> FittedLight | None:
+    """Charges fitted to a light, at places that are kept if there are any; None if they would not do."""
+    medium = body.only_medium
+    if medium is None or len(deposit.points) == 0:
+        return None
+    if kept is None:
+        return fit_light(deposit, body.surface, medium, tolerance=tolerance)
+    chosen, places = kept.find(repr(light), deposit.resolution)
+    if chosen and places is None:
+        return None
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, places=places)
+    if not chosen:
+        kept.keep(repr(light), deposit.resolution, None if found is None else found.places)
+    return found
+
+
+def without_fit(subtract: Subtract) -> Subtract:
+    """What to subtract in place of fitted charges where no true surface is known."""
+    return "half-space" if subtract == "fitted" else subtract
 
 
 def check_list(lights: Sequence[Light]) -> None:

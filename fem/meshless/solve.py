@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST
-from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
+from tetlux.fem.meshless.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.split import check_list
 from tetlux.fem.labelled import GivenMedia
