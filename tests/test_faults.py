@@ -300,7 +300,7 @@ def test_interrupted_at_any_stage(
     else:
         where = {
             "reading": "tetlux.cases.batch.load_cases",
-            "solving": "tetlux.fem.system.estimate_error",
+            "solving": "tetlux.fem.error.by_operator.estimate_error",
             "writing": "tetlux.cases.run.write_mesh",
             "publishing": "tetlux.cases.run.publish",
         }[stage]

@@ -4,15 +4,60 @@ Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that pa
 ``∫ Q0 v`` by the corners.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from tetlux.fem.ballistic.follow import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.media.fresnel import moments
+from tetlux.fem.operators.operator import Operator
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Load:
+    """What one light puts on the nodes of a mesh.
+
+    Attributes
+    ----------
+    deposit : Deposit
+        What the light leaves on this mesh.
+    operator : Operator
+        The operator that is solved with.
+    at_nodes : (n,) ndarray
+        The right-hand side, W.
+    """
+
+    deposit: Deposit
+    operator: Operator
+    at_nodes: FloatArray
+
+    @property
+    def has_first_moment(self) -> bool:
+        """Whether it has a Q1, beside which the diffusion equation itself may have a fluence below zero."""
+        return len(self.deposit.starts) > 0 and bool(np.any(self.operator.coefficients.cosine != 0))
+
+    __repr__ = one_line
+
+
+def load_of(deposit: Deposit, operator: Operator) -> Load:
+    """The load of a deposit, as it is on the mesh of an operator.
+
+    A fitted operator absorbs only in the layer: the rest of what is emitted is absorbed where it is emitted.
+    """
+    mesh = operator.mesh
+    at_nodes = load_vector(mesh, operator.coefficients, deposit)
+    if operator.fitting is not None and np.any(deposit.emission):
+        emitted = mesh.to_nodes(deposit.emission * mesh.volumes)
+        withheld = (1.0 - operator.fitting.absorption_scale) * emitted
+        at_nodes -= withheld
+        deposit = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+    return Load(deposit, operator, at_nodes)
 
 
 def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> FloatArray:

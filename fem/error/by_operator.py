@@ -1,0 +1,53 @@
+"""The error of all lights together, where they are solved for with different operators."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tetlux.fem.error.estimate import Estimate, estimate_error
+from tetlux.fem.operators.loads import Load
+from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.meshing.surface.surface import Surface
+
+
+def estimate_by_operator(
+    loads: Sequence[Load], of_lights: Sequence[Solution], whole: Solution, inner: Sequence[Surface]
+) -> Estimate:
+    """Estimate the error of a solution as the sum of the errors of its parts, one for each operator.
+
+    Parameters
+    ----------
+    loads : sequence of Load
+        Of the lights.
+    of_lights : sequence of Solution
+        Of each light.
+    whole : Solution
+        Their sum.
+    inner : sequence of Surface
+        Of the regions of the mesh.
+
+    Returns
+    -------
+    Estimate
+    """
+    estimates = []
+    for operator in dict.fromkeys(load.operator for load in loads):
+        own = [light for light, load in enumerate(loads) if load.operator is operator]
+        emission = sum((loads[light].deposit.emission for light in own), 0.0)
+        # Only uneven deposits make the exitance ripple, and emission is even.
+        uneven = [loads[light].at_nodes for light in own if not loads[light].deposit.even]
+        estimates.append(
+            estimate_error(
+                sum_solutions([of_lights[light] for light in own]),
+                whole,
+                operator.coefficients,
+                operator.solver,
+                np.sum([np.zeros(len(operator.mesh.points)), *uneven], axis=0),
+                emission,
+                inner,
+                operator.fitting,
+            )
+        )
+    return Estimate(
+        np.sum([each.shares for each in estimates], axis=0), np.sum([each.power_shares for each in estimates], axis=0)
+    )

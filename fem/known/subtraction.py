@@ -1,0 +1,48 @@
+"""`Subtraction`: charges that are subtracted on a mesh, and what that adds to the equations there."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.patch import Patch, patch_of
+from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
+from tetlux.fem.operators.assembly import Mass
+from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.describe import one_line
+from tetlux.meshing.tets.mesh import TetMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Subtraction:
+    """Charges of one light that are subtracted on a patch of a mesh.
+
+    Attributes
+    ----------
+    light : int
+        The number of the light.
+    patch : Patch
+        Where they are subtracted.
+    terms : PatchTerms
+        What that adds to the load vector and to the ledger.
+    mass : {"lumped", "consistent"}
+        As in the system matrix.
+    """
+
+    light: int
+    patch: Patch
+    terms: PatchTerms
+    mass: Mass
+
+    def shrink_to(self, good: BoolArray) -> "Subtraction":
+        """The same on the tetrahedra whose four nodes are good, (n,), alone."""
+        patch = patch_of(self.patch.mesh, self.patch.charges, good, self.patch.at_nodes)
+        return replace(self, patch=patch, terms=patch_terms(patch, self.mass))
+
+    __repr__ = one_line
+
+
+def subtract_on(mesh: TetMesh, light: int, charges: Charges, mass: Mass, good: BoolArray | None = None) -> Subtraction:
+    """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
+    patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
+    return Subtraction(light, patch, patch_terms(patch, mass), mass)

@@ -1,0 +1,62 @@
+"""The solution of one light: its fluence, limited where it has to be, and its ledger."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tetlux.fem.known.subtraction import Subtraction
+from tetlux.fem.operators.limiter import nonnegative
+from tetlux.fem.operators.loads import Load
+from tetlux.fem.outcome.solution import Power, Solution
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface.surface import Surface
+
+
+def solution_of_light(
+    load: Load, fluence: FloatArray, subtractions: Sequence[Subtraction], surface: Surface, *, limit: bool
+) -> Solution:
+    """The solution of one light.
+
+    Parameters
+    ----------
+    load : Load
+        Of the light.
+    fluence : (n,) ndarray
+        The solution of its linear systems, W/unit².
+    subtractions : sequence of Subtraction
+        The charges of this light that are subtracted.
+    surface : Surface
+        What the mesh stands for.
+    limit : bool
+        Whether the fluence is kept from going below zero where the diffusion equation itself keeps it from that.
+
+    Returns
+    -------
+    Solution
+    """
+    deposit, operator = load.deposit, load.operator
+    mesh, limited_power = operator.mesh, 0.0
+    if limit and not (load.has_first_moment or any(each.patch.charges.dips for each in subtractions)):
+        fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
+    outside = mesh.boundary_node_areas * deposit.irradiance
+    transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
+    emitted = float((mesh.volumes * deposit.emission).sum())
+    absorbed = float((operator.absorbing * fluence).sum())
+    ledger = Power(
+        incident=deposit.incident + float(outside.sum()) + emitted,
+        specular=deposit.specular + float((outside - transmitted).sum()),
+        absorbed=deposit.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
+        exited=0.0,
+        ballistic=deposit.ballistic,
+    )
+    solution = Solution(
+        mesh,
+        surface,
+        operator.coefficients.outer,
+        fluence,
+        ledger,
+        tuple(each.patch for each in subtractions),
+        deposit.transmitted_irradiance,
+        limited_power=limited_power,
+    )
+    exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(each.terms.exited for each in subtractions)
+    return replace(solution, power=replace(ledger, exited=exited))
