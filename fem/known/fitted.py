@@ -114,6 +114,8 @@ def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     """Whether the light is a few points well inside a simple body."""
     if not 0 < len(deposit.points) <= MOST_SOURCES or len(deposit.starts) > 0 or surface.overlaps:
         return False
+    if np.any(deposit.irradiance) or np.any(deposit.emission) or deposit.on_mesh is not None:
+        return False
     depths = np.linalg.norm(surface.project(deposit.points)[0] - deposit.points, axis=1)
     return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(deposit.points).all())
 

@@ -5,10 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.fitted import FittedLight
+from tetlux.fem.known.fitted_patch import fitted_patch, fitted_terms
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Mass
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -46,3 +48,9 @@ def subtract_on(mesh: TetMesh, light: int, charges: Charges, mass: Mass, good: B
     """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
     patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
+
+
+def subtract_fitted(mesh: TetMesh, light: int, fitted: FittedLight, mass: Mass, absorbing: FloatArray) -> Subtraction:
+    """Subtract fitted charges of a light; its load is then that of what is missing, by what nodes absorb, (n,)."""
+    patch = fitted_patch(mesh, fitted)
+    return Subtraction(light, patch, fitted_terms(patch, absorbing), mass)
