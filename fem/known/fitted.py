@@ -29,7 +29,7 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
 # Points at which the residual is integrated lie so many times the spacing of charges apart, as which it ripples.
-INTEGRATED = 0.5
+INTEGRATED = 1.0
 # A source nearer to the surface than this share of a mean free path is not fitted: it would take many charges.
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.

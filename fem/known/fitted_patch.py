@@ -15,6 +15,9 @@ from tetlux.meshing.arrays import FloatArray, IntArray, summed
 from tetlux.meshing.surface.surface import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
+# Ripples that a mesh misses are shorter than those that charges leave, by this factor.
+SHORTER = 0.65
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedPatch(Patch):
@@ -55,7 +58,7 @@ class FittedPatch(Patch):
         corners = self.mesh.boundary_faces[self.facets]
         seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
-        length = np.minimum(self.violation.points.spacing, sides[self.facets])
+        length = SHORTER * np.minimum(self.violation.points.spacing, sides[self.facets])
         missed = damped(equation_of(self.charges.medium), self.violation.residual - seen, length)
         square = self.violation.points.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
