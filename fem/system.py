@@ -163,9 +163,9 @@ class System:
             subtractions = self._subtractions(sources, before)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.at_nodes.any()]
+            coarse = () if before is None else before.solution.patches
             fitted = [
-                subtract_fitted(self.mesh, light, each, self.mass, self.plain.absorbing)
-                for light, each in sources.fitted.items()
+                subtract_fitted(light, each, self.plain, self.mass, coarse) for light, each in sources.fitted.items()
             ]
             operators = [*(self.plain for _ in [*subtractions, *fitted]), *(loads[light].operator for light in lit)]
         with watch.stage("solve"):

@@ -69,12 +69,30 @@ class FittedPatch(Patch):
         return summed(corners, values[:, None] * self.weights, len(self.mesh.points))
 
 
-def fitted_patch(mesh: TetMesh, light: FittedLight) -> FittedPatch:
-    """A light's charges on a mesh."""
-    everywhere = np.ones(len(mesh.tetrahedra), dtype=bool)
-    at_nodes = light.charges.fluence(mesh.points)
-    _, facets, weights = mesh.closest_boundary(light.violation.points.points)
+def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
+    """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
+    everywhere, points = np.ones(len(mesh.tetrahedra), dtype=bool), light.violation.points.points
+    if coarse is None:
+        at_nodes = light.charges.fluence(mesh.points)
+        _, facets, weights = mesh.closest_boundary(points)
+    else:
+        # Nodes of the coarse mesh come first.
+        new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
+        at_nodes = np.concatenate([coarse.at_nodes, new])
+        facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
+        others = np.flatnonzero(facets < 0)
+        _, facets[others], weights[others] = mesh.closest_boundary(points[others])
     return FittedPatch(mesh, light.charges, everywhere, at_nodes, light.violation, facets, weights)
+
+
+def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
+    """The boundary triangle of a refined mesh that each of the coarse mesh still is, -1 if it was split, (f,)."""
+    count = len(fine.points)
+    before, after = ((faces[:, 0] * count + faces[:, 1]) * count + faces[:, 2] for faces in
+                     (coarse.boundary_faces.astype(np.int64), fine.boundary_faces.astype(np.int64)))
+    order = np.argsort(after)
+    found = order[np.minimum(np.searchsorted(after, before, sorter=order), len(order) - 1)]
+    return np.where(after[found] == before, found, -1)
 
 
 def fitted_terms(patch: FittedPatch, absorbing: FloatArray) -> PatchTerms:
