@@ -1,4 +1,4 @@
-"""Several case files, one after the other: all are checked before the first is run."""
+"""Runs of several case files, one after the other: all files are checked before the first is run."""
 
 import sys
 import time
@@ -8,39 +8,60 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import Report, run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.cases.write.publish import check_writable
 from tetlux.meshing.errors import InputError, TetluxError
 
-# Runs that are named beside a warning that some of a sweep have; those of more are in their summaries.
-FEW = 3
+# A warning names its runs of a sweep if they are no more than this; summaries always hold it.
+MOST_NAMED = 3
 
 
 def load_all(requests: Sequence[str]) -> list[Case]:
-    """The cases of all case files.
+    """Read all case files and check that their cases have different names.
+
+    Parameters
+    ----------
+    requests : sequence of str
+        Case files, or names of those that ship.
+
+    Returns
+    -------
+    list of Case
 
     Raises
     ------
     InputError
-        If any of them is wrong, or two would write into one folder.
+        If a case file is wrong, or two cases would write into one folder.
     """
     cases = [case for request in requests for case in load_cases(find_case_file(request))]
-    seen: dict[str, Path] = {}
+    sources: dict[str, Path] = {}
     for case in cases:
-        if case.name in seen:
-            if seen[case.name] == case.source:
+        if case.name in sources:
+            if sources[case.name] == case.source:
                 raise InputError(f"{case.source} is given twice; give it once.")
             raise InputError(
-                f'{seen[case.name]} and {case.source} both make a case named "{case.name}"; give one another name.'
+                f'{sources[case.name]} and {case.source} both make a case named "{case.name}"; rename one of them.'
             )
-        seen[case.name] = case.source
+        sources[case.name] = case.source
     return cases
 
 
 def check_all(requests: Sequence[str]) -> int:
-    """Print for each case file whether it can run; 0 if all are, else 2."""
+    """Print for each case file whether it is valid, and what it describes.
+
+    Parameters
+    ----------
+    requests : sequence of str
+        Case files, or names of those that ship.
+
+    Returns
+    -------
+    int
+        0 if all are valid, else 2.
+    """
     wrong = 0
     for request in requests:
         try:
@@ -55,19 +76,20 @@ def check_all(requests: Sequence[str]) -> int:
             runs += f"channels {', '.join(first.channel_names)}; "
         size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
         print(f"{request}: ok: {runs}{_size(first)}, {size} {surface.unit}")
-        for note in (*_labels(first), *first.repairs, *surface.warnings, *first.region_warnings):
+        for note in (*_describe_mesh(first), *first.repairs, *surface.warnings, *first.region_warnings):
             print(f"  {note}")
     return 2 if wrong else 0
 
 
 def _size(case: Case) -> str:
+    """The size of the surface, or of the mesh if the case gives one."""
     if case.mesh is None:
         return f"{len(case.surface.faces):,} triangles"
     return f"{len(case.mesh.points):,} nodes, {len(case.mesh.tetrahedra):,} tetrahedra"
 
 
-def _labels(case: Case) -> list[str]:
-    """What a mesh that is given consists of, and what is to be known of it."""
+def _describe_mesh(case: Case) -> list[str]:
+    """The labels of a mesh that the case gives, and the warnings about that mesh."""
     if case.mesh is None:
         return []
     mesh = case.mesh
@@ -79,7 +101,26 @@ def _labels(case: Case) -> list[str]:
 
 
 def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:
-    """Run cases, with a line for each stage; 0 if all ran, 1 if some failed."""
+    """Run cases, and print a line for each stage.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    out : Path
+        Folder of all results.
+    cache : bool
+        Whether meshes are looked up and kept in the user's cache directory.
+
+    Returns
+    -------
+    int
+        0 if all ran, 1 if some failed.
+
+    Raises
+    ------
+    InputError
+        If `out` cannot be written to.
+    """
     check_writable(out)
     failed = 0
     notes = _SweepNotes(cases)
@@ -93,43 +134,43 @@ def run_all(cases: Sequence[Case], out: Path, *, cache: bool = True) -> int:
             print(f"  {time.perf_counter() - started:6.1f} s  {line}", flush=True)
 
         try:
-            folder = run_case(case, out, report, cache=cache, note=notes.of(case, report))
+            folder = run_case(case, out, report, cache=cache, note=notes.collector_for(case, report))
         except TetluxError as error:
             failed += 1
             print(f"tetlux: {case.name} failed: {error}", file=sys.stderr, flush=True)
         else:
             report(f"written to {folder}")
-        notes.tell_after(case)
+        notes.report_after(case)
     if failed:
         print(f"tetlux: {failed} of {len(cases)} cases failed.", file=sys.stderr)
     return 1 if failed else 0
 
 
 class _SweepNotes:
-    """Warnings of the runs of a sweep, each said once, when the last of its runs has ended.
+    """Collects the warnings of the runs of a sweep, and prints each once when the last run has ended.
 
-    Those of a case that is no sweep are reported as they come.
+    Warnings of a case without a sweep are printed at once.
     """
 
     def __init__(self, cases: Sequence[Case]) -> None:
-        self._left = Counter(case.source for case in cases)
-        self._runs = dict(self._left)
-        self._found: dict[str, list[str]] = {}
+        self._runs_left = Counter(case.source for case in cases)
+        self._runs = dict(self._runs_left)
+        self._cases_by_warning: dict[str, list[str]] = {}
 
-    def of(self, case: Case, report: Report) -> Report:
-        """What is to be called with each warning of a run."""
+    def collector_for(self, case: Case, report: Report) -> Report:
+        """The function to call with each warning of a run."""
         if self._runs[case.source] == 1:
             return lambda warning: report(f"note: {warning}")
-        return lambda warning: self._found.setdefault(warning, []).append(case.name)
+        return lambda warning: self._cases_by_warning.setdefault(warning, []).append(case.name)
 
-    def tell_after(self, case: Case) -> None:
-        """Say what was found, if this was the last run of its sweep."""
-        self._left[case.source] -= 1
-        if self._left[case.source] > 0:
+    def report_after(self, case: Case) -> None:
+        """Print the warnings of a sweep, if this was its last run."""
+        self._runs_left[case.source] -= 1
+        if self._runs_left[case.source] > 0:
             return
         runs = self._runs[case.source]
-        for warning, names in self._found.items():
+        for warning, names in self._cases_by_warning.items():
             where = f"all {runs} runs" if len(names) == runs else f"{len(names)} of {runs} runs"
-            few = f" ({', '.join(names)})" if len(names) <= FEW and len(names) < runs else ""
-            print(f"note, in {where}{few}: {warning}", flush=True)
-        self._found = {}
+            named = f" ({', '.join(names)})" if len(names) <= MOST_NAMED and len(names) < runs else ""
+            print(f"note, in {where}{named}: {warning}", flush=True)
+        self._cases_by_warning = {}

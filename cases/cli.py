@@ -9,12 +9,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-# What takes half a second to import, numpy and all that needs it, is imported where it is used: --help, list and show
-# answer at once, and Ctrl-C may come at any moment.
+# Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
+# then answer at once.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        By default those of the process.
 
     Returns
     -------
@@ -22,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
     try:
-        _be_interrupted_by_signals()
+        _treat_signals_as_interrupts()
         return _main(arguments)
     except KeyboardInterrupt:
         return _report("interrupted; finished cases are kept.", 130)
@@ -35,15 +40,15 @@ def _main(arguments: Sequence[str] | None) -> int:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
-        # Most likely of what is printed to; but whoever reads it may have had enough of it.
+        # Most likely of standard output. A broken pipe only means that its reader, such as head, has ended.
         return 1 if isinstance(error, BrokenPipeError) else _report(f"stopped: {error}; finished cases are kept.", 1)
     except Exception as error:
-        return _failed(error)
+        return _exit_code_of(error)
     return code
 
 
-def _failed(error: Exception) -> int:
-    """The exit code of an error that has a sentence for the user; any other is raised again."""
+def _exit_code_of(error: Exception) -> int:
+    """Print the sentence of a user's error and return its exit code; raise any other error again."""
     from tetlux.meshing.errors import TetluxError, memory_ran_out  # noqa: PLC0415
 
     if isinstance(error, TetluxError):
@@ -54,36 +59,36 @@ def _failed(error: Exception) -> int:
 
 
 def _report(sentence: str, code: int) -> int:
-    """An exit code, with a sentence that says why."""
+    """Print a sentence and return the exit code that it explains."""
     print(f"tetlux: {sentence}", file=sys.stderr)
     return code
 
 
-def _be_interrupted_by_signals() -> None:
-    """Let a scheduler's and a closing terminal's signal end a run as Ctrl-C does, with nothing left behind."""
+def _treat_signals_as_interrupts() -> None:
+    """Make SIGTERM (a scheduler) and SIGHUP (a closing terminal) end a run as Ctrl-C does, with clean-up."""
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
-            # nohup has one of them ignored.
+            # nohup ignores SIGHUP, which must stay so.
             if signal.getsignal(number) is signal.SIG_DFL:
                 signal.signal(number, signal.default_int_handler)
 
 
 class _Parser(argparse.ArgumentParser):
-    """One that says which command a word that is none was probably meant to be."""
+    """A parser that suggests a command for a misspelt one."""
 
     def error(self, message: str) -> NoReturn:
-        wrong = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
-        if wrong:
-            from tetlux.cases.nearest import did_you_mean  # noqa: PLC0415
+        invalid = re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message)
+        if invalid:
+            from tetlux.cases.hints import did_you_mean  # noqa: PLC0415
 
-            commands = re.findall(r"[\w-]+", wrong[2])
-            hint = did_you_mean(wrong[1], commands)
-            message = f'there is no command "{wrong[1]}"; {hint}the commands are {", ".join(commands)}.'
+            commands = re.findall(r"[\w-]+", invalid[2])
+            hint = did_you_mean(invalid[1], commands)
+            message = f'there is no command "{invalid[1]}"; {hint}the commands are {", ".join(commands)}.'
         super().error(message)
 
 
 class _Version(argparse.Action):
-    """Prints the version, which is looked up only then."""
+    """Prints the version, and looks it up only when asked for."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         from importlib.metadata import version  # noqa: PLC0415
@@ -93,7 +98,9 @@ class _Version(argparse.Action):
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="tetlux", description="Light diffusing through any shape, by tetrahedral finite elements.")
+    parser = _Parser(
+        prog="tetlux", description="Solve light diffusion through bodies of any shape, by tetrahedral finite elements."
+    )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
@@ -102,37 +109,49 @@ def _parser() -> argparse.ArgumentParser:
         "cases",
         nargs="+",
         metavar="CASE",
-        help="a YAML case file, or the name of one that ships (see tetlux list)",
+        help="a YAML case file, or the name of a shipped one (see tetlux list)",
     )
-    run.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: results")
-    run.add_argument("--no-cache", action="store_true", help="neither use nor keep meshes of earlier runs")
+    run.add_argument(
+        "--out", type=Path, default=Path("results"), metavar="DIR", help="folder of all results; default: results"
+    )
+    run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
-    check = commands.add_parser("check", help="check case files and the surfaces they name, without solving")
-    check.add_argument("cases", nargs="+", metavar="CASE")
+    check = commands.add_parser("check", help="check case files and the files they name, without solving")
+    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, or the name of a shipped one")
     check.set_defaults(command=_check)
 
-    listing = commands.add_parser("list", help="list the cases that ship")
+    listing = commands.add_parser("list", help="list the cases that ship with tetlux")
     listing.set_defaults(command=_list)
 
-    show = commands.add_parser("show", help="print a case file, such as one that ships, to start from")
-    show.add_argument("case", metavar="CASE")
+    show = commands.add_parser("show", help="print a case file, for instance a shipped one to start from")
+    show.add_argument("case", metavar="CASE", help="a YAML case file, or the name of a shipped one")
     show.set_defaults(command=_show)
 
-    chart = commands.add_parser("chart", help="measure methods against each other: error, seconds, unknowns")
-    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: slab sphere torus hare, which ship")
-    chart.add_argument("--out", type=Path, default=Path("chart"), metavar="DIR", help="default: chart")
-    chart.add_argument("--quick", action="store_true", help="a few coarse runs of each method only")
-    chart.set_defaults(command=_chart)
-
-    stress = commands.add_parser("stress", help="drive the solver to its edges and map what breaks")
-    stress.add_argument("--out", type=Path, default=Path("stress"), metavar="DIR", help="default: stress")
-    stress.add_argument("--quick", action="store_true", help="few values on each axis")
-    stress.set_defaults(command=_stress)
-
+    _add_measurements(commands)
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
     schema.set_defaults(command=_schema)
     return parser
+
+
+def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    """Add the commands that measure the solver itself."""
+    chart = commands.add_parser("chart", help="compare methods by error, seconds and unknowns")
+    chart.add_argument(
+        "cases", nargs="*", metavar="CASE", help="default: the shipped cases slab, sphere, torus and hare"
+    )
+    chart.add_argument(
+        "--out", type=Path, default=Path("chart"), metavar="DIR", help="folder of the chart; default: chart"
+    )
+    chart.add_argument("--quick", action="store_true", help="run a few coarse resolutions of each method only")
+    chart.set_defaults(command=_chart)
+
+    stress = commands.add_parser("stress", help="run the solver at extreme values and map where it fails")
+    stress.add_argument(
+        "--out", type=Path, default=Path("stress"), metavar="DIR", help="folder of the map; default: stress"
+    )
+    stress.add_argument("--quick", action="store_true", help="run a few values on each axis only")
+    stress.set_defaults(command=_stress)
 
 
 def _run(options: argparse.Namespace) -> int:

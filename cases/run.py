@@ -1,4 +1,4 @@
-"""One run: solve a case and write what it asks for, whole or not at all."""
+"""`run_case`: solve a case and write its outputs, all or none."""
 
 import json
 import time
@@ -7,33 +7,33 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.compare.differences import as_json, compare
+from tetlux.cases.compare.differences import as_data, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.sensors import readings, write_readings
-from tetlux.cases.picture.arrows import rays
-from tetlux.cases.picture.draw import Scene, Shape, draw
+from tetlux.cases.file.detectors import read_detectors, write_readings
+from tetlux.cases.picture.arrows import light_rays
+from tetlux.cases.picture.draw import PictureScene, RegionOutline, draw_picture
 from tetlux.cases.write.ply import write_ply
-from tetlux.cases.write.publish import cannot_write, claimed, publish
-from tetlux.cases.write.results import AnySolution, Results, results_of, surface_values, volume_values
+from tetlux.cases.write.publish import claim_folder, publish, write_error
+from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
-from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.media.region import Region
-from tetlux.fem.scene import media_of
+from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.solve import solve, solve_each
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
-from tetlux.meshing.notes import prefixed
+from tetlux.meshing.notes import add_prefix
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
-# The same surface for VTK, PyVista and ParaView, which show no values of a PLY.
+# The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
-# The summary last: see `publish`.
+# The summary is last, as `publish` needs it.
 ALL_FILES = (*FILES.values(), VTP, READINGS, *COMPARISON, SUMMARY)
 
 
@@ -47,8 +47,8 @@ def run_case(
 ) -> Path:
     """Solve a case and write its results.
 
-    They are written into a folder beside the final one, which they replace when all are complete: where there is a
-    summary, the run was finished.
+    Files are written into a temporary folder and moved when all are complete, so a folder with a summary holds a
+    finished run.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def run_case(
     cache : bool
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     note : callable, optional
-        Called with each warning; if not given they are reported.
+        Called with each warning; by default they go to `report`.
 
     Returns
     -------
@@ -70,22 +70,33 @@ def run_case(
     Raises
     ------
     RunError
-        If the mesher or the solver fails, memory runs out, another run is at work on the same case, or the results
+        If the mesher or the solver fails, memory runs out, another run is writing to the same folder, or the results
         cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from tetlux.cases.file.load import load_cases
+    >>> from tetlux.cases.shipped import find_case_file
+    >>> (case,) = load_cases(find_case_file("sphere"))
+    >>> with tempfile.TemporaryDirectory() as out:
+    ...     folder = run_case(replace(case, outputs=()), Path(out))
+    ...     sorted(path.name for path in folder.iterdir())
+    ['compare.json', 'compare.png', 'summary.json']
     """
     started, target = time.perf_counter(), out / case.name
     try:
-        with claimed(out, case.name) as folder:
+        with claim_folder(out, case.name) as folder:
             solutions = _solve(case, report, cache=cache)
             try:
-                warnings = _write(results_of(case, solutions), folder, started)
+                warnings = _write(collect_results(case, solutions), folder, started)
                 publish(folder, target, ALL_FILES)
             except OSError as error:
-                raise cannot_write(target, error) from error
+                raise write_error(target, error) from error
     except (MemoryError, RuntimeError) as error:
         if not memory_ran_out(error):
             raise
-        raise RunError("memory ran out; give a larger tolerance, or run it where there is more memory.") from error
+        raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
     for warning in warnings:
         if note is None:
             report(f"note: {warning}")
@@ -95,7 +106,7 @@ def run_case(
 
 
 def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
-    """A solution for each channel, by the model that the case asks for."""
+    """Solve each channel by the model of the case."""
     if case.spec.model == "charges":
         return _solve_with_charges(case, report)
     return solve_each(
@@ -110,9 +121,9 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
 
 
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
-    """A solution for each channel, each with the seconds of all."""
+    """Solve each channel by charges; the seconds of each solution are those of all channels together."""
     solutions = []
-    media = media_of([channel.medium for channel in case.channels], case.regions, len(case.channels))
+    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
         lights = list(channel.lights.values())
@@ -120,7 +131,7 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
         solutions.append(solution)
-    seconds = {stage: sum(one.seconds[stage] for one in solutions) for stage in solutions[0].seconds}
+    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
@@ -133,22 +144,22 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
     if "surface" in case.outputs:
         _write_surface(results, folder)
     if "volume" in case.outputs:
-        write_mesh(results.with_mesh[0].mesh, folder / FILES["volume"], volume_values(results))
-    found = readings(case.sensors, results.by_light())
+        write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
+    readings = read_detectors(case.detectors, results.by_channel_and_light())
     if "picture" in case.outputs:
-        warnings += draw(_scene(results, found), folder / FILES["picture"])
-    if found:
-        write_readings(found, unit, folder / READINGS)
+        warnings += draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
+    if readings:
+        write_readings(readings, unit, folder / READINGS)
     compared = None
     if case.comparison is not None:
-        compared = compare(case.comparison, results.with_mesh[0])
+        compared = compare(case.comparison, results.mesh_solutions[0])
         data, image = (folder / name for name in COMPARISON)
-        data.write_text(json.dumps(as_json(compared), allow_nan=False) + "\n", encoding="utf-8")
+        data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
     now = time.perf_counter()
     seconds = {**first.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
     seconds["surface"] += case.reading_seconds
-    figures = summarize(results, found, seconds, warnings)
+    figures = summarize(results, readings, seconds, warnings)
     if compared is not None:
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)
@@ -157,50 +168,52 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
 
 
 def _write_surface(results: Results, folder: Path) -> None:
-    """The surface with its values, for mesh tools and for VTK."""
+    """Write the surface with its values, as PLY for mesh tools and as VTP for VTK."""
     unit, values = results.case.surface.unit, surface_values(results)
     notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
     if results.has_colours:
         notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"
     write_ply(results.surface, folder / FILES["surface"], values, list(notes.values()))
     if results.has_colours:
-        # One array of three bytes is what VTK's viewers can show as a colour.
+        # VTK's viewers show a colour only from a single array of three bytes.
         values["preview"] = results.preview[0]
     write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
 
 
-def _scene(results: Results, readings: list[dict[str, Any]]) -> Scene:
-    """What the picture shows."""
+def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureScene:
+    """Collect what the picture shows."""
     case = results.case
-    # A light that is dark in the first channel may be bright in another.
+    # Lights of all channels: one that is dark in the first may be bright in another.
     lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-    return Scene(
+    return PictureScene(
         points=results.surface.points,
         triangles=results.surface.faces,
         exitance=results.exitance(),
         unit=case.surface.unit,
         title=case.name,
-        lights=tuple(ray for light in lights.values() for ray in rays(light, case.surface)),
+        lights=tuple(ray for light in lights.values() for ray in light_rays(light, case.surface)),
         colours=results.preview if results.has_colours else None,
         up=case.up,
         toward=case.toward,
-        regions=tuple(Shape(one.surface.name, one.surface.points, one.surface.faces) for one in case.regions),
+        regions=tuple(
+            RegionOutline(region.surface.name, region.surface.points, region.surface.faces) for region in case.regions
+        ),
         detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
     )
 
 
 def _warnings(results: Results) -> list[str]:
-    """Those of all channels; a sentence that holds for some of several channels names them."""
+    """The warnings of all channels; one that holds for some channels only names them."""
     names, solutions = results.case.channel_names, results.solutions
-    told: dict[str, list[str]] = {}
+    channels_by_warning: dict[str, list[str]] = {}
     for name, solution in zip(names, solutions, strict=True):
-        # What was mended is said when the case is read.
+        # Repairs are reported when the case is read.
         for warning in (each for each in solution.warnings if each not in results.case.repairs):
-            told.setdefault(results.case.named(warning), []).append(name)
+            channels_by_warning.setdefault(results.case.name_region(warning), []).append(name)
     return [
         *results.case.region_warnings,
         *(
-            warning if len(whose) == len(names) else prefixed(warning, f"in {' and '.join(whose)}: ")
-            for warning, whose in told.items()
+            warning if len(channels) == len(names) else add_prefix(warning, f"in {' and '.join(channels)}: ")
+            for warning, channels in channels_by_warning.items()
         ),
     ]

@@ -1,6 +1,6 @@
-"""The case files that ship with the package, and which file a name on the command line stands for.
+"""The case files that ship with the package, and the look-up of case files by path or shipped name.
 
-Nothing heavy is imported here: ``tetlux list`` and ``tetlux show`` have to answer at once.
+Modules that need numpy are not imported here, so that ``tetlux list`` and ``tetlux show`` answer at once.
 """
 
 import json
@@ -8,9 +8,9 @@ import os
 import re
 from pathlib import Path
 
-from tetlux.cases.nearest import did_you_mean
+from tetlux.cases.hints import did_you_mean
 
-# Of case files; JSON is YAML.
+# Suffixes of case files; JSON is a subset of YAML.
 SUFFIXES = (".yaml", ".yml", ".json")
 
 
@@ -20,18 +20,32 @@ def library_folder() -> Path:
 
 
 def shipped_cases() -> dict[str, str]:
-    """Names of the case files that ship, and the sentence at the top of each."""
+    """Names of the shipped case files, each with the sentence in its first line."""
     files = sorted(library_folder().glob("*.yaml"))
     return {path.stem: path.read_text(encoding="utf-8").splitlines()[0].lstrip("# ") for path in files}
 
 
 def find_case_file(request: str) -> Path:
-    """A path as given, or the shipped case file of that name where there is no such path.
+    """Find a case file by its path or, if no such path exists, by the name of a shipped one.
+
+    Parameters
+    ----------
+    request : str
+        Path of a case file, or name of a shipped one.
+
+    Returns
+    -------
+    Path
 
     Raises
     ------
     InputError
-        If it is neither, or a surface file.
+        If it is neither, or is a surface file.
+
+    Examples
+    --------
+    >>> find_case_file("hare").name
+    'hare.yaml'
     """
     path = Path(request)
     # Path.exists raises where a name is too long for the file system.
@@ -43,7 +57,7 @@ def find_case_file(request: str) -> Path:
             names = sorted(path.stem for path in library_folder().glob("*.yaml"))
             hint = did_you_mean(request, names)
             raise _input_error(
-                f"{request}{': ' + hint + 'it' if hint else ''} is neither a file nor one of the cases that ship: "
+                f"{request}{': ' + hint + 'it' if hint else ''} is neither a file nor one of the shipped cases: "
                 f"{', '.join(names)}."
             )
     if path.suffix.lower() not in ("", *SUFFIXES):
@@ -59,7 +73,16 @@ def _refuse_surface(path: Path) -> None:
 
 
 def case_text(request: str) -> str:
-    """The text of a case file, or of one that ships: with the full path of its surface, so that a copy of it runs.
+    """Read the text of a case file; in a shipped one the path of its surface is made absolute, so that a copy runs.
+
+    Parameters
+    ----------
+    request : str
+        Path of a case file, or name of a shipped one.
+
+    Returns
+    -------
+    str
 
     Raises
     ------
@@ -75,7 +98,7 @@ def case_text(request: str) -> str:
         raise _input_error(f"{path} cannot be read: {error.strerror}; give a YAML case file.") from error
     if path.parent != library_folder():
         return text
-    # A string of JSON is one of YAML, whatever is in the path.
+    # JSON quotes the path as YAML needs it, whatever characters it has.
     return re.sub(r"(?<=file: )[\w.-]+", lambda name: json.dumps(str(library_folder() / name[0])), text)
 
 

@@ -1,7 +1,6 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -23,10 +22,16 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, Reading, read
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.fem.solve import solve, solve_each
+from tetlux.fem.sources.footprint import Footprint
+from tetlux.fem.sources.hints import MeshHints
+from tetlux.fem.sources.ledger import Ledger
+from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 
 __all__ = [
@@ -41,10 +46,13 @@ __all__ = [
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
+    "Footprint",
     "Gaussian",
     "Image",
+    "Ledger",
     "Light",
     "Medium",
+    "MeshHints",
     "PencilBeam",
     "PointDetector",
     "PointSource",
@@ -52,7 +60,9 @@ __all__ = [
     "Reading",
     "Rectangle",
     "Region",
+    "Segments",
     "Solution",
+    "SourceTerms",
     "System",
     "VaryingMedium",
     "grid_field",

@@ -8,11 +8,11 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split
-from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
-from tetlux.fem.scene import Scene
+from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
@@ -35,7 +35,7 @@ class Problem:
 
     Attributes
     ----------
-    scene : Scene
+    scenes : Scenes
         The body and the media of each scene.
     sources : list of Sources
         The lights of each scene.
@@ -45,7 +45,7 @@ class Problem:
     watch : Stopwatch
     """
 
-    scene: Scene
+    scenes: Scenes
     sources: list[Sources]
     mass: Mass
     limit: bool
@@ -54,7 +54,7 @@ class Problem:
     @property
     def media(self) -> list[tuple[AnyMedium, ...]]:
         """The media of each scene."""
-        return self.scene.media
+        return self.scenes.media
 
     @property
     def size(self) -> tuple[int, int]:
@@ -65,7 +65,7 @@ class Problem:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
         assembly = Assembly(mesh)
         systems = {
-            media: self.scene.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            media: self.scenes.system_on(mesh, media, self.mass, assembly, limit=self.limit)
             for media in dict.fromkeys(self.media)
         }
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
@@ -73,12 +73,12 @@ class Problem:
 
 def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
     """The mesher's mesh of a body, refined towards its lights."""
-    scene = problem.scene
+    scenes = problem.scenes
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
-            mesh = tetrahedralize(scene.surface, scene.inner, cache=cache)
-        lit = lit_points([deposit for sources in problem.sources for deposit in sources.left])
-        mesh = graded_towards(mesh, scene.surface, *lit, most_tetrahedra, inner=scene.inner)
+            mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.not_fitted])
+        mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
@@ -118,7 +118,7 @@ def solve_and_refine(
         One for each scene, all on the same mesh.
     """
     # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
-    bodies = problem.scene.bodies
+    bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     solve_on = problem.solver_on(mesh)
     steps = best = {first: solve_on(first, None)}
@@ -132,7 +132,7 @@ def solve_and_refine(
         fine_enough = not marked.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = refine(mesh, marked, problem.scene.surface, problem.scene.inner)
+                finer = refine(mesh, marked, problem.scenes.surface, problem.scenes.inner)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, problem.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}

@@ -1,4 +1,4 @@
-"""The first mesh: fine enough, where light is deposited, for its error to be estimated at all."""
+"""The first mesh: fine enough near sources for its error to be estimated at all."""
 
 from collections.abc import Sequence
 
@@ -12,36 +12,47 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
-# Edges on the first mesh are no longer than this times the distance from the light, or times what resolves it
-# where they are at it. Its error then is some per cent, and its estimate good to a factor of three.
-LONGEST = 1.0
+# Longest edge of a tetrahedron on the first mesh, relative to its distance from the nearest source, or to the length
+# to resolve there if that is larger. The error then is some per cent, and its estimate good to a factor of three.
+LONGEST_EDGE = 1.0
 
 
-def lit_points(deposits: list[Deposit]) -> tuple[FloatArray, FloatArray]:
-    """Points where light is deposited, or is lit (s, 3), and the length to resolve at each (s,)."""
+def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
+    """Places near which the mesh has to be fine.
+
+    Parameters
+    ----------
+    deposits : sequence of Deposit
+
+    Returns
+    -------
+    places : (s, 3) ndarray
+        Points of the source terms and places of the mesh hints, each once, unit.
+    resolutions : (s,) ndarray
+        Length to resolve at each, unit; the shortest if several deposits have the same place.
+    """
     found, resolutions = [np.zeros((0, 3))], [np.zeros(0)]
     for deposit in deposits:
-        points = np.vstack([deposit.points, deposit.lit])
+        points = np.vstack([deposit.terms.points, deposit.hints.places])
         found.append(points)
-        resolutions.append(np.full(len(points), deposit.resolution))
+        resolutions.append(np.full(len(points), deposit.hints.resolution))
     places, finest = np.vstack(found), np.concatenate(resolutions)
-    # The same light in several media is at the same places, where the finest has its way.
     order = np.lexsort((finest, *places.T))
-    new = (np.diff(places[order], axis=0, prepend=np.inf) != 0).any(axis=1)
-    return places[order[new]], finest[order[new]]
+    first = (np.diff(places[order], axis=0, prepend=np.inf) != 0).any(axis=1)
+    return places[order[first]], finest[order[first]]
 
 
-def graded_towards(
+def grade_mesh(
     mesh: TetMesh,
     surface: Surface,
     points: FloatArray,
     resolutions: FloatArray,
     most: int,
     *,
-    longest: float = LONGEST,
+    longest: float = LONGEST_EDGE,
     inner: Sequence[Surface] = (),
 ) -> TetMesh:
-    """Split tetrahedra until none is longer than `longest` times its distance from the light.
+    """Refine a mesh until its edges are short compared with their distance from the nearest source.
 
     Parameters
     ----------
@@ -49,12 +60,14 @@ def graded_towards(
     surface : Surface
         New boundary nodes are moved onto it.
     points, resolutions : (s, 3), (s,) ndarray
-        See `lit_points`.
+        See `places_to_resolve`.
     most : int
-        Tetrahedra at which it stops.
+        Largest number of tetrahedra; a refinement that would exceed it is not made.
     longest : float
+        Longest edge relative to the distance of the tetrahedron's middle from the nearest point, or to the resolution
+        there if that is larger.
     inner : sequence of Surface
-        Those of the mesh's regions; new nodes on them are moved onto them.
+        Surfaces of the mesh's regions; new nodes on them are moved onto them.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Checks of what users give: places, directions, powers."""
+"""Checks of places, directions and powers that users give."""
 
 import math
 
@@ -7,14 +7,30 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 
-# Farther away, in whatever unit, products of coordinates overflow.
+# Beyond this, in any unit, products of coordinates overflow.
 FARTHEST = 1e30
-# Squares of fainter and brighter lights are no numbers any more.
+# Squares of powers below this underflow, and squares of powers above its inverse overflow.
 FAINTEST = 1e-60
 
 
 def as_vector(value: Vector, name: str) -> FloatArray:
-    """Three coordinates as an array, or an InputError that names them."""
+    """Convert three coordinates to an array.
+
+    Parameters
+    ----------
+    value : (3,) floats
+    name : str
+        What the error calls them.
+
+    Returns
+    -------
+    (3,) ndarray
+
+    Raises
+    ------
+    InputError
+        If they are not three finite numbers, or out of range.
+    """
     vector = _finite(value, name)
     if np.abs(vector).max() > FARTHEST:
         raise InputError(
@@ -34,18 +50,34 @@ def _finite(value: Vector, name: str) -> FloatArray:
 
 
 def unit_vector(value: Vector, name: str) -> FloatArray:
-    """A direction of length 1, or an InputError that names it."""
+    """Normalize a direction to length 1.
+
+    Parameters
+    ----------
+    value : (3,) floats
+    name : str
+        What the error calls it.
+
+    Returns
+    -------
+    (3,) ndarray
+
+    Raises
+    ------
+    InputError
+        If it is zero, or not three finite numbers.
+    """
     vector = _finite(value, name)
     largest = np.abs(vector).max()
     if not largest > 0:
         raise InputError(f"{name} is zero; give the {name} in which the light travels.", field=name)
-    vector = vector / largest  # its square may be out of range
-    vector[np.abs(vector) < 1e-30] = 0.0  # and what is divided by it
+    vector = vector / largest  # the square of a large component would overflow
+    vector[np.abs(vector) < 1e-30] = 0.0  # so that divisions by a component do not overflow
     return np.asarray(vector / np.linalg.norm(vector))
 
 
 def check_positive(value: float, name: str, unit: str) -> None:
-    """Refuse what is not a positive number."""
+    """Refuse a value that is not a positive number, or out of range."""
     if not math.isfinite(value) or value <= 0:
         raise InputError(f"{name} is {value:g}; give a number of {unit} greater than 0.", field=name)
     if not FAINTEST <= value <= 1.0 / FAINTEST:

@@ -1,4 +1,4 @@
-"""How much memory a solution needs, and how much there is."""
+"""How much memory a solution takes, and how much is available."""
 
 import os
 import sys
@@ -8,10 +8,10 @@ from pathlib import Path
 
 from tetlux.meshing.errors import RunError
 
-# Bytes, by the peak memory of processes over what they had before, with the error estimated. Beside what is imported on
-# the way, each tetrahedron needed so many kB:
+# Bytes. Measured as the growth of a process's peak memory while it solves and estimates the error, less IMPORTED; kB
+# for each tetrahedron, and in the last column what `estimate_memory` gives:
 #
-#   of a given mesh, by its tetrahedra     48k    413k  1,296k   here
+#   a given mesh, by its tetrahedra        48k    413k  1,296k  estimate
 #   a point source                         .43     .92     .77   1.02
 #   eight                                          .97           1.16
 #   eight, and diffuse light                               .82   1.18
@@ -19,22 +19,22 @@ from tetlux.meshing.errors import RunError
 #   the same in three channels                    1.14    1.07   1.30
 #   eight scenes, each of another medium (384k)   1.41           2.00
 #
-#   of the finest mesh, after refinement
+#   the finest mesh, after refinement
 #   a beam on the whole body, 154k                1.58           1.62
 #   the same in three channels, 291k              1.37           1.90
 #   and with diffuse light, 197k                  1.78           1.96
 #   a pencil beam, 191k                           1.46           1.62
 #   eight point sources, 238k                     1.54           1.76
 #
-# Refinement holds two meshes at a time, and makes another one that may turn out to be too large.
+# Refinement holds two meshes at a time, and makes a third one that may turn out to be too large.
 IMPORTED = 80e6
 GIVEN, REFINED = 1000.0, 1600.0
-# For each further medium, a matrix and its solver; for each light of each scene, its fluence and its patch.
+# Bytes a tetrahedron for each further medium (its matrix and solver), and for each light (its fluence and patch).
 MATRIX, LIGHT = 120.0, 20.0
 
 
-def need(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
-    """Memory that it takes to solve on a mesh and to estimate the error, bytes.
+def estimate_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
+    """Estimate the memory that it takes to solve on a mesh and to estimate the error, bytes.
 
     Parameters
     ----------
@@ -42,68 +42,72 @@ def need(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool =
     matrices : int
         How many different media, or sets of media, are solved for.
     lights : int
-        Those of all scenes.
+        How many lights all scenes have together.
     refined : bool
-        Whether the mesh is one of several, each finer than the one before.
+        Whether the mesh is made by refinement, which holds two meshes at a time.
+
+    Returns
+    -------
+    float
     """
-    return IMPORTED + tetrahedra * _each(matrices, lights, refined)
+    return IMPORTED + tetrahedra * _bytes_per_tetrahedron(matrices, lights, refined)
 
 
-def _each(matrices: int, lights: int, refined: bool) -> float:
+def _bytes_per_tetrahedron(matrices: int, lights: int, refined: bool) -> float:
     return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights
 
 
 def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
-    """Refuse a mesh that there is not enough memory for; see `need`.
+    """Refuse a mesh that takes more memory than is available; see `estimate_memory`.
 
     Raises
     ------
     RunError
     """
-    needed, there = need(tetrahedra, matrices, lights), available()
-    if needed > there:
+    needed, free = estimate_memory(tetrahedra, matrices, lights), available()
+    if needed > free:
         raise RunError(
-            f"{tetrahedra:,} tetrahedra need about {gigabytes(needed)} GB of memory, and {gigabytes(there)} GB are "
+            f"{tetrahedra:,} tetrahedra need about {gigabytes(needed)} GB of memory, and {gigabytes(free)} GB are "
             "available; give a coarser mesh or fewer channels, or run it where there is more."
         )
 
 
-def limited_by_memory(most: int, matrices: int = 1, lights: int = 1) -> tuple[int, str]:
-    """How many tetrahedra a mesh may be refined to, `most` at the most, and in words what the limit is."""
-    there = available()
-    affordable = max(0.0, there - IMPORTED) / _each(matrices, lights, refined=True)
+def affordable_tetrahedra(most: int, matrices: int = 1, lights: int = 1) -> tuple[int, str]:
+    """How many tetrahedra a mesh may be refined to, at most `most`, and a clause that says what sets the limit."""
+    free = available()
+    affordable = max(0.0, free - IMPORTED) / _bytes_per_tetrahedron(matrices, lights, refined=True)
     if affordable >= most:
         return most, f"at the limit of {most:,} tetrahedra"
-    return int(affordable), f"at the {affordable:,.0f} tetrahedra that {gigabytes(there)} GB of memory suffice for"
+    return int(affordable), f"at the {affordable:,.0f} tetrahedra that {gigabytes(free)} GB of memory suffice for"
 
 
 def gigabytes(memory: float) -> str:
-    """Bytes in units of 1e9, as people read them."""
+    """Format a number of bytes in GB (1e9 bytes), with three digits."""
     return f"{memory / 1e9:.3g}" if memory < 1e11 else f"{memory / 1e9:.0f}"
 
 
 def available(root: Path = Path("/")) -> float:
-    """Memory that this process may still use, bytes: as the system, its control group and its own limit have it.
+    """Memory that this process may still use, bytes: the least that system, control groups and ``ulimit`` leave.
 
-    Elsewhere than on Linux it is all that the machine has, or infinite where that is not known. `root` is the folder
-    that holds ``proc`` and ``sys``.
+    On other systems than Linux it is all memory of the machine, or infinite where that is not known. `root` is the
+    folder that holds ``proc`` and ``sys``.
     """
-    found = [*_of_system(root), *_of_groups(root), *_of_limit(root)]
+    found = [*_left_by_system(root), *_left_by_groups(root), *_left_by_ulimit(root)]
     if not found and hasattr(os, "sysconf"):
         with suppress(OSError, ValueError):
             found = [float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")]
     return max(0.0, min(found, default=float("inf")))
 
 
-def _of_system(root: Path) -> Iterator[float]:
+def _left_by_system(root: Path) -> Iterator[float]:
     with suppress(OSError, ValueError):
         for line in (root / "proc/meminfo").read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 yield 1024.0 * int(line.split()[1])
 
 
-def _of_groups(root: Path) -> Iterator[float]:
-    """What the control groups leave that this process is in, of version 2 and of version 1."""
+def _left_by_groups(root: Path) -> Iterator[float]:
+    """What each control group of this process leaves, in version 1 and version 2."""
     with suppress(OSError):
         for line in (root / "proc/self/cgroup").read_text().splitlines():
             _, controllers, path = line.split(":", 2)
@@ -113,23 +117,23 @@ def _of_groups(root: Path) -> Iterator[float]:
                 base, limit, usage = root / "sys/fs/cgroup/memory", "memory.limit_in_bytes", "memory.usage_in_bytes"
             else:
                 continue
-            # The group and those that it is part of; in a container the first ones are not to be seen.
+            # The limits of parent groups count too. A container does not see its own group under its full path.
             group = base / path.lstrip("/")
             for folder in (group, *group.parents):
                 with suppress(OSError, ValueError):
                     left = int((folder / limit).read_text()) - int((folder / usage).read_text())
-                    yield float(left + _cached(folder))
+                    yield float(left + _reclaimable_cache(folder))
                 if folder == base:
                     break
 
 
-def _cached(folder: Path) -> int:
-    """Of a control group's memory, what files were read into and the system takes back when it is needed."""
+def _reclaimable_cache(folder: Path) -> int:
+    """File cache that counts as used by a control group, which the system reclaims when memory is needed."""
     lines = (folder / "memory.stat").read_text().splitlines()
     return next((int(line.split()[1]) for line in lines if line.startswith("inactive_file ")), 0)
 
 
-def _of_limit(root: Path) -> Iterator[float]:
+def _left_by_ulimit(root: Path) -> Iterator[float]:
     """What ``ulimit -v`` leaves."""
     if sys.platform == "linux":
         import resource  # noqa: PLC0415

@@ -1,4 +1,4 @@
-"""What a user should know of a solution, as sentences with codes."""
+"""Notes on a solution: each a sentence for the user with a stable code."""
 
 from collections.abc import Iterator
 
@@ -11,27 +11,32 @@ from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warnings_for
 from tetlux.meshing.notes import Note
 
-# A fluence or exitance below zero by less than this share of the maximum is not reported.
+# A negative fluence or exitance is reported from this share of the maximum on.
 NEGLIGIBLE_DIP = 1e-6
-# Nor is power below zero, or moved, by less than this share of the incident power.
+# Negative power, and power that the limiter moved, are reported from this share of the incident power on.
 NEGLIGIBLE_POWER = 1e-4
-# Change of the body's volume by curved triangles, as a share, from which on it is reported.
+# The change of the body's volume by curved triangles is reported from this share on.
 LARGEST_BULGE = 0.015
-# Change of a source's depth by flat facets, as a share of the depth, from which on it is reported.
+# The change of a source's depth by flat facets is reported from this share of the depth on.
 SHALLOW = 0.1
 
 
 def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
-    """Notes on a solution.
+    """Collect the notes on a solution.
 
     Parameters
     ----------
     solution : Solution
     sources : Sources
-        The lights that it is for.
+        What the lights of the solution leave in the body.
     tolerance : float
     where : str
         Where refinement stopped, for the sentence that the tolerance was not met.
+
+    Returns
+    -------
+    list of str
+        Without repetitions.
     """
     notes = list(solution.surface.warnings)
     if solution.validity is not None:
@@ -79,7 +84,7 @@ def _on_power(solution: Solution) -> Iterator[Note]:
     if abs(power.exited) <= ROUNDING * power.incident:
         yield Note(
             "no-light-leaves",
-            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",
+            "no diffuse light leaves the body: all light is reflected at its surface, passes through or is absorbed.",
         )
 
 
@@ -124,7 +129,7 @@ def _on_exitance(solution: Solution) -> Iterator[Note]:
 
 
 def _on_shallow_sources(solution: Solution) -> Iterator[Note]:
-    """At most one note: on the first patch with a source whose depth differs much between facets and surface."""
+    """Report the first source whose depth below the facets differs much from that below the surface."""
     for patch in solution.patches:
         sources = patch.charges.positions[: patch.charges.sources]
         if len(sources) == 0 or isinstance(patch, FittedPatch):

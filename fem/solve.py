@@ -1,24 +1,24 @@
-"""`solve` and `solve_each`: from a body, its media and lights to solutions."""
+"""`solve` and `solve_each`: the public functions that solve for the light in a body."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, solve_and_refine
-from tetlux.fem.meshless.solution import ChargeSolution
-from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
 from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
-from tetlux.fem.labelled import GivenMedia
+from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
-from tetlux.fem.memory import check_memory, limited_by_memory
+from tetlux.fem.memory import affordable_tetrahedra, check_memory
+from tetlux.fem.meshless.solution import ChargeSolution
+from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.notes import notes_on
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.scene import channels_of, scene_of
-from tetlux.fem.sources.deposit import Light
+from tetlux.fem.scenes import build_scenes, media_by_channel
+from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -26,7 +26,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 
 @overload
-def solve(  # type: ignore[overload-overlap]  # a list of channels may be among media by label
+def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of channels, see the next overload
     body: Surface | TetMesh,
     medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
@@ -91,7 +91,7 @@ def solve(
     report: Callable[[str], None] = lambda _: None,
     model: Literal["full", "charges"] = "full",
 ) -> Solution | list[Solution] | ChargeSolution:
-    """Solve for the light in a body.
+    """Solve the diffusion approximation for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
     tolerance; a `TetMesh` is used as it is, with a medium for each label of its tetrahedra if it has several.
@@ -99,25 +99,27 @@ def solve(
     Parameters
     ----------
     body : Surface or TetMesh
+        The body; all lengths are in its unit.
     medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
-        Of the body, or of each label of a mesh, by its number or name. Several are channels (wavelengths, or red, green
-        and blue): all are solved on one mesh that is fine enough for every one of them. The media of a label may be a
-        list of channels too.
+        The medium of the body, or a mapping from each label of a mesh, by number or name, to its medium. A sequence
+        holds channels (wavelengths, or red, green and blue), all solved on one mesh that is fine enough for each;
+        within a mapping a label may have a list of channels too. Coefficients in 1/unit.
     lights : sequence of Light
         At least one; they add up.
     regions : sequence of Region
-        Parts of the body with media of their own.
+        Closed surfaces within the body, with media of their own.
     tolerance : float
         Wanted relative L2 error of the exitance over the surface.
     mesh : TetMesh, optional
-        Use this mesh of the body as it is.
+        A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
-        Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
+        Quadrature of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
-        What is subtracted from the fluence of point sources before the rest is solved for, see `tetlux.fem.known`.
-        "fitted" is charges fitted to the surface, for points and beams that are points in one even medium, where a
-        `Surface` says what the true one is; all other light, and light for which they would not do, has "half-space".
-        Where they are is kept with the mesh of a solution: on the same `mesh` exitance depends smoothly on the medium.
+        What is subtracted from the fluence of point sources before finite elements solve for the rest, see
+        `tetlux.fem.known`. "fitted" is charges fitted to the surface, for points and beams that are points, where the
+        body is a `Surface` of one even medium; other light, and light for which they would not do, has "half-space".
+        Places of charges are kept with the mesh of a solution: solved on it again as `mesh`, the exitance depends
+        smoothly on the medium.
     limit : bool
         Whether the fluence is limited to be nonnegative where lumping alone does not make it so, see
         `tetlux.fem.operators.limiter`.
@@ -129,28 +131,29 @@ def solve(
     report : callable
         Called with a line of text as each stage ends.
     model : {"full", "charges"}
-        "full" is finite elements. "charges" needs no mesh: screened charges outside the body are fitted to its
-        surface, see `tetlux.fem.charges`; for points, beams that are points, and diffuse light in regions of one medium
-        each. Of the other arguments it takes `regions` and `tolerance`.
+        "full" solves by finite elements. "charges" fits screened charges outside the body to its boundary condition
+        and makes no mesh, see `tetlux.fem.charges`; it takes points, beams that are points, and diffuse light, in
+        uniform media, and of the other arguments only `regions` and `tolerance`.
 
     Returns
     -------
     Solution, list of Solution, or ChargeSolution
-        One for each channel, if `medium` is a sequence, or one of its labels has a sequence. A ChargeSolution for
-        ``model="charges"``.
+        A list with a solution for each channel if `medium` is a sequence or holds one for a label. A ChargeSolution
+        for ``model="charges"``.
 
     Raises
     ------
     InputError
-        If the tolerance, the body's size or a light is not sensible: see each light.
+        If an argument is out of range, a light does not meet the body, or media, regions and mesh do not fit each
+        other.
     RunError
-        If the mesher or the linear solver fails, or the mesh needs more memory than there is.
+        If the mesher or the linear solver fails, or the mesh takes more memory than is available.
 
     Notes
     -----
-    The error is estimated by a dual solution, see `tetlux.fem.error.estimate`; the tetrahedra with the largest shares
-    are split until it is within the tolerance. It is the error of the discretisation, not that of the diffusion
-    approximation.
+    P1 finite elements with partial-current (Robin) boundaries, see `tetlux.fem.operators.forms`. A dual solution
+    estimates the error, see `tetlux.fem.error.estimate`; the tetrahedra with the largest shares are split until it is
+    within the tolerance. It is the error of the discretisation, not that of the diffusion approximation.
 
     Examples
     --------
@@ -162,10 +165,10 @@ def solve(
     True
     """
     if model not in ("full", "charges"):
-        raise InputError(f'model is "{model}"; it is "full" or "charges".')
+        raise InputError(f'model is "{model}"; give "full" or "charges".')
     if model == "charges":
         return solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-    channels, several = channels_of(body, mesh, medium)
+    channels, several = media_by_channel(body, mesh, medium)
     solutions = solve_each(
         body,
         channels,
@@ -198,26 +201,61 @@ def solve_each(
     cache: bool = True,
     report: Callable[[str], None] = lambda _: None,
 ) -> list[Solution]:
-    """Solve for several lights, each on its own, on one mesh that is fine enough for every one of them.
+    """Solve for several scenes of one body on one mesh that is fine enough for each of them.
 
     Parameters
     ----------
-    body, regions, tolerance, mesh, mass, subtract, limit, most_tetrahedra, cache, report
-        As in `solve`.
+    body : Surface or TetMesh
+        The body of all scenes; all lengths are in its unit.
     medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
-        That of all scenes, or of each.
+        One for all scenes, or a sequence with one for each scene. Coefficients in 1/unit.
     scenes : sequence of sequences of Light
-        The lights of one scene add up; each scene has a solution of its own.
+        The lights of each scene, which add up.
+    regions : sequence of Region
+        Closed surfaces within the body; a region has one medium for all scenes, or one for each.
+    tolerance : float
+        Wanted relative L2 error of each scene's exitance over the surface.
+    mesh : TetMesh, optional
+        A mesh of the body, which is used as it is.
+    mass : {"lumped", "consistent"}
+        Quadrature of the terms without derivatives.
+    subtract : {"half-space", "free-space", "nothing"}
+        The closed form that is subtracted from the fluence of point sources.
+    limit : bool
+        Whether the fluence is limited to be nonnegative.
+    most_tetrahedra : int
+        Refinement stops at this many even if the tolerance is not met; solutions then carry a warning.
+    cache : bool
+        Whether the mesher's mesh is looked up and kept in the user's cache directory.
+    report : callable
+        Called with a line of text as each stage ends.
 
     Returns
     -------
     list of Solution
-        One for each scene; their seconds are those of all of them.
+        One for each scene, all on the same mesh; the seconds of each are those of all scenes together.
 
     Raises
     ------
-    InputError, RunError
-        As in `solve`.
+    InputError
+        If an argument is out of range, a light does not meet the body, or media, regions and mesh do not fit each
+        other.
+    RunError
+        If the mesher or the linear solver fails, or the mesh takes more memory than is available.
+
+    Notes
+    -----
+    Method and estimate are those of `solve`. Scenes of equal media share one system matrix.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointSource, solve_each
+    >>> from tetlux.meshing import sphere
+    >>> tissue = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> scenes = [[PointSource((0, 0, z))] for z in (5.0, 8.0)]
+    >>> deep, shallow = solve_each(sphere(10.0), tissue, scenes, tolerance=0.05)
+    >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
+    (True, True)
     """
     check_tolerance(tolerance)
     check_scenes(scenes)
@@ -227,26 +265,26 @@ def solve_each(
         mesh = body
     watch = Stopwatch()
     with watch.stage("surface"):
-        scene = scene_of(body, mesh, medium, regions, len(scenes))
+        checked = build_scenes(body, mesh, medium, regions, len(scenes))
         kept = KeptPlaces() if mesh is None else kept_on(mesh)
         if isinstance(body, TetMesh):
             subtract = without_fit(subtract)
         sources = [
             sources_of(lights, each, subtract, tolerance=tolerance, kept=kept)
-            for lights, each in zip(scenes, scene.bodies, strict=True)
+            for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
-    problem = Problem(scene, sources, mass, limit, watch)
+    problem = Problem(checked, sources, mass, limit, watch)
     given = mesh is not None
-    most_tetrahedra, where = limited_by_memory(most_tetrahedra, *problem.size)
+    most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size)
     if mesh is None:
         mesh = first_mesh(problem, most_tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size)
     steps = solve_and_refine(mesh, problem, tolerance, 0 if given else most_tetrahedra, report)
     keep_with(steps[0].solution.mesh, kept)
-    found = []
+    solutions = []
     for number, step in enumerate(steps):
         notes = notes_on(step.solution, sources[number], tolerance, "on the mesh given" if given else where)
-        notes += scene.warnings(number, step.solution, given=given)
-        found.append(replace(step.solution, warnings=list(dict.fromkeys(notes))))
+        notes += checked.warnings(number, step.solution, given=given)
+        solutions.append(replace(step.solution, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
-    return [replace(solution, seconds=seconds) for solution in found]
+    return [replace(solution, seconds=seconds) for solution in solutions]

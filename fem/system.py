@@ -10,8 +10,8 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.error.by_operator import estimate_by_operator
 from tetlux.fem.error.estimate import Estimate
-from tetlux.fem.known.patch import good_nodes, inherit_good_nodes
 from tetlux.fem.known.kept import kept_on
+from tetlux.fem.known.patch import good_nodes, inherit_good_nodes
 from tetlux.fem.known.split import Sources, Subtract, sources_of, without_fit
 from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_on
 from tetlux.fem.linear.solver import LinearResult
@@ -23,7 +23,8 @@ from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
 from tetlux.fem.outcome.of_light import solution_of_light
 from tetlux.fem.outcome.solution import Solution, sum_solutions
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import BoolArray, FloatArray
@@ -188,20 +189,21 @@ class System:
     def _loads(self, sources: Sources) -> list[Load]:
         """The load of each light: with the fitted operator where it is spread evenly, else with the plain one."""
         loads = []
-        for light, deposit in enumerate(sources.on_mesh):
-            on_mesh = self._scale_emission(deposit.on(self.mesh, self.true_surface, self.coefficients))
+        for light, deposit in enumerate(sources.remaining):
+            on_mesh = self._scale_emission(deposit.evaluate_on(self.mesh, self.true_surface, self.coefficients))
             known = light in sources.owners or light in sources.fitted
-            operator = self.fitted if on_mesh.even and not known else self.plain
+            operator = self.fitted if on_mesh.terms.is_distributed and not known else self.plain
             loads.append(load_of(on_mesh, operator))
         return loads
 
     def _scale_emission(self, deposit: Deposit) -> Deposit:
         """Scale what regions emit to their true volumes: the facets of a round region lie inside it."""
-        if np.ndim(deposit.emission) == 0 or not self.regions:
+        if np.ndim(deposit.terms.emission) == 0 or not self.regions:
             return deposit
         held = np.bincount(self.mesh.regions, self.mesh.volumes, minlength=len(self.regions) + 1)
         share = own_volumes(self.true_surface, tuple(region.surface for region in self.regions)) / held
-        return replace(deposit, emission=deposit.emission * share[self.mesh.regions])
+        emission = deposit.terms.emission * share[self.mesh.regions]
+        return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
     def _subtractions(self, sources: Sources, before: Step | None) -> list[Subtraction]:
         """What is subtracted: the charges, each where it was a good guess on the mesh before, or else everywhere."""

@@ -1,4 +1,4 @@
-"""Array types for all signatures, and the scatter-add that assembly uses."""
+"""Array types of all signatures, sums by index, and evenly spaced indices."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +11,9 @@ BoolArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 
-def summed(places: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
-    """Sums (count,) of values by place; `places` and `values` have the same shape."""
-    return np.asarray(np.bincount(places.reshape(-1), values.reshape(-1), count), dtype=np.float64)
+def sum_by_index(indices: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
+    """Sum the values with each index 0, 1, ..., (count,); `indices` and `values` have the same shape."""
+    return np.asarray(np.bincount(indices.reshape(-1), values.reshape(-1), count), dtype=np.float64)
 
 
 def spread_indices(count: int, most: int) -> IntArray:

@@ -1,5 +1,6 @@
-"""Short texts for objects that contain arrays: counts, sizes with units, positions."""
+"""Short texts for messages and representations: counts, sizes with units, vectors, objects with arrays."""
 
+from collections.abc import Iterable
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
@@ -22,38 +23,43 @@ def size(points: FloatArray, unit: str) -> str:
     return f"{' x '.join(f'{length:.3g}' for length in lengths)} {unit}"
 
 
-def place_words(place: FloatArray, size: float) -> str:
-    """Coordinates as text, of a point of a body of that size; rounding errors about 0 are written as 0."""
-    return "(" + ", ".join(f"{x if abs(x) > 1e-6 * size else 0.0:.4g}" for x in place) + ")"
+def as_text(vector: Iterable[float], size: float = 0.0) -> str:
+    """A point or a direction as text, such as ``(1, 2.5, 0)``.
+
+    Coordinates below 1e-6 of `size`, the size of the body, are rounding errors and are written as 0.
+    """
+    return "(" + ", ".join(f"{0.0 if abs(x) <= 1e-6 * size else x:.4g}" for x in vector) + ")"
 
 
 def one_line(self: Any) -> str:
     """A ``__repr__`` for dataclasses with arrays: types and shapes of arrays, other values, no defaults."""
-    shown = [f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if not _is_default(self, one)]
-    return _cut(f"{type(self).__name__}({', '.join(shown)})", LONGEST_LINE)
+    shown = [
+        f"{item.name}={_summarize(getattr(self, item.name))}" for item in fields(self) if not _is_default(self, item)
+    ]
+    return _truncate(f"{type(self).__name__}({', '.join(shown)})", LONGEST_LINE)
 
 
-def _is_default(self: Any, one: "Field[Any]") -> bool:
-    value = getattr(self, one.name)
-    default = one.default_factory() if one.default_factory is not MISSING else one.default
+def _is_default(self: Any, item: "Field[Any]") -> bool:
+    value = getattr(self, item.name)
+    default = item.default_factory() if item.default_factory is not MISSING else item.default
     if isinstance(value, np.ndarray) or isinstance(default, np.ndarray):
         return isinstance(value, np.ndarray) and value.size == 0
     return bool(value is default or value == default)
 
 
-def _short(value: object) -> str:
+def _summarize(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape}"
     if isinstance(value, list | tuple):
-        text = f"({', '.join(map(_short, value))})"
+        text = f"({', '.join(map(_summarize, value))})"
         return text if len(text) <= LONGEST_VALUE else count(len(value), "value")
     if isinstance(value, dict):
         return f"{{{', '.join(map(str, value))}}}"
     if callable(value) and hasattr(value, "__name__"):
         return str(value.__name__)
-    return _cut(repr(value), LONGEST_VALUE)
+    return _truncate(repr(value), LONGEST_VALUE)
 
 
-def _cut(text: str, longest: int) -> str:
+def _truncate(text: str, longest: int) -> str:
     line = " ".join(text.split())
     return line if len(line) <= longest else f"{line[: longest - 3]}..."

@@ -3,16 +3,16 @@
 from functools import partial
 from typing import Any
 
-# Longer texts are shortened in the middle, since a quoted name can have any length.
-LONGEST = 900
+# Characters of a message; longer ones lose their middle, since a quoted name can have any length.
+LONGEST_SENTENCE = 900
 
 
 class TetluxError(Exception):
     """Base of all errors that tetlux raises deliberately; the text is one sentence on one printable line."""
 
     def __init__(self, sentence: str) -> None:
-        if len(sentence) > LONGEST:
-            sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
+        if len(sentence) > LONGEST_SENTENCE:
+            sentence = f"{sentence[: LONGEST_SENTENCE // 2]} ... {sentence[-LONGEST_SENTENCE // 2 :]}"
         super().__init__(
             "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in sentence)
         )
@@ -36,7 +36,7 @@ class InputError(TetluxError, ValueError):
         self.text, self.field, self.remedy = text, field, remedy
 
     def about(self, field: str) -> "InputError":
-        """The same error with a field that the code that raised it does not know."""
+        """The same error with the argument or key that it concerns."""
         return InputError(self.text, field=field, remedy=self.remedy)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -44,9 +44,9 @@ class InputError(TetluxError, ValueError):
 
 
 class RunError(TetluxError, RuntimeError):
-    """A sound request that could not be carried out: the mesher or the solver failed."""
+    """A valid request could not be carried out: the mesher or the solver failed."""
 
 
 def memory_ran_out(error: BaseException) -> bool:
-    """Whether an error means that memory ran out; for threads, Python raises another type than MemoryError."""
+    """Whether an error means that memory ran out; Python raises RuntimeError if it is memory for a thread."""
     return isinstance(error, MemoryError) or str(error) == "can't start new thread"

@@ -61,7 +61,7 @@ def codes_of(warnings: Iterable[str]) -> set[str]:
     return {warning.code for warning in warnings if isinstance(warning, Note)}
 
 
-def prefixed(warning: str, prefix: str) -> str:
+def add_prefix(warning: str, prefix: str) -> str:
     """A warning with a prefix; a note remains a note."""
     return warning.with_prefix(prefix) if isinstance(warning, Note) else prefix + warning
 

@@ -12,7 +12,7 @@ from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, To
 from tetlux.meshing.surface.surface import Surface
 
 
-def _positive(**lengths: float) -> None:
+def _check_lengths(**lengths: float) -> None:
     for name, value in lengths.items():
         if not math.isfinite(value) or value <= 0:
             raise InputError(f"{name} is {value:g}; give a length greater than 0.")
@@ -21,56 +21,108 @@ def _positive(**lengths: float) -> None:
 
 
 def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int = 4, unit: str = "mm") -> Surface:
-    """A sphere as an icosahedron subdivided `subdivisions` times, its vertices on the sphere.
+    """Make a sphere: an icosahedron subdivided several times, with its vertices on the sphere.
 
-    Four subdivisions give 5,120 triangles, whose volume is 0.3 % too small.
+    Parameters
+    ----------
+    radius : float
+        Unit.
+    center : (3,) floats
+        Unit.
+    subdivisions : int
+        From 1 to 7; each splits every triangle into four. Four give 5,120 triangles, whose volume is 0.3 % too small.
+    unit : str
+        Unit of length: nm, um, mm, cm, m or in.
+
+    Returns
+    -------
+    Surface
+        With ``20 * 4**subdivisions`` triangles.
 
     Raises
     ------
     InputError
-        If the radius is not positive, or `subdivisions` not within 1 to 7.
+        If the radius is not positive, or `subdivisions` is not from 1 to 7.
+
+    Examples
+    --------
+    >>> sphere(10.0)
+    Surface("sphere", 5,120 triangles, 20 x 20 x 20 mm, volume 4.18e+03 mm³)
     """
-    _positive(radius=radius)
+    _check_lengths(radius=radius)
     if not 1 <= subdivisions <= 7:
         raise InputError(f"subdivisions is {subdivisions}; give 1 to 7.")
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return _surface_of(Sphere(radius, _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
+    return _make_surface(Sphere(radius, _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
 
 
 def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> Surface:
-    """A box with edges along the axes.
+    """Make a box with edges along the axes.
 
     Parameters
     ----------
     size : (3,) floats
-        Edge lengths along x, y and z.
+        Edge lengths along x, y and z, unit.
     center : (3,) floats
+        Unit.
     unit : str
+        Unit of length: nm, um, mm, cm, m or in.
+
+    Returns
+    -------
+    Surface
+        With 12 triangles.
 
     Raises
     ------
     InputError
         If a length is not positive.
+
+    Examples
+    --------
+    >>> box((10.0, 20.0, 5.0))
+    Surface("box", 12 triangles, 10 x 20 x 5 mm, volume 1e+03 mm³)
     """
     for axis, length in zip("xyz", size, strict=True):
-        _positive(**{f"size along {axis}": length})
+        _check_lengths(**{f"size along {axis}": length})
     import trimesh  # noqa: PLC0415
 
     mesh = trimesh.creation.box(extents=size)
-    return _surface_of(Box(_vector(size), _vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
+    return _make_surface(
+        Box(_to_vector(size), _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit
+    )
 
 
 def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
-    """A square plate of `width` x `width` whose upper face is z = 0 and whose lower face is z = -depth.
+    """Make a square plate whose upper face is z = 0 and whose lower face is z = -depth, centred on the z axis.
+
+    Parameters
+    ----------
+    width : float
+        Edge length of both faces, unit.
+    depth : float
+        Distance between the faces, unit.
+    unit : str
+        Unit of length: nm, um, mm, cm, m or in.
+
+    Returns
+    -------
+    Surface
+        With 12 triangles.
 
     Raises
     ------
     InputError
         If a length is not positive.
+
+    Examples
+    --------
+    >>> slab(60.0, 10.0).extent
+    'x -30..30, y -30..30, z -10..0 mm'
     """
-    _positive(width=width, depth=depth)
+    _check_lengths(width=width, depth=depth)
     plate = box((width, width, depth), center=(0.0, 0.0, -0.5 * depth), unit=unit)
     return replace(plate, name="slab", shape=Slab(width, depth))
 
@@ -78,19 +130,39 @@ def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:
 def cylinder(
     radius: float, height: float, *, center: Vector = (0.0, 0.0, 0.0), segments: int = 64, unit: str = "mm"
 ) -> Surface:
-    """A cylinder along z with flat ends.
+    """Make a cylinder along z with flat ends.
+
+    Parameters
+    ----------
+    radius, height : float
+        Unit.
+    center : (3,) floats
+        Unit.
+    segments : int
+        Edges around each end, at least 8; the number of rows along z makes the faces nearly square.
+    unit : str
+        Unit of length: nm, um, mm, cm, m or in.
+
+    Returns
+    -------
+    Surface
 
     Raises
     ------
     InputError
         If a length is not positive, or `segments` is below 8.
+
+    Examples
+    --------
+    >>> cylinder(5.0, 20.0)
+    Surface("cylinder", 5,376 triangles, 10 x 10 x 20 mm, volume 1.57e+03 mm³)
     """
-    _positive(radius=radius, height=height)
+    _check_lengths(radius=radius, height=height)
     if segments < 8:
         raise InputError(f"segments is {segments}; give 8 or more.")
     angle = 2.0 * np.pi * np.arange(segments) / segments
     ring = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-    # Rows are about as tall as segments are wide, since fTetWild is slow on needles.
+    # Rows are about as tall as segments are wide, since fTetWild is slow on elongated triangles.
     rows = max(1, round(height / (2.0 * np.pi * radius / segments)))
     levels = np.linspace(-0.5 * height, 0.5 * height, rows + 1)
     points = np.vstack(
@@ -98,38 +170,49 @@ def cylinder(
         + [np.array([[0.0, 0.0, levels[0]], [0.0, 0.0, levels[-1]]])]
     )
     faces = [_grid_faces(rows, segments, closed_rows=False)]
-    here = np.arange(segments)
-    following = (here + 1) % segments
+    start = np.arange(segments)
+    end = (start + 1) % segments
     bottom, top = len(points) - 2, len(points) - 1
     last = rows * segments
-    faces.append(np.column_stack([following, here, np.full(segments, bottom)]))
-    faces.append(np.column_stack([here + last, following + last, np.full(segments, top)]))
-    shape = Cylinder(radius, height, _vector(center))
-    return _surface_of(shape, points + np.asarray(center), np.vstack(faces), unit)
+    faces.append(np.column_stack([end, start, np.full(segments, bottom)]))
+    faces.append(np.column_stack([start + last, end + last, np.full(segments, top)]))
+    shape = Cylinder(radius, height, _to_vector(center))
+    return _make_surface(shape, points + np.asarray(center), np.vstack(faces), unit)
 
 
 def torus(
     major: float, minor: float, *, center: Vector = (0.0, 0.0, 0.0), segments: int = 96, unit: str = "mm"
 ) -> Surface:
-    """A torus around the z axis.
+    """Make a torus around a line along z.
 
     Parameters
     ----------
     major : float
-        Distance from the axis to the centre of the tube.
+        Distance from the axis to the centre of the tube, unit.
     minor : float
-        Radius of the tube, less than `major`.
+        Radius of the tube, less than `major`, unit.
     center : (3,) floats
+        Unit.
     segments : int
-        Columns of triangles along the ring; the number of rows around the tube makes cells nearly square.
+        Edges along the ring, at least 12; the number of rows around the tube makes the faces nearly square.
     unit : str
+        Unit of length: nm, um, mm, cm, m or in.
+
+    Returns
+    -------
+    Surface
 
     Raises
     ------
     InputError
-        If a length is not positive, the tube is wider than the ring, or `segments` is below 12.
+        If a length is not positive, `minor` is not less than `major`, or `segments` is below 12.
+
+    Examples
+    --------
+    >>> torus(10.0, 3.0)
+    Surface("torus", 5,568 triangles, 26 x 26 x 5.99 mm, volume 1.76e+03 mm³)
     """
-    _positive(major=major, minor=minor)
+    _check_lengths(major=major, minor=minor)
     if minor >= major:
         raise InputError(f"minor is {minor:g} and major {major:g}; the tube's radius must be the smaller one.")
     if segments < 12:
@@ -143,16 +226,16 @@ def torus(
         [(distance * np.cos(uu)).ravel(), (distance * np.sin(uu)).ravel(), (minor * np.sin(vv)).ravel()]
     )
     faces = _grid_faces(rows, segments, closed_rows=True)
-    return _surface_of(Torus(major, minor, _vector(center)), points + np.asarray(center), faces, unit)
+    return _make_surface(Torus(major, minor, _to_vector(center)), points + np.asarray(center), faces, unit)
 
 
-def _surface_of(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
-    """Make a checked surface of a shape's triangles that remembers the shape."""
+def _make_surface(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
+    """Make a checked surface from a shape's triangles; its `shape` is that shape."""
     name = type(shape).__name__.lower()
     return replace(surface_from_arrays(points, faces, unit=unit, name=name), shape=shape)
 
 
-def _vector(values: Vector) -> Vector:
+def _to_vector(values: Vector) -> Vector:
     """Convert three numbers to floats."""
     x, y, z = map(float, values)
     return x, y, z

@@ -20,7 +20,7 @@ from skfem.refdom import RefTet, RefTri
 from tetlux.fem import Medium, PointSource, Power, Solution
 from tetlux.fem.body.body import Body as LitBody
 from tetlux.fem.exact import dipole, half_space, slab, sphere
-from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.linear.multigrid import multigrid
 from tetlux.fem.linear.solver import Solver
@@ -480,7 +480,7 @@ def point_in_a_ball(finenesses: Sequence[float], subtract: Subtract) -> Table:
     coarse = sphere_surface(radius)
     surface = TrueSphere(coarse.points, coarse.faces)
     light = PointSource((0.0, 0.0, height))
-    lit = lit_points([light.deposit_in(LitBody(coarse, (medium,)))])
+    lit = places_to_resolve([light.deposit_in(LitBody(coarse, (medium,)))])
 
     def truth(x: FloatArray) -> FloatArray:
         gamma = np.arctan2(np.hypot(x[..., 0], x[..., 1]), x[..., 2])
@@ -488,7 +488,7 @@ def point_in_a_ball(finenesses: Sequence[float], subtract: Subtract) -> Table:
 
     rows = []
     for fineness in finenesses:
-        mesh = graded_towards(ball_mesh(radius, 4), surface, *lit, 1_000_000, longest=fineness)
+        mesh = grade_mesh(ball_mesh(radius, 4), surface, *lit, 1_000_000, longest=fineness)
         solution = solve(surface, medium, [light], mesh=mesh, subtract=subtract)
         error = relative_error(
             mesh.boundary_points, mesh.boundary_triangles, mesh.boundary_areas, solution.exitance, truth

@@ -15,15 +15,15 @@ from tests.conftest import block
 from tetlux.meshing import Surface, TetMesh, box, tetrahedralize
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import cache
-from tetlux.meshing.mesher.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.cache import cache_directory, load_cached_mesh, mesh_key, store_cached_mesh
 
 MESH = block((2, 3, 4), (1.0, 2.0, 3.0))
 
 
 def test_a_mesh_comes_back_as_it_was(tmp_path: Path) -> None:
-    assert remembered_mesh("a", tmp_path, "cm") is None
-    remember_mesh("a", tmp_path / "deep" / "down", MESH)
-    again = remembered_mesh("a", tmp_path / "deep" / "down", "cm")
+    assert load_cached_mesh("a", tmp_path, "cm") is None
+    store_cached_mesh("a", tmp_path / "deep" / "down", MESH)
+    again = load_cached_mesh("a", tmp_path / "deep" / "down", "cm")
     assert again is not None
     assert (again.points == MESH.points).all()
     assert (again.tetrahedra == MESH.tetrahedra).all()
@@ -85,12 +85,12 @@ def test_the_key_holds_all_that_shapes_a_mesh(monkeypatch: pytest.MonkeyPatch) -
 )
 def test_an_entry_that_is_another_thing_is_a_miss(content: dict[str, object], tmp_path: Path) -> None:
     np.savez(tmp_path / "a.npz", **content)  # type: ignore[arg-type]
-    assert remembered_mesh("a", tmp_path, "mm") is None
+    assert load_cached_mesh("a", tmp_path, "mm") is None
 
 
 @pytest.mark.parametrize("damage", ["empty", "half", "bits", "prose", "folder", "array"])
 def test_a_damaged_entry_is_a_miss_and_is_replaced(damage: str, tmp_path: Path) -> None:
-    remember_mesh("a", tmp_path, MESH)
+    store_cached_mesh("a", tmp_path, MESH)
     path = tmp_path / "a.npz"
     data = bytearray(path.read_bytes())
     if damage == "empty":
@@ -108,30 +108,30 @@ def test_a_damaged_entry_is_a_miss_and_is_replaced(damage: str, tmp_path: Path) 
     else:
         path.unlink()
         path.mkdir()
-    assert remembered_mesh("a", tmp_path, "mm") is None
-    remember_mesh("a", tmp_path, MESH)
-    assert (remembered_mesh("a", tmp_path, "mm") is not None) == (damage != "folder")
+    assert load_cached_mesh("a", tmp_path, "mm") is None
+    store_cached_mesh("a", tmp_path, MESH)
+    assert (load_cached_mesh("a", tmp_path, "mm") is not None) == (damage != "folder")
 
 
 def test_an_unwritable_directory_is_no_cache(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
-    remember_mesh("a", file / "below", MESH)
-    remember_mesh("a", file, MESH)
-    assert remembered_mesh("a", file, "mm") is None
+    store_cached_mesh("a", file / "below", MESH)
+    store_cached_mesh("a", file, MESH)
+    assert load_cached_mesh("a", file, "mm") is None
     assert file.read_text() == ""
 
 
 def test_what_was_used_longest_ago_goes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = time.time()
     for age, key in enumerate("abcd"):
-        remember_mesh(key, tmp_path, MESH)
+        store_cached_mesh(key, tmp_path, MESH)
         os.utime(tmp_path / f"{key}.npz", (now - 100 + age, now - 100 + age))
     size = (tmp_path / "a.npz").stat().st_size
     (tmp_path / "notes.txt").write_text("kept")
-    assert remembered_mesh("a", tmp_path, "mm") is not None
-    monkeypatch.setattr(cache, "LIMIT", 3 * size)
-    remember_mesh("e", tmp_path, MESH)
+    assert load_cached_mesh("a", tmp_path, "mm") is not None
+    monkeypatch.setattr(cache, "LARGEST_CACHE", 3 * size)
+    store_cached_mesh("e", tmp_path, MESH)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "d.npz", "e.npz", "notes.txt"]
 
 
@@ -139,7 +139,7 @@ def test_what_a_dead_process_left_goes_after_a_day(tmp_path: Path) -> None:
     for name, age in (("old.part", 2 * 86_400), ("new.part", 60)):
         (tmp_path / name).write_text("")
         os.utime(tmp_path / name, (time.time() - age,) * 2)
-    remember_mesh("a", tmp_path, MESH)
+    store_cached_mesh("a", tmp_path, MESH)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.npz", "new.part"]
 
 
@@ -148,7 +148,7 @@ def test_a_write_that_fails_leaves_nothing(tmp_path: Path, monkeypatch: pytest.M
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(np, "savez", full)
-    remember_mesh("a", tmp_path, MESH)
+    store_cached_mesh("a", tmp_path, MESH)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -158,8 +158,8 @@ def test_many_may_read_and_write_at_once(tmp_path: Path) -> None:
 
     def work(mesh: TetMesh) -> None:
         for _ in range(30):
-            remember_mesh("a", tmp_path, mesh)
-            found = remembered_mesh("a", tmp_path, "mm")
+            store_cached_mesh("a", tmp_path, mesh)
+            found = load_cached_mesh("a", tmp_path, "mm")
             if found is None or len(found.tetrahedra) not in {len(m.tetrahedra) for m in meshes}:
                 wrong.append(found)
 

@@ -9,9 +9,10 @@ import pytest
 from PIL import Image
 
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
 from tetlux.cases.file.images import read_pixels
-from tetlux.cases.picture.arrows import rays
+from tetlux.cases.file.load import load_cases
+from tetlux.cases.picture.arrows import light_rays
 from tetlux.fem import CollimatedBeam, DiffusePatch, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector
@@ -73,14 +74,14 @@ def test_spots_and_their_power(load: Load, spot: str, expected: Disc) -> None:
 def test_light_on_the_whole_body_is_drawn_as_parallel_arrows(load: Load) -> None:
     case = load("collimated: {direction: [0, 0, -2], irradiance: 0.5}")
     assert case.lights == (CollimatedBeam((0.0, 0.0, -2.0), 0.5),)
-    drawn = rays(case.lights[0], case.surface)
+    drawn = light_rays(case.lights[0], case.surface)
     assert len(drawn) == 3
     for ray in drawn:
         start, end = np.array(ray.start), np.array(ray.end)
         assert end[2] == pytest.approx(4.0)
         assert np.abs(end[:2]).max() < 4.0
         assert start - end == pytest.approx([0.0, 0.0, 0.3 * case.surface.diagonal])
-    (spot,) = rays(CollimatedBeam((0.0, 0.0, -1.0), 1.0, Disc((1.0, 2.0, 0.0), 0.5)), box((8.0, 8.0, 8.0)))
+    (spot,) = light_rays(CollimatedBeam((0.0, 0.0, -1.0), 1.0, Disc((1.0, 2.0, 0.0), 0.5)), box((8.0, 8.0, 8.0)))
     assert spot.end == pytest.approx((1.0, 2.0, 4.0), abs=0.05)
 
 
@@ -89,7 +90,7 @@ def test_a_patch_has_a_value_for_each_channel(load: Load) -> None:
     case = load(f"{patch}\n  - {POINT}", medium=THREE)
     lights = [channel.lights.get("patch_1") for channel in case.channels]
     assert lights == [DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), None, DiffusePatch((1.0, 2.0, 4.0), 1.0, 3.0)]
-    (drawn,) = rays(DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), case.surface)
+    (drawn,) = light_rays(DiffusePatch((1.0, 2.0, 4.0), 1.0, 2.0), case.surface)
     assert drawn.is_point
     assert drawn.end == pytest.approx((1.0, 2.0, 4.0))
 
@@ -148,8 +149,8 @@ def test_detectors_and_camera(load: Load) -> None:
         "  - {name: c, fibre: {center: [0, -4, 0], radius: 0.5, numerical_aperture: 0.22}}\n"
         "camera: {position: [0, 0, 50]}\n"
     )
-    assert [(s.name, s.kind) for s in case.sensors] == [("a", "point"), ("b", "disc"), ("c", "fibre")]
-    assert [s.detector for s in case.sensors] == [
+    assert [(s.name, s.kind) for s in case.detectors] == [("a", "point"), ("b", "disc"), ("c", "fibre")]
+    assert [s.detector for s in case.detectors] == [
         PointDetector((0.0, 0.0, 4.0)),
         DiscDetector((4.0, 0.0, 0.0), 1.0),
         FibreDetector((0.0, -4.0, 0.0), 0.5, 0.22),
@@ -209,14 +210,14 @@ WRONG = [
         "lights: all lights are dark in channel 1; give",
     ),
     ("{name: all, " + POINT + "}", "", r'lights\[0\]: "all" is the sum'),
-    ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" stands here twice'),
+    ("{name: a, " + POINT + "}\n  - {name: a, " + POINT + "}", "", r'lights\[1\]: the name "a" is given twice'),
     ("{name: red, " + POINT + "}", "channels: [red, ir]\n", r'lights: names of lights and channels make "red" twice'),
-    ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: a name here is of letters from A to Z, digits and"),
-    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, diffuse, patch, collimated, environment, emission"),
+    ("{name: a b, " + POINT + "}", "", r"lights\[0\]\.name: expected a name of letters from A to Z, digits and"),
+    ("{}", "", r"lights\[0\]: give exactly one of pencil, point, .*, emission, not none"),
     (
         POINT,
         "detectors: [{name: a, point: [0, 0, 4]}, {name: a, point: [0, 4, 0]}]\n",
-        r'detectors\[1\]: the name "a" stands here twice',
+        r'detectors\[1\]: the name "a" is given twice',
     ),
     (POINT, "detectors: [{point: [0, 0, 4]}]\n", r"detectors\[0\]\.name: this key is missing"),
     (POINT, "detectors: [{name: a}]\n", r"detectors\[0\]: give exactly one of point, disc, fibre"),

@@ -11,9 +11,10 @@ import trimesh
 from PIL import Image
 
 from tests.conftest import block
-from tetlux.cases.chart.benchmark import benchmark_of
+from tetlux.cases.chart.benchmark import prepare_benchmark
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.fem import Medium, PencilBeam, PointSource
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
@@ -151,7 +152,7 @@ def test_regions_have_media_for_every_channel(load: Load) -> None:
         Medium(sigma_a=0.2, sigma_s_prime=1.0, eta=1.4),
     )
     assert cube.medium == (Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4),) * 2
-    assert not case.is_simple
+    assert not case.has_single_medium
 
 
 def absorbing(field: str) -> str:
@@ -180,9 +181,9 @@ WRONG = [
     ),
     ("{material: marbel}", "", r'medium\.material: material "marbel" is not known; did you mean "marble"'),
     ("{material: marble, eta: 1.3}", "", r"medium\.eta: unknown key; the keys here are material"),
-    (TISSUE, "channels: [a, a]\n", r'line 5: channels\[1\]: the name "a" stands here twice'),
-    (TISSUE, "channels: [blue, green, red]\n", "channels: red, green and blue stand in this order"),
-    (TISSUE, "channels: ['a b']\n", r"channels\[0\]: a name here is of letters"),
+    (TISSUE, "channels: [a, a]\n", r'line 5: channels\[1\]: the name "a" is given twice'),
+    (TISSUE, "channels: [blue, green, red]\n", "channels: give red, green and blue in this order"),
+    (TISSUE, "channels: ['a b']\n", r"channels\[0\]: expected a name of letters"),
     ("{sigma_a: [], sigma_s_prime: 1, eta: 1.4}", "", r"medium\.sigma_a: give at least one"),
     (
         "{sigma_a: [0.1, many], sigma_s_prime: 1, eta: 1.4}",
@@ -233,8 +234,8 @@ WRONG = [
         r"regions\[0\]\.medium\.sigma_s_prime: .*3 channels",
     ),
     (TISSUE, ball(name="body"), r'regions\[0\]: "body" is'),
-    (TISSUE, "channels: [a, b]\ncompare: [series]\n", "compare: closed forms are those of one channel"),
-    (TISSUE, ball() + "compare: [robin]\n", "compare: closed forms are those of one channel"),
+    (TISSUE, "channels: [a, b]\ncompare: [series]\n", "compare: closed forms exist for one channel"),
+    (TISSUE, ball() + "compare: [robin]\n", "compare: closed forms exist for one channel"),
 ]
 
 
@@ -254,8 +255,8 @@ def test_a_wrong_medium_gets_one_sentence(
 
 def test_a_chart_is_of_simple_cases_only(load: Load) -> None:
     for case in (load("{material: marble}"), load(more=ball())):
-        with pytest.raises(RunError, match="a chart is of one channel and one even medium"):
-            benchmark_of(case, quick=True)
+        with pytest.raises(RunError, match="a chart needs one channel and one uniform medium"):
+            prepare_benchmark(case, quick=True)
 
 
 def test_repairs_of_a_region_bear_its_name(load: Load, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

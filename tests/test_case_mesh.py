@@ -10,7 +10,7 @@ import pytest
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.fem import Emission, Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, read_mesh
 from tetlux.meshing.files.meshes import write_mesh
@@ -98,7 +98,7 @@ def test_channels_sweeps_and_emission(path: Path) -> None:
     assert isinstance(two.media, dict)
     assert (two.media[3].sigma_a, two.media[7].sigma_a, two.media[7].sigma_s_prime) == (0.2, 0.02, 2.5)
     assert list(one.lights.values()) == [Emission(1.0, 7), Emission(1.0, 3)]
-    assert not last.is_simple
+    assert not last.has_single_medium
 
 
 def test_coefficients_from_files_are_those_of_their_label(path: Path) -> None:
@@ -125,7 +125,7 @@ def test_the_array_of_labels_is_a_key(path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (LABELLED + "surface: {sphere: {radius: 1}}\n", r"line 1: mesh: mesh stands in place of .*; leave surface out"),
+        (LABELLED + "surface: {sphere: {radius: 1}}\n", r"line 1: mesh: mesh replaces .*; leave surface out"),
         (LABELLED + f"medium: {SKIN}\n", "leave medium out"),
         (
             LABELLED + f"regions: [{{surface: {{sphere: {{radius: 1}}}}, medium: {SKIN}}}]\ncompare: [dipole]\n",
@@ -138,7 +138,7 @@ def test_the_array_of_labels_is_a_key(path: Path) -> None:
             r'line 1: mesh\.labels\.skim: the mesh has no label "skim"; did you mean "sk',
         ),
         (LABELLED.replace("skin:", "4:"), r'mesh\.labels\.4: the mesh has no label "4"; its labels are 3 \(skin\)'),
-        (LABELLED.replace("skin:", "bone:"), r"mesh\.labels\.7: label 7 \(bone\) has a medium already"),
+        (LABELLED.replace("skin:", "bone:"), r"mesh\.labels\.7: label 7 \(bone\) has two media; give it one"),
         (
             f"mesh: {{file: head.msh, labels: {{7: {BONE}}}}}\n",
             r"mesh\.labels: the mesh's label 3 \(skin\) has no medium",

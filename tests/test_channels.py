@@ -23,7 +23,7 @@ from tetlux.fem import (
     System,
     solve,
 )
-from tetlux.fem.ballistic.follow import Rays
+from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.solve import solve_each
@@ -82,7 +82,7 @@ def test_channels_are_solved_as_each_alone(media: Sequence[AnyMedium]) -> None:
 def test_what_falls_on_a_mesh_is_worked_out_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """For all channels of one index, and for a spot that only differs in its irradiance."""
     worked: list[str] = []
-    draw, look = CollimatedBeam._falling, EnvironmentLight._seen_from
+    draw, look = CollimatedBeam._incident_rays, EnvironmentLight._illuminate
 
     def counting_draw(light: CollimatedBeam, mesh: TetMesh) -> tuple[Rays, FloatArray]:
         worked.append("beam")
@@ -92,8 +92,8 @@ def test_what_falls_on_a_mesh_is_worked_out_once(monkeypatch: pytest.MonkeyPatch
         worked.append("sky")
         return look(light, mesh, eta)
 
-    monkeypatch.setattr(CollimatedBeam, "_falling", counting_draw)
-    monkeypatch.setattr(EnvironmentLight, "_seen_from", counting_look)
+    monkeypatch.setattr(CollimatedBeam, "_incident_rays", counting_draw)
+    monkeypatch.setattr(EnvironmentLight, "_illuminate", counting_look)
     sky, disc = EnvironmentLight(np.ones((4, 8))), Disc((0.0, 0.5, 1.0), 1.0)
     down, spot = CollimatedBeam((0.0, 0.0, -1.0)), CollimatedBeam((0.0, 0.0, -1.0), spot=disc)
     cases: list[tuple[list[Medium], list[Light], list[str]]] = [

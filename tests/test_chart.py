@@ -19,30 +19,31 @@ from tetlux import cases, fem, meshing
 from tetlux.cases.chart import benchmark as chart_benchmark
 from tetlux.cases.chart import command as chart_module
 from tetlux.cases.chart import files, finite_elements, reference
-from tetlux.cases.chart.benchmark import Benchmark, benchmark_of
+from tetlux.cases.chart.benchmark import Benchmark, prepare_benchmark
 from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, OURS
+from tetlux.cases.chart.meshless import MESHLESS, MONTE_CARLO
 from tetlux.cases.chart.methods import Method, Outcome
-from tetlux.cases.chart.models import MODELS, MONTE_CARLO
 from tetlux.cases.chart.peers import PEERS, Peer, run_peer
-from tetlux.cases.chart.picture import LOOKS
+from tetlux.cases.chart.picture import STYLES
 from tetlux.cases.chart.reference import Reference
 from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure_methods
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
-from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
+from tetlux.cases.chart.statistics import fit_exponent, pareto_front
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem import solve
 from tetlux.fem.exact import slab, sphere
+from tetlux.fem.exact.checks import Face
 from tetlux.meshing import RunError, Surface, box, tetrahedralize
 
 NO_LIGHT = (np.zeros((0, 3)), np.zeros(0))
-BY_NAME = {method.name: method for method in (*MODELS, *FINITE_ELEMENTS, MONTE_CARLO)}
+BY_NAME = {method.name: method for method in (*MESHLESS, *FINITE_ELEMENTS, MONTE_CARLO)}
 
 
 @pytest.fixture(scope="module")
 def ball_benchmark() -> Benchmark:
-    return benchmark_of(load_cases(find_case_file("sphere"))[0], quick=True)
+    return prepare_benchmark(load_cases(find_case_file("sphere"))[0], quick=True)
 
 
 def few(benchmark: Benchmark, count: int = 50) -> Benchmark:
@@ -107,10 +108,10 @@ def test_the_front_is_what_nothing_beats() -> None:
 
 def test_exponents_are_fitted_to_three_runs_or_more() -> None:
     x = [100.0, 1000.0, 20000.0]
-    assert fitted_exponent(x, [3.0 * value**-0.7 for value in x]) == pytest.approx(-0.7, abs=1e-12)
-    assert fitted_exponent(x[:2], [1.0, 2.0]) is None
-    assert fitted_exponent([5.0] * 3, [1.0, 2.0, 3.0]) is None
-    assert fitted_exponent(x, [1.0, 0.0, 2.0]) is None
+    assert fit_exponent(x, [3.0 * value**-0.7 for value in x]) == pytest.approx(-0.7, abs=1e-12)
+    assert fit_exponent(x[:2], [1.0, 2.0]) is None
+    assert fit_exponent([5.0] * 3, [1.0, 2.0, 3.0]) is None
+    assert fit_exponent(x, [1.0, 0.0, 2.0]) is None
 
 
 # Benchmarks
@@ -129,13 +130,13 @@ def test_the_sphere_is_measured_on_the_true_sphere(ball_benchmark: Benchmark) ->
 
 
 def test_the_slab_is_measured_on_both_faces() -> None:
-    benchmark = benchmark_of(load_cases(find_case_file("slab"))[0], quick=True)
+    benchmark = prepare_benchmark(load_cases(find_case_file("slab"))[0], quick=True)
     ((source, power),) = benchmark.sources
     emitted = benchmark.samples.weights * benchmark.reference.exitance
     front = benchmark.samples.normals[:, 2] > 0
     assert np.allclose(benchmark.samples.points[:, 2], np.where(front, 0.0, -10.0), atol=1e-9)
     depth = -float(source[2])
-    sides: list[tuple[np.ndarray, slab.Face]] = [(front, "front"), (~front, "back")]
+    sides: list[tuple[np.ndarray, Face]] = [(front, "front"), (~front, "back")]
     for side, face in sides:
         total = power * slab.point_total(TISSUE, thickness=10.0, depth=depth, face=face)
         # The rest leaves beyond the samples: 0.09 % of the front's, 0.56 % of the back's.
@@ -149,7 +150,7 @@ def test_without_a_closed_form_the_reference_is_a_finer_run(tmp_path: Path, monk
         "medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}\n"
         "lights:\n  - diffuse: {irradiance: 1.0}\n"
     )
-    benchmark = benchmark_of(load_cases(tmp_path / "block.yaml")[0], quick=True)
+    benchmark = prepare_benchmark(load_cases(tmp_path / "block.yaml")[0], quick=True)
     assert benchmark.reference.kind == "finer run"
     assert benchmark.reference.description.startswith("tetlux itself on ")
     assert 0 < benchmark.reference.error <= 0.1
@@ -164,9 +165,9 @@ def test_tolerances_below_the_reference_are_left_out(ball_benchmark: Benchmark) 
     rough = replace(
         ball_benchmark, reference=Reference("finer run", "", ball_benchmark.reference.exitance, error=0.004)
     )
-    assert BY_NAME[OURS].ladder_for(ball_benchmark) == BY_NAME[OURS].ladder
-    assert BY_NAME[OURS].ladder_for(rough) == (0.05, 0.02)
-    assert BY_NAME["P1, uniform"].ladder_for(rough) == BY_NAME["P1, uniform"].ladder
+    assert BY_NAME[OURS].values_for(ball_benchmark) == BY_NAME[OURS].values
+    assert BY_NAME[OURS].values_for(rough) == (0.05, 0.02)
+    assert BY_NAME["P1, uniform"].values_for(rough) == BY_NAME["P1, uniform"].values
 
 
 # Methods
@@ -174,7 +175,7 @@ def test_tolerances_below_the_reference_are_left_out(ball_benchmark: Benchmark) 
 
 def test_closed_forms_of_the_half_space_on_the_sphere(ball_benchmark: Benchmark) -> None:
     """Both differ from the sphere's own closed form by what the curvature does, and the dipole by its boundary."""
-    errors = {m.name: ball_benchmark.error_of(m.run(ball_benchmark, 0.0).exitance) for m in MODELS}
+    errors = {m.name: ball_benchmark.error_of(m.run(ball_benchmark, 0.0).exitance) for m in MESHLESS}
     assert errors["dipole alone"] == pytest.approx(0.402, abs=0.01)
     assert errors["half-space alone"] == pytest.approx(0.113, abs=0.005)
 
@@ -245,8 +246,8 @@ def test_exponents_by_method() -> None:
 
 
 def test_every_method_has_a_look() -> None:
-    assert {*BY_NAME, *(method.name for peer in PEERS for method in peer.methods)} == set(LOOKS)
-    assert len({(look.color, look.marker) for look in LOOKS.values()}) == len(LOOKS)
+    assert {*BY_NAME, *(method.name for peer in PEERS for method in peer.methods)} == set(STYLES)
+    assert len({(look.color, look.marker) for look in STYLES.values()}) == len(STYLES)
 
 
 # Peers
@@ -326,10 +327,10 @@ ABSENT = (Peer("NGSolve", "no_such_package", ()),)
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """A chart of methods that take no time."""
-    monkeypatch.setattr(chart_module, "MODELS", LITTLE[:1])
+    monkeypatch.setattr(chart_module, "MESHLESS", LITTLE[:1])
     monkeypatch.setattr(chart_module, "FINITE_ELEMENTS", LITTLE[1:])
     monkeypatch.setattr(chart_module, "PEERS", ABSENT)
-    monkeypatch.setattr(chart_module, "monte_carlo_installed", lambda: False)
+    monkeypatch.setattr(chart_module, "has_monte_carlo", lambda: False)
     monkeypatch.setattr(chart_module, "_warm_up", lambda: None)
 
 
@@ -358,11 +359,13 @@ def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     picture = np.asarray(Image.open(tmp_path / "out" / "chart.png").convert("RGB")).astype(int)
     assert picture.shape[1] == 2000
     for name in (OURS, "P1, graded"):
-        color = [int(LOOKS[name].color[i : i + 2], 16) for i in (1, 3, 5)]
+        color = [int(STYLES[name].color[i : i + 2], 16) for i in (1, 3, 5)]
         assert (np.abs(picture - color).max(axis=2) < 8).sum() > 300, name
     said = capsys.readouterr().out
-    assert 'NGSolve is not installed and left out; pip install "tetlux[peers]" brings it.' in said
-    assert 'Monte Carlo is left out: it needs numba; pip install "tetlux[montecarlo]" brings it.' in said
+    assert 'NGSolve is left out, since it is not installed; pip install "tetlux[peers]" installs it.' in said
+    assert (
+        'Monte Carlo is left out, since numba is not installed; pip install "tetlux[montecarlo]" installs it.' in said
+    )
 
 
 @pytest.mark.usefixtures("little")
@@ -411,10 +414,10 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
     [
         (
             ["ball"],
-            'ball: did you mean "sphere"? it is neither a file nor one of the cases that ship: '
+            'ball: did you mean "sphere"? it is neither a file nor one of the shipped cases: '
             "candle, hare, inclusion, laser, marble, slab, sphere, torus.",
         ),
-        (["sweep.yaml"], "sweep.yaml holds a sweep, and a chart is of single scenes; leave sweep out of it."),
+        (["sweep.yaml"], "sweep.yaml has a sweep, but a chart takes single scenes; leave sweep out."),
         (
             ["sphere", "--out", "sweep.yaml"],
             "results cannot be written to sweep.yaml: Not a directory; choose another folder with --out.",

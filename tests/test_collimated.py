@@ -7,10 +7,9 @@ import pytest
 
 from tests.benchmarks.scenes import lit_ball, turbid
 from tests.conftest import block
-from tetlux.fem import CollimatedBeam, Deposit, Disc, Medium, Solution, System, solve
-from tetlux.fem.body.body import Body
+from tests.lights_made import deposit_on_mesh
+from tetlux.fem import CollimatedBeam, Disc, Medium, Solution, System, solve
 from tetlux.fem.exact import slab_plane, sphere_light
-from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing import InputError, TetMesh, box, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
@@ -141,10 +140,6 @@ def test_van_de_hulsts_slab() -> None:
     assert through + ballistic == pytest.approx(0.66096, rel=0.03)
 
 
-def on_mesh(light: CollimatedBeam, mesh: TetMesh, medium: Medium) -> Deposit:
-    return light.deposit_in(Body(mesh.surface, (medium,))).on(mesh, mesh.surface, coefficients_of(medium))
-
-
 OPAQUE = Medium(sigma_a=1.0, sigma_s_prime=20.0, eta=1.0)
 
 
@@ -154,12 +149,13 @@ def test_all_of_a_convex_bodys_lit_side_is_lit_and_nothing_else(
     name: str, direction: Vector, ball_mesh: TetMesh
 ) -> None:
     mesh = ball_mesh if name == "ball" else block((5, 4, 3), (3.0, 3.0, 3.0))
-    deposit = on_mesh(CollimatedBeam(direction), mesh, OPAQUE)
+    deposit = deposit_on_mesh(CollimatedBeam(direction), mesh, OPAQUE)
+    segments = deposit.terms.segments
     facing = -mesh.surface.normals @ (np.array(direction) / np.linalg.norm(direction))
     lit = facing > 0
-    assert deposit.incident == pytest.approx(float(mesh.boundary_areas[lit] @ facing[lit]), rel=1e-5)
+    assert deposit.ledger.incident == pytest.approx(float(mesh.boundary_areas[lit] @ facing[lit]), rel=1e-5)
     # A ray starts on every lit facet, but for those nearly edge-on, and on no other.
-    _, starts, _ = mesh.closest_boundary(deposit.starts)
+    _, starts, _ = mesh.closest_boundary(segments.starts)
     assert set(np.flatnonzero(facing > 1e-2)) <= set(starts.tolist()) <= set(np.flatnonzero(lit))
 
 
@@ -175,13 +171,14 @@ def ring_mesh() -> TetMesh:
 
 def test_what_faces_the_light_but_is_hidden_gets_none(ring_mesh: TetMesh) -> None:
     """From +x: the near half is lit, and the far half only by what passes the tube, here next to nothing."""
-    deposit = on_mesh(CollimatedBeam((-1.0, 0.0, 0.0)), ring_mesh, OPAQUE)
+    deposit = deposit_on_mesh(CollimatedBeam((-1.0, 0.0, 0.0)), ring_mesh, OPAQUE)
+    segments = deposit.terms.segments
     facing = ring_mesh.surface.normals[:, 0]
     without_shadows = float(ring_mesh.boundary_areas[facing > 0] @ facing[facing > 0])
     # Measured -.8 %: facets, and one ray each where they are half in the shadow.
-    assert deposit.incident == pytest.approx(SEEN, rel=0.015)
+    assert deposit.ledger.incident == pytest.approx(SEEN, rel=0.015)
     assert without_shadows > 1.5 * SEEN
-    entering = deposit.starts[deposit.fluxes > 1e-6 * deposit.fluxes.max()]
+    entering = segments.starts[segments.fluxes > 1e-6 * segments.fluxes.max()]
     # The inner side of the far half is hidden by the near one but for a hair at the very top, where facets are.
     hidden = (np.hypot(*entering.T[:2]) < MAJOR - 0.1) & (entering[:, 0] < -0.5) & (np.abs(entering[:, 2]) < 1.8)
     assert not hidden.any()
@@ -203,23 +200,24 @@ def passes(extinction: float) -> tuple[float, float]:
 def test_behind_a_gap_arrives_what_has_passed_before_it(ring_mesh: TetMesh) -> None:
     """At matched indices light goes straight on: through the tube, across the hole and through the tube again."""
     clear = Medium(sigma_a=0.05, sigma_s_prime=0.35, eta=1.0)
-    deposit = on_mesh(CollimatedBeam((-1.0, 0.0, 0.0)), ring_mesh, clear)
-    again = (np.hypot(*deposit.starts.T[:2]) < MAJOR) & (deposit.starts[:, 0] < 0)
+    deposit = deposit_on_mesh(CollimatedBeam((-1.0, 0.0, 0.0)), ring_mesh, clear)
+    segments = deposit.terms.segments
+    again = (np.hypot(*segments.starts.T[:2]) < MAJOR) & (segments.starts[:, 0] < 0)
     entering, leaving = passes(0.4)
     # Measured 2 % of both, by the facets; 1 % with edges of .6.
-    assert float(deposit.fluxes[again].sum()) == pytest.approx(entering, rel=0.04)
-    assert deposit.ballistic == pytest.approx(leaving, rel=0.04)
-    out = deposit.absorbed + deposit.ballistic + deposit.specular
-    scattered = deposit.fluxes @ -np.expm1(-0.4 * deposit.lengths) * 0.35 / 0.4
-    assert out + scattered == pytest.approx(deposit.incident, rel=1e-9)
+    assert float(segments.fluxes[again].sum()) == pytest.approx(entering, rel=0.04)
+    assert deposit.ledger.ballistic == pytest.approx(leaving, rel=0.04)
+    out = deposit.ledger.absorbed + deposit.ledger.ballistic + deposit.ledger.specular
+    scattered = segments.fluxes @ -np.expm1(-0.4 * segments.lengths) * 0.35 / 0.4
+    assert out + scattered == pytest.approx(deposit.ledger.incident, rel=1e-9)
 
 
 def test_rays_that_graze_facets_go_on(ring_mesh: TetMesh) -> None:
     """One direction in fifteen has a ray along a facet; none of them may meet it again and again, and stay there."""
     clear = Medium(sigma_a=0.05, sigma_s_prime=0.35, eta=1.0)
     for direction in on_sphere(1.0, np.linspace(0.6, 1.4, 60)):
-        deposit = on_mesh(CollimatedBeam(tuple(direction)), ring_mesh, clear)
-        assert deposit.powers.sum() == 0
+        deposit = deposit_on_mesh(CollimatedBeam(tuple(direction)), ring_mesh, clear)
+        assert deposit.terms.powers.sum() == 0
 
 
 def test_lights_that_cannot_be() -> None:

@@ -10,14 +10,16 @@ import pytest
 from PIL import Image
 
 from tests.conftest import TISSUE
-from tetlux.cases.compare.comparison import NAMES, source_model
+from tetlux.cases.compare.comparison import NAMES, describe_source_model
 from tetlux.cases.compare.differences import MEANINGS, compare
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import ClosedForm
 from tetlux.cases.run import run_case
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PointSource, Solution, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import slab as exact_slab
+from tetlux.fem.exact.checks import Face
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.meshing import InputError, RunError, slab, sphere
 
@@ -98,7 +100,7 @@ def test_a_wrong_exitance_is_seen(ball_solution: Solution, tmp_path: Path) -> No
 
 
 def test_the_source_model_is_given_a_figure() -> None:
-    assert "would change the exitance" in source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
+    assert "would change the exitance" in describe_source_model(Medium(sigma_a=0.01, sigma_s=5.0, g=0.8, eta=1.4))
 
 
 @pytest.mark.parametrize(
@@ -107,10 +109,10 @@ def test_the_source_model_is_given_a_figure() -> None:
         (
             "[robin, images, dipole]",
             "[series]",
-            r'line 7: compare: "series" is no closed form',
+            r'line 7: compare: there is no closed form "series"',
         ),
-        ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*there is none for a torus"),
-        ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms here are those of point sources"),
+        ("slab: {width: 60, depth: 10}", "torus: {major: 9, minor: 4}", "compare: .*a torus has none"),
+        ("power: 2.0", 'deposit: "line", radius: 1', "compare: closed forms exist for point sources only"),
         (
             "origin: [3, 0, 10]",
             "origin: [29, 0, 10]",
@@ -171,7 +173,7 @@ def test_the_registry_has_both_faces_of_a_slab() -> None:
     form = closed_forms(plate.shape, TISSUE, [deposit])["robin"]
     radius, weight = np.polynomial.legendre.leggauss(400)
     rho, weight = 10.0 * (radius + 1.0), 10.0 * weight
-    sides: tuple[tuple[float, exact_slab.Face], ...] = ((0.0, "front"), (-2.0, "back"))
+    sides: tuple[tuple[float, Face], ...] = ((0.0, "front"), (-2.0, "back"))
     for z, face in sides:
         places = np.column_stack([1.0 + rho, np.full(400, 2.0), np.full(400, z)])
         total = 2.0 * np.pi * (weight * rho) @ form.exitance(places)

@@ -15,13 +15,12 @@ import pytest
 
 from tests.conftest import block
 from tests.convergence import summed
-from tetlux.fem import Medium, PencilBeam, PointSource, Solution, solve
+from tetlux.fem import Medium, PencilBeam, PointSource, Segments, Solution, SourceTerms, solve
 from tetlux.fem.exact import cylinder, half_space, slab, sphere
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.operators.assembly import system_matrix
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import FloatArray
 
@@ -361,14 +360,8 @@ START, DIRECTION, LENGTH = np.array([0.3, 0.4, 0.0]), np.array([0.1, -0.2, -1.0]
 
 
 def test_equation_9_a_beams_first_moment_acts_like_its_divergence() -> None:
-    deposit = Deposit(
-        incident=1.0,
-        starts=START[None],
-        directions=DIRECTION[None],
-        lengths=np.array([LENGTH]),
-        fluxes=np.array([1.0]),
-    )
-    load = load_vector(SOLVED_MESH, coefficients_of(PEAKED), deposit)
+    segments = Segments(START[None], DIRECTION[None], np.array([LENGTH]), np.array([1.0]))
+    load = load_vector(SOLVED_MESH, coefficients_of(PEAKED), SourceTerms(segments=segments))
     # The rule does not stop where the beam passes from one tetrahedron to the next: 3e-6 of the largest.
     np.testing.assert_allclose(load, along_beam(SOLVED_MESH, START, DIRECTION, LENGTH), atol=1e-5 * load.max())
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from tetlux import fem, meshing
+from tetlux import cases, fem, meshing
 
-FOLDERS = {"tetlux.fem": fem, "tetlux.meshing": meshing}
+FOLDERS = {"tetlux.cases": cases, "tetlux.fem": fem, "tetlux.meshing": meshing}
 
 
 def modules_with_examples() -> list[str]:

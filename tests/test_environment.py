@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
+from tests.lights_made import deposit_on_mesh
 from tests.test_paths import carved
 from tetlux.fem import CollimatedBeam, DiffuseLight, EnvironmentLight, Medium, Solution, System, solve
-from tetlux.fem.body.body import Body
-from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import moments, reflectance
 from tetlux.meshing import InputError, TetMesh, box, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, Vector
@@ -89,11 +88,11 @@ def test_a_coarse_environment_is_even_too(ball_mesh: TetMesh) -> None:
 def test_a_concave_body_keeps_light_off_itself(ring: TetMesh) -> None:
     """Of the mesh's nodes those at the middle of the hole see part of the sky, and those outermost all of it."""
     light = EnvironmentLight(np.full((32, 64), 1.0 / math.pi))
-    deposit = light.deposit_in(Body(ring.surface, (medium(1.0),))).on(ring, ring.surface, coefficients_of(medium(1.0)))
-    assert isinstance(deposit.irradiance, np.ndarray)
+    irradiance = deposit_on_mesh(light, ring, medium(1.0)).terms.irradiance
+    assert isinstance(irradiance, np.ndarray)
     distance = np.hypot(*ring.boundary_points.T[:2])
-    assert deposit.irradiance[distance > 7.9] == pytest.approx(1.0, abs=0.03)
-    innermost = deposit.irradiance[distance < 4.1]
+    assert irradiance[distance > 7.9] == pytest.approx(1.0, abs=0.03)
+    innermost = irradiance[distance < 4.1]
     assert len(innermost) > 5
     # A band of 37 degrees to either side is clear at most, and of the rest what is above and below the far side.
     assert 0.3 < innermost.min() <= innermost.max() < 0.9
@@ -136,17 +135,15 @@ def test_a_small_sun_lights_what_a_beam_lights() -> None:
     (towards,), (across,) = light.directions
     x, y, z = (-float(part) for part in towards)
     beam = CollimatedBeam((x, y, z), float(across))
-    of_sky, of_beam = (
-        each.deposit_in(Body(mesh.surface, (of,))).on(mesh, mesh.surface, coefficients_of(of)) for each in (light, beam)
-    )
-    incident = float(mesh.boundary_node_areas @ of_sky.irradiance)
-    assert incident == pytest.approx(of_beam.incident, rel=1e-9)
+    of_sky, of_beam = deposit_on_mesh(light, mesh, of), deposit_on_mesh(beam, mesh, of)
+    incident = float(mesh.boundary_node_areas @ of_sky.terms.irradiance)
+    assert incident == pytest.approx(of_beam.ledger.incident, rel=1e-9)
     facing = mesh.surface.normals @ towards
     # Where the L is hidden from its own upright part it is dark.
     assert incident < 0.95 * across * float(mesh.boundary_areas @ np.maximum(facing, 0.0))
     lit = facing > 0
     lost = float(reflectance(facing[lit], 1.0 / 1.4).min())
-    passed = float(mesh.boundary_node_areas @ of_sky.transmitted_irradiance)
+    passed = float(mesh.boundary_node_areas @ of_sky.terms.transmitted_irradiance)
     assert passed < (1.0 - lost) * incident * (1.0 + 1e-12)
 
 

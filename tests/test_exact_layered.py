@@ -6,6 +6,7 @@ import pytest
 from tests.conftest import TISSUE
 from tetlux.fem import Medium
 from tetlux.fem.exact import layered, slab
+from tetlux.fem.exact.checks import Face
 from tetlux.meshing import InputError
 
 UPPER = Medium(sigma_a=0.05, sigma_s_prime=2.0, eta=1.4)
@@ -15,7 +16,7 @@ RHO = np.array([0.0, 0.5, 3.0, 20.0])
 
 @pytest.mark.parametrize("face", ["front", "back"])
 @pytest.mark.parametrize("cut", [0.3, 2.0, 9.0])
-def test_equal_layers_are_a_slab(face: slab.Face, cut: float) -> None:
+def test_equal_layers_are_a_slab(face: Face, cut: float) -> None:
     for medium in (TISSUE, Medium(sigma_a=0.0, sigma_s_prime=1.0, eta=1.0)):
         found = layered.point_exitance([medium, medium], [cut, 10.0 - cut], depth=2.0, rho=RHO, face=face)
         truth = slab.point_exitance(medium, thickness=10.0, depth=2.0, rho=RHO, face=face)
@@ -56,4 +57,4 @@ def test_plates_that_cannot_be() -> None:
     with pytest.raises(InputError, match="different refractive indices"):
         layered.point_total([UPPER, Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.3)], [1.0, 1.0], depth=0.5)
     with pytest.raises(InputError, match=r'face is "side"'):
-        layered.point_total([UPPER], [1.0], depth=0.5, face="side")
+        layered.point_total([UPPER], [1.0], depth=0.5, face="side")  # type: ignore[arg-type]

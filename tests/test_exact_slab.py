@@ -4,8 +4,8 @@ from scipy import integrate
 
 from tetlux.fem import Medium
 from tetlux.fem.exact import dipole, half_space, slab, slab_plane
+from tetlux.fem.exact.checks import Face
 from tetlux.fem.exact.numerics.layer import Layer
-from tetlux.fem.exact.slab import Face
 from tetlux.meshing.errors import InputError
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)

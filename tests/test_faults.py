@@ -21,12 +21,12 @@ from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
 from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import ALL_FILES
-from tetlux.cases.write.publish import claimed
+from tetlux.cases.write.publish import claim_folder
 from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import child as child_mesher
-from tetlux.meshing.mesher.cache import remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.cache import load_cached_mesh, store_cached_mesh
 
 CASE = """\
 name: ball
@@ -136,7 +136,7 @@ def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
 KILLER = """\
 import os, pathlib, signal, sys
 from pathlib import Path
-from tetlux.cases.write.publish import claimed, publish
+from tetlux.cases.write.publish import claim_folder, publish
 
 names, out, n = sys.argv[3:], Path(sys.argv[1]), 0
 while True:
@@ -158,7 +158,7 @@ while True:
                     os.kill(os.getpid(), signal.SIGKILL)
                 return function(*arguments, **options)
             return call
-        with claimed(out, "ball") as folder:
+        with claim_folder(out, "ball") as folder:
             for name in names[:-2] + names[-1:]:
                 (folder / name).write_text("new")
             for name in ("unlink", "mkdir", "rename", "replace", "rmdir"):
@@ -167,7 +167,7 @@ while True:
         os._exit(0)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     print(n, code, {path.name: path.read_text() for path in target.iterdir()}, flush=True)
-    with claimed(out, "ball"):
+    with claim_folder(out, "ball"):
         pass
     if code == 0:
         break
@@ -201,7 +201,7 @@ def test_killed_between_any_two_changes(notes: str, tmp_path: Path) -> None:
 
 def test_the_second_of_two_runs_is_refused(case: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    with claimed(out, "ball") as folder:
+    with claim_folder(out, "ball") as folder:
         (folder / "surface.ply").write_text("half")
         assert main(["run", str(case), "--out", str(out)]) == 1
         printed = capsys.readouterr()
@@ -216,13 +216,13 @@ def test_the_second_of_two_runs_is_refused(case: Path, tmp_path: Path, capsys: p
 RACER = """\
 import os, sys, time
 from pathlib import Path
-from tetlux.cases.write.publish import claimed, publish
+from tetlux.cases.write.publish import claim_folder, publish
 from tetlux.meshing import RunError
 
 out, me, done = Path(sys.argv[1]), sys.argv[2], 0
 while done < 40:
     try:
-        with claimed(out, "ball") as folder:
+        with claim_folder(out, "ball") as folder:
             (folder.parent / "alone").mkdir()
             for name in ("a", "b", "c"):
                 (folder / name).write_text(me)
@@ -259,7 +259,7 @@ def test_the_lock_is_on_the_folder_that_is_there(tmp_path: Path, monkeypatch: py
         usual(descriptor, operation)
 
     monkeypatch.setattr(fcntl, "flock", meanwhile)
-    with claimed(tmp_path, "ball"), pytest.raises(RunError, match="another run"), claimed(tmp_path, "ball"):
+    with claim_folder(tmp_path, "ball"), pytest.raises(RunError, match="another run"), claim_folder(tmp_path, "ball"):
         pass
     assert len(calls) == 4
     assert list(tmp_path.iterdir()) == []
@@ -479,11 +479,11 @@ WRITER = """\
 import sys
 from pathlib import Path
 from tests.conftest import block
-from tetlux.meshing.mesher.cache import remember_mesh
+from tetlux.meshing.mesher.cache import store_cached_mesh
 
 while True:
     for number in (1, 2):
-        remember_mesh(str(number), Path(sys.argv[1]), block((20, 20, number), (1.0, 1.0, 1.0)))
+        store_cached_mesh(str(number), Path(sys.argv[1]), block((20, 20, number), (1.0, 1.0, 1.0)))
         print(number, flush=True)
 """
 
@@ -500,13 +500,13 @@ def test_a_cache_whose_writers_are_killed(tmp_path: Path) -> None:
                 time.sleep(0.007 * moment)
                 writer.kill()
             for key, size in sizes.items():
-                mesh = remembered_mesh(key, tmp_path, "mm")
+                mesh = load_cached_mesh(key, tmp_path, "mm")
                 assert mesh is None or len(mesh.tetrahedra) == size
         other.kill()
     for path in tmp_path.glob("*.part"):
         os.utime(path, (time.time() - 90_000,) * 2)
     for key in sizes:
-        remember_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
+        store_cached_mesh(key, tmp_path, block((1, 1, 1), (1.0, 1.0, 1.0)))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["1.npz", "2.npz"]
 
 

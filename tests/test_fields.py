@@ -131,7 +131,7 @@ def test_images_that_cannot_be(tmp_path: Path) -> None:
         read(tmp_path / "none")
     stack(tmp_path)
     Image.fromarray(SLICE[:2]).save(tmp_path / "s3.png")
-    message = r"s3.png has 4 x 2 pixels, mode L, and .*s1.png has 4 x 3 pixels, mode L; slices must be alike"
+    message = r"s3.png has 4 x 2 pixels, mode L, and .*s1.png has 4 x 3 pixels, mode L; give slices of one size"
     with pytest.raises(InputError, match=message):
         read(tmp_path)
     Image.fromarray(SLICE.astype(np.uint16)).save(tmp_path / "s3.png")

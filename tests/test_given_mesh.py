@@ -8,8 +8,8 @@ import pytest
 from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PointSource, solve
 from tetlux.meshing import InputError, TetMesh, mesh_from_arrays, refine
-from tetlux.meshing.files.meshes import oriented
 from tetlux.meshing.tets import conformity
+from tetlux.meshing.tets.given import mesh_with_nodes
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
 LIGHT = [PointSource((10.0, 10.0, 12.0))]
@@ -36,7 +36,7 @@ def test_doubled_nodes_are_joined() -> None:
         assert mesh.area == pytest.approx(2400.0)
         assert mesh.region_volumes == pytest.approx({1: 4000.0, 2: 4000.0})
         assert mesh.repairs == ("25 nodes that lie where another one does were joined with it.",)
-    mesh, nodes = oriented(*DOUBLED)
+    mesh, nodes = mesh_with_nodes(*DOUBLED)
     assert (DOUBLED[0][nodes] == mesh.points).all()
     solution = solve(mesh, TISSUE, LIGHT, tolerance=0.6)
     # What the same tetrahedra give that had these nodes in common from the beginning.
@@ -82,7 +82,7 @@ def test_a_small_crack_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     # The cube's 150 mm² and those around it.
     with pytest.raises(InputError, match="300 mm² of the boundary face each other inside"):
         solve(slit, TISSUE, [PointSource((4.0, 4.0, 4.0))])
-    monkeypatch.setattr(conformity, "MOST_INSIDE", 0.2)
+    monkeypatch.setattr(conformity, "MOST_COVERED", 0.2)
     slit = replace(slit)
     assert (
         "300 mm² of the mesh's boundary face each other inside it; no light passes there."

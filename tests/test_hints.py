@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.file.case import load_cases
-from tetlux.cases.nearest import ALIASES, REMEDIES, did_you_mean, nearest
+from tetlux.cases.file.load import load_cases
+from tetlux.cases.hints import did_you_mean, nearest_word
+from tetlux.cases.synonyms import ALIASES, REMEDIES
 from tetlux.meshing import InputError
 
 CASE = """\
@@ -39,7 +40,7 @@ def refusal(text: str, folder: Path) -> str:
     ],
 )  # fmt: skip
 def test_the_names_that_others_give_to_coefficients_are_known(word: str, key: str | None) -> None:
-    assert nearest(word, MEDIUM) == key
+    assert nearest_word(word, MEDIUM) == key
 
 
 def test_what_is_no_coefficient_here_is_told_by_those_that_are() -> None:
@@ -53,7 +54,7 @@ def test_every_alias_can_be_met() -> None:
     """One in capitals, say, would never be looked up."""
     for alias, keys in ALIASES.items():
         for key in keys:
-            assert nearest(alias, ["first", key, "last"]) == key, alias
+            assert nearest_word(alias, ["first", key, "last"]) == key, alias
     for alias, (key, sentence) in REMEDIES.items():
         assert did_you_mean(alias, [key]) == sentence
 

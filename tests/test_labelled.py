@@ -146,7 +146,7 @@ def test_labels_and_media_that_do_not_go_together(media: Any, words: str) -> Non
 
 
 def test_media_by_label_need_a_mesh_and_no_regions() -> None:
-    with pytest.raises(InputError, match="media by label go with a mesh of labelled tetrahedra"):
+    with pytest.raises(InputError, match="media by label need a mesh with labelled tetrahedra"):
         solve(box((20.0, 20.0, 20.0)), {0: TISSUE}, LIGHT)
     core = Region(box((2.0, 2.0, 2.0), center=(10.0, 10.0, 10.0)), FLUID)
     with pytest.raises(InputError, match="leave them out where media are by label"):

@@ -6,33 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.conftest import block
+from tests.lights_made import lights_of_every_kind
 from tests.test_paths import TROUGH
-from tetlux.fem import (
-    CollimatedBeam,
-    DiffuseLight,
-    DiffusePatch,
-    Disc,
-    Emission,
-    EnvironmentLight,
-    Gaussian,
-    Image,
-    Light,
-    Medium,
-    PencilBeam,
-    Rectangle,
-    Solution,
-    System,
-)
-from tetlux.fem.lights.spots import Spot
+from tetlux.fem import Light, Medium, Solution, System
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import Vector
 
 MESHES = {"cube": block((4, 4, 4), (4.0, 4.0, 4.0)), "trough": TROUGH}
-PIXELS = np.random.default_rng(4).random((5, 7))
-SPOTS = ("disc", "gaussian", "rectangle", "image")
-KINDS = ("whole", *SPOTS, "round pencil", "pencil", "diffuse", "patch", "environment", "glow")
+# A place inside each, clear of facets.
+INSIDE = {"cube": (0.1, 0.13, -1.6), "trough": (3.1, 0.13, -1.6)}
+KINDS = tuple(lights_of_every_kind(INSIDE["cube"], (0.0, 0.0, -1.0)))
 
 # The same examples on every machine.
 few = settings(max_examples=20, deadline=None, derandomize=True, database=None)
@@ -40,35 +25,10 @@ numbers = st.floats(-1.0, 1.0)
 directions = st.tuples(numbers, numbers, numbers).filter(lambda v: np.linalg.norm(v) > 0.1)
 
 
-# A place inside each, clear of facets.
-WITHIN = {"cube": (0.1, 0.13, -1.6), "trough": (3.1, 0.13, -1.6)}
-
-
 def light(kind: str, direction: Vector, brightness: float, scale: float, name: str = "trough") -> Light:
     """A light that meets a body whatever its direction; lengths times `scale`, and W/unit² over its square."""
-    unit = np.array(direction) / np.linalg.norm(direction)
-    x, y, z = (scale * float(value) for value in np.array(WITHIN[name]) - 12.0 * unit)
-    # Two across, up along an axis that the beam is not along.
-    up = tuple(float(value) for value in np.eye(3)[np.argmin(np.abs(unit))])
-    spots: dict[str, Spot] = {
-        "disc": Disc((x, y, z), 0.7 * scale),
-        "gaussian": Gaussian((x, y, z), 0.5 * scale),
-        "rectangle": Rectangle((x, y, z), 1.1 * scale, 0.6 * scale, up=(up[0], up[1], up[2])),
-        "image": Image((x, y, z), 1.4 * scale, PIXELS, up=(up[0], up[1], up[2])),
-    }
-    irradiance = brightness / scale**2
-    if kind == "whole" or kind in spots:
-        return CollimatedBeam(direction, irradiance, spots.get(kind))
-    place = (scale * WITHIN[name][0], scale * WITHIN[name][1], scale * WITHIN[name][2])
-    others: dict[str, Light] = {
-        "round pencil": PencilBeam((x, y, z), direction, power=brightness, radius=0.4 * scale, deposit="line"),
-        "pencil": PencilBeam((x, y, z), direction, power=brightness, deposit="line"),
-        "diffuse": DiffuseLight(irradiance),
-        "patch": DiffusePatch(place, 2.5 * scale, irradiance),
-        "environment": EnvironmentLight(irradiance * PIXELS, up=direction, front=(up[0], up[1], up[2])),
-        "glow": Emission(brightness / scale**3),
-    }
-    return others[kind]
+    x, y, z = (scale * value for value in INSIDE[name])
+    return lights_of_every_kind((x, y, z), direction, brightness=brightness, scale=scale)[kind]
 
 
 def medium(sigma_a: float, sigma_s: float, g: float, eta: float, scale: float, *, varying: bool) -> AnyMedium:
@@ -96,7 +56,7 @@ def test_all_power_is_accounted_for(
     assert abs(power.balance_error) < 1e-9
     assert min(power.specular, power.ballistic) >= 0.0
     assert power.specular + power.ballistic <= power.incident * (1.0 + 1e-12)
-    if kind.endswith("pencil"):
+    if kind.endswith(("pencil", "line")):
         # A spot's power is right to .2 %, and part of it may miss.
         assert power.incident <= 1.0 + 5e-3
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE
-from tetlux.fem import Deposit, Medium, PencilBeam, solve
+from tetlux.fem import Deposit, Medium, PencilBeam, Segments, SourceTerms, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
@@ -24,15 +24,14 @@ DOWN = np.array([0.0, 0.0, 1.0])
 
 
 def segment(length: float, direction: FloatArray = DOWN, flux: float = 1.0) -> Deposit:
-    return Deposit(
-        starts=np.zeros((1, 3)), directions=direction[None], lengths=np.array([length]), fluxes=np.array([flux])
-    )
+    segments = Segments(np.zeros((1, 3)), direction[None], np.array([length]), np.array([flux]))
+    return Deposit(terms=SourceTerms(segments=segments))
 
 
 def scattered(deposit: Deposit, medium: Medium) -> float:
     scattering, _ = medium.delta_eddington
-    extinction = medium.sigma_a + scattering
-    return float((deposit.fluxes * scattering / extinction * -np.expm1(-extinction * deposit.lengths)).sum())
+    extinction, segments = medium.sigma_a + scattering, deposit.terms.segments
+    return float((segments.fluxes * scattering / extinction * -np.expm1(-extinction * segments.lengths)).sum())
 
 
 def fine_line(medium: Medium, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -64,15 +63,15 @@ def test_powers_sum_to_what_the_beam_leaves(medium: Medium, length: float) -> No
     bright, faint = beam_as_charges(deposit, medium)
     beam = beam_source(medium, "delta-eddington")
     total = scattered(deposit, medium)
-    assert bright.powers.sum() + scattered(faint, medium) == pytest.approx(total, rel=1e-13)
-    assert len(bright.starts) == len(faint.points) == 0
-    assert (bright.points[:, 2] > 0).all()
-    assert (bright.points[:, 2] < length).all()
+    assert bright.terms.powers.sum() + scattered(faint, medium) == pytest.approx(total, rel=1e-13)
+    assert len(bright.terms.segments) == len(faint.terms.points) == 0
+    assert (bright.terms.points[:, 2] > 0).all()
+    assert (bright.terms.points[:, 2] < length).all()
     # Only what is bright: as far as where the rest begins, of which the forward part starts there.
-    reach = float(faint.starts[0, 2]) if len(faint.starts) else length
+    reach = float(faint.terms.segments.starts[0, 2]) if len(faint.terms.segments) else length
     s, left = beam.extinction, math.exp(-beam.extinction * reach)
     moment = 0.7 * (beam.isotropic * (1.0 - (1.0 + s * reach) * left) / s**2 + beam.forward * (1.0 - left) / s)
-    assert bright.powers @ bright.points[:, 2] == pytest.approx(moment, rel=3e-4)
+    assert bright.terms.powers @ bright.terms.points[:, 2] == pytest.approx(moment, rel=3e-4)
 
 
 @pytest.mark.parametrize("medium", [TISSUE, FORWARD, MATCHED, BACKWARD])
@@ -80,7 +79,7 @@ def test_exitance_is_the_lines_a_mean_free_path_from_the_entry(medium: Medium, m
     monkeypatch.setattr(lines, "FADED", 1e-5)
     bright, _ = beam_as_charges(segment(200.0), medium)
     rho = np.array([0.5, 1.0, 1.5, 2.0, 4.0, 8.0]) * medium.mean_free_path
-    found = half_space_exitance(medium, bright.points, bright.powers, rho, 0.0 * rho)
+    found = half_space_exitance(medium, bright.terms.points, bright.terms.powers, rho, 0.0 * rho)
     truth = half_space.pencil_exitance(medium, rho=rho)
     # Measured: 4.4e-4 at most, and 4e-3 at half a mean free path; 1.8e-3 with charges at the end 1.5 times as deep.
     assert found[1:] == pytest.approx(truth[1:], rel=6e-4)
@@ -95,7 +94,7 @@ def test_exitance_of_a_slanting_line(medium: Medium, angle: float, monkeypatch: 
     around = np.linspace(0.0, 2.0 * np.pi, 9)
     for rho in (1.0, 2.0, 4.0):
         x, y = rho * medium.mean_free_path * np.cos(around), rho * medium.mean_free_path * np.sin(around)
-        found = half_space_exitance(medium, bright.points, bright.powers, x, y)
+        found = half_space_exitance(medium, bright.terms.points, bright.terms.powers, x, y)
         truth = half_space_exitance(medium, *fine_line(medium, direction), x, y)
         # Measured: 8e-4, at 60 degrees; 5e-3 with three charges at the end that lack two moments only.
         assert found == pytest.approx(truth, rel=1.2e-3)
@@ -112,7 +111,9 @@ def test_fluence_beside_the_line_is_the_lines(monkeypatch: pytest.MonkeyPatch) -
             return np.asarray(powers @ np.array(parts))
 
         # Measured: 0.9 % and 4e-4.
-        assert fluence(bright.points, bright.powers) == pytest.approx(fluence(*fine_line(FORWARD, DOWN)), rel=most)
+        assert fluence(bright.terms.points, bright.terms.powers) == pytest.approx(
+            fluence(*fine_line(FORWARD, DOWN)), rel=most
+        )
 
 
 def sphere_error(solution_exitance: FloatArray, truth: FloatArray, weights: FloatArray) -> float:
@@ -183,15 +184,15 @@ def test_only_beams_without_width_are_points(ball: Surface) -> None:
         sources_of([wide], Body(ball, (FORWARD,)), "half-space"),
     )
     assert len(one.charges) == 1
-    assert len(one.deposits[0].starts) == 0
-    assert one.deposits[0].resolution == FORWARD.mean_free_path
+    assert len(one.deposits[0].terms.segments.starts) == 0
+    assert one.deposits[0].hints.resolution == FORWARD.mean_free_path
     assert len(other.charges) == 0
     # Without images its rays' points could be afforded.
     assert len(sources_of([wide], Body(ball, (FORWARD,)), "free-space").charges) == 0
-    assert other.on_mesh[0].on_mesh is not None
+    assert other.remaining[0].on_mesh is not None
     plain = sources_of([thin], Body(ball, (FORWARD,)), "nothing")
     assert len(plain.charges) == 0
-    assert plain.on_mesh[0] is plain.deposits[0]
+    assert plain.remaining[0] is plain.deposits[0]
 
 
 def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
@@ -203,5 +204,5 @@ def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
     assert 5 < len(sources.charges) < 20
     assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
     put = sum(float(c.strengths[: c.sources].sum()) for c in sources.charges)
-    put += sum(scattered(d, FORWARD) for d in sources.on_mesh)
+    put += sum(scattered(d, FORWARD) for d in sources.remaining)
     assert put == pytest.approx(sum(scattered(b.deposit_in(Body(ball, (FORWARD,))), FORWARD) for b in beams), rel=1e-12)

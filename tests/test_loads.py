@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.fem import Deposit, Medium, PencilBeam
+from tetlux.fem import Medium, PencilBeam, Segments, SourceTerms
 from tetlux.fem.body.body import Body
-from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.operators.loads import load_vector
 from tetlux.meshing import Surface, TetMesh
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -20,28 +20,32 @@ FORWARD = Medium(sigma_a=0.05, sigma_s=3.0, g=0.8, eta=1.4)
 CLOSE = 1e-7
 
 
-def beams(starts: object, ends: object) -> Deposit:
+def beams(starts: object, ends: object) -> Segments:
     """Segments from starts to ends, 1 W in each."""
     origin, target = np.atleast_2d(np.asarray(starts, dtype=float)), np.atleast_2d(np.asarray(ends, dtype=float))
     lengths = np.linalg.norm(target - origin, axis=1)
     directions = (target - origin) / lengths[:, None]
-    return Deposit(incident=1.0, starts=origin, directions=directions, lengths=lengths, fluxes=np.ones(len(origin)))
+    return Segments(origin, directions, lengths, np.ones(len(origin)))
 
 
-def scattered(deposit: Deposit, medium: Medium) -> float:
+def segment_load(mesh: TetMesh, coefficients: Coefficients, segments: Segments) -> FloatArray:
+    return load_vector(mesh, coefficients, SourceTerms(segments=segments))
+
+
+def scattered(segments: Segments, medium: Medium) -> float:
     scattering, _ = medium.delta_eddington
     extinction = medium.sigma_a + scattering
-    return float((deposit.fluxes * scattering / extinction * -np.expm1(-extinction * deposit.lengths)).sum())
+    return float((segments.fluxes * scattering / extinction * -np.expm1(-extinction * segments.lengths)).sum())
 
 
-def careful_load(mesh: TetMesh, medium: Medium, deposit: Deposit) -> FloatArray:
+def careful_load(mesh: TetMesh, medium: Medium, segments: Segments) -> FloatArray:
     """The same loads: every tetrahedron cuts every path, the deepest has a stretch, quadrature integrates over it."""
     scattering, cosine = medium.delta_eddington
     every = np.arange(len(mesh.tetrahedra))
     nodes, weights = np.polynomial.legendre.leggauss(16)
     load = np.zeros(len(mesh.points))
     for start, direction, length, flux in zip(
-        deposit.starts, deposit.directions, deposit.lengths, deposit.fluxes, strict=True
+        segments.starts, segments.directions, segments.lengths, segments.fluxes, strict=True
     ):
         base = mesh.barycentric(np.tile(start, (len(every), 1)), every)
         slope = (mesh.barycentric(np.tile(start + length * direction, (len(every), 1)), every) - base) / length
@@ -98,25 +102,25 @@ def test_awkward_paths_are_cut_as_one_by_one(name: str, seed: int | None) -> Non
     mesh, turn = (block((4, 4, 4), (4.0, 4.0, 4.0)), np.eye(3))
     if seed is not None:
         mesh, turn = turned(mesh, seed)
-    deposit = beams(*(turn @ np.array(end, dtype=float) for end in AWKWARD[name]))
-    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
-    assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
+    segments = beams(*(turn @ np.array(end, dtype=float) for end in AWKWARD[name]))
+    load = segment_load(mesh, coefficients_of(FORWARD), segments)
+    assert load.sum() == pytest.approx(scattered(segments, FORWARD), rel=1e-12)
+    assert load == pytest.approx(careful_load(mesh, FORWARD, segments), abs=CLOSE)
 
 
 def test_many_paths_at_once_are_cut_as_one_by_one() -> None:
     mesh, turn = turned(block((4, 4, 4), (4.0, 4.0, 4.0)), 3)
     ends = np.array(list(AWKWARD.values()), dtype=float)
     random = np.random.default_rng(4).uniform(-2, 2, size=(40, 2, 3)) - [0, 0, 2]
-    deposit = beams(*(np.vstack([ends, random])[:, i] @ turn.T for i in (0, 1)))
-    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
-    assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
+    segments = beams(*(np.vstack([ends, random])[:, i] @ turn.T for i in (0, 1)))
+    load = segment_load(mesh, coefficients_of(FORWARD), segments)
+    assert load.sum() == pytest.approx(scattered(segments, FORWARD), rel=1e-12)
+    assert load == pytest.approx(careful_load(mesh, FORWARD, segments), abs=CLOSE)
     # Two half as strong in the place of each.
-    ends = deposit.starts + deposit.lengths[:, None] * deposit.directions
-    twice = beams(np.repeat(deposit.starts, 2, axis=0), np.repeat(ends, 2, axis=0))
+    ends = segments.starts + segments.lengths[:, None] * segments.directions
+    twice = beams(np.repeat(segments.starts, 2, axis=0), np.repeat(ends, 2, axis=0))
     twice = replace(twice, fluxes=0.5 * twice.fluxes)
-    assert load_vector(mesh, coefficients_of(FORWARD), twice) == pytest.approx(load, abs=1e-12)
+    assert segment_load(mesh, coefficients_of(FORWARD), twice) == pytest.approx(load, abs=1e-12)
 
 
 def test_paths_on_a_graded_mesh_are_cut_as_one_by_one() -> None:
@@ -128,11 +132,11 @@ def test_paths_on_a_graded_mesh_are_cut_as_one_by_one() -> None:
     ends = np.column_stack([random.uniform(-1, 1, size=(30, 2)), np.full(30, -1.0)])
     ends[:10, :2] = starts[:10, :2]
     starts[25:], ends[25:] = mesh.points[random.choice(len(mesh.points), 5)], mesh.points[:5]
-    deposit = beams(starts, ends)
-    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
-    assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
-    for part in mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths):
+    segments = beams(starts, ends)
+    load = segment_load(mesh, coefficients_of(FORWARD), segments)
+    assert load.sum() == pytest.approx(scattered(segments, FORWARD), rel=1e-12)
+    assert load == pytest.approx(careful_load(mesh, FORWARD, segments), abs=CLOSE)
+    for part in mesh.tree.cut(segments.starts, segments.directions, segments.lengths):
         assert part.weights[part.cells >= 0].sum(axis=1) == pytest.approx(1.0, abs=1e-14)
 
 
@@ -142,8 +146,8 @@ def test_nothing_falls_between_tetrahedra() -> None:
     random = np.random.default_rng(11)
     faces = mesh.tetrahedra[random.integers(len(mesh.tetrahedra), size=500), :3]
     starts, ends = (np.einsum("ij,ijk->ik", random.dirichlet(np.ones(3), 500), mesh.points[faces]) for _ in range(2))
-    deposit = beams(starts, ends)
-    parts = list(mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths))
+    segments = beams(starts, ends)
+    parts = list(mesh.tree.cut(segments.starts, segments.directions, segments.lengths))
     assert all((part.cells >= 0).all() for part in parts)
 
 
@@ -151,13 +155,13 @@ def test_what_falls_between_the_thinnest_tetrahedra_is_found_there() -> None:
     """Tetrahedra of quality 1e-5 are known to a few digits only; the middles of gaps are in them all the same."""
     mesh, _ = turned(pressed(block((6, 6, 6), (2.0, 2.0, 2.0)), 7.0), 1)
     starts, ends = np.random.default_rng(12).choice(mesh.points, size=(2, 1000))
-    deposit = beams(starts, ends + 1e-12)
+    segments = beams(starts, ends + 1e-12)
     tree = mesh.tree
     middles = [np.zeros((0, 3))]
-    for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths):
+    for part in tree.cut(segments.starts, segments.directions, segments.lengths):
         outside = part.cells < 0
         along = 0.5 * (part.enter + part.leave)[outside]
-        middles.append(deposit.starts[part.paths[outside]] + along[:, None] * deposit.directions[part.paths[outside]])
+        middles.append(segments.starts[part.paths[outside]] + along[:, None] * segments.directions[part.paths[outside]])
     lost = np.vstack(middles)
     inside = np.linalg.norm(mesh.closest_boundary(lost)[0] - lost, axis=1) > 1e-9
     # 69.
@@ -172,8 +176,8 @@ def test_what_runs_outside_goes_to_the_nearest_nodes() -> None:
     gap = (np.abs(middle - np.array([0.0, 0.0, -2.0])) < 1.0).all(axis=1)
     mesh = TetMesh(whole.points, whole.tetrahedra[~gap])
     x, y = np.array([0.3, -0.6, 0.2, 7.0]), np.array([0.5, 0.2, -1.6, 7.0])
-    deposit = beams(np.column_stack([x, y, np.full(4, 0.001)]), np.column_stack([x, y, np.full(4, -4.002)]))
-    (part,) = mesh.tree.cut(deposit.starts, deposit.directions, deposit.lengths)
+    segments = beams(np.column_stack([x, y, np.full(4, 0.001)]), np.column_stack([x, y, np.full(4, -4.002)]))
+    (part,) = mesh.tree.cut(segments.starts, segments.directions, segments.lengths)
     outside = part.cells < 0
     order = np.lexsort((part.enter[outside], part.paths[outside]))
     assert part.paths[outside][order].tolist() == [0, 0, 0, 1, 1, 1, 2, 2, 3]
@@ -181,26 +185,23 @@ def test_what_runs_outside_goes_to_the_nearest_nodes() -> None:
     assert part.leave[outside][order] == pytest.approx(
         [0.001, 3.001, 4.003, 0.001, 3.001, 4.003, 0.001, 4.003, 4.003], abs=1e-8
     )
-    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
-    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
-    assert load == pytest.approx(careful_load(mesh, FORWARD, deposit), abs=CLOSE)
+    load = segment_load(mesh, coefficients_of(FORWARD), segments)
+    assert load.sum() == pytest.approx(scattered(segments, FORWARD), rel=1e-12)
+    assert load == pytest.approx(careful_load(mesh, FORWARD, segments), abs=CLOSE)
 
 
 def test_a_wide_beam_in_a_ball_is_cut_as_one_by_one(ball: Surface, ball_mesh: TetMesh) -> None:
     """It enters and leaves through the true surface, outside the mesh's facets."""
     beam = PencilBeam((0.5, -0.3, 20.0), (0.1, 0.2, -1.0), radius=4.0, deposit="line")
-    deposit = beam.deposit_in(Body(ball, (FORWARD,)))
-    load = load_vector(ball_mesh, coefficients_of(FORWARD), deposit)
-    assert load.sum() == pytest.approx(scattered(deposit, FORWARD), rel=1e-12)
-    some = slice(None, None, 20)
-    few = replace(
-        deposit,
-        starts=deposit.starts[some],
-        directions=deposit.directions[some],
-        lengths=deposit.lengths[some],
-        fluxes=deposit.fluxes[some] / deposit.fluxes[some].sum(),
-    )
-    assert load_vector(ball_mesh, coefficients_of(FORWARD), few) == pytest.approx(
+    deposit = beam.deposit_in(Body(ball, (FORWARD,))).evaluate_on(ball_mesh, ball, coefficients_of(FORWARD))
+    segments = deposit.terms.segments
+    assert len(segments) > 20
+    load = segment_load(ball_mesh, coefficients_of(FORWARD), segments)
+    assert load.sum() == pytest.approx(scattered(segments, FORWARD), rel=1e-12)
+    some = np.arange(0, len(segments), 20)
+    fluxes = np.full(len(some), 1.0 / len(some))
+    few = Segments(segments.starts[some], segments.directions[some], segments.lengths[some], fluxes)
+    assert segment_load(ball_mesh, coefficients_of(FORWARD), few) == pytest.approx(
         careful_load(ball_mesh, FORWARD, few), abs=CLOSE
     )
 
@@ -210,17 +211,17 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     mesh = block((5, 5, 5), (5.0, 5.0, 5.0))
     random = np.random.default_rng(6)
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
-    deposit = beams(starts, ends)
-    load = load_vector(mesh, coefficients_of(FORWARD), deposit)
+    segments = beams(starts, ends)
+    load = segment_load(mesh, coefficients_of(FORWARD), segments)
     monkeypatch.setattr(cell_tree, "PORTION", portion)
-    assert load_vector(mesh, coefficients_of(FORWARD), deposit) == pytest.approx(load, abs=1e-14)
+    assert segment_load(mesh, coefficients_of(FORWARD), segments) == pytest.approx(load, abs=1e-14)
     tree = mesh.tree
-    parts = list(tree.cut(deposit.starts, deposit.directions, deposit.lengths))
+    parts = list(tree.cut(segments.starts, segments.directions, segments.lengths))
     assert len(parts) > {1: 60, 50: 20, 1000: 2}[portion]
     covered = np.zeros(len(starts))
     for part in parts:
         np.add.at(covered, part.paths, part.leave - part.enter)
-    assert covered == pytest.approx(deposit.lengths, rel=1e-12)
+    assert covered == pytest.approx(segments.lengths, rel=1e-12)
 
 
 class Counting:
@@ -244,18 +245,18 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
     random = np.random.default_rng(7)
     for mesh, size in ((ball_mesh, 5.0), (graded, 1.0)):
         starts = np.column_stack([random.uniform(-0.5, 0.5, size=(200, 2)) * size, np.zeros(200)])
-        deposit = beams(starts, starts * 0.5 - np.array([0.0, 0.0, size]))
+        segments = beams(starts, starts * 0.5 - np.array([0.0, 0.0, size]))
         tree = mesh.tree
         levels = [Counting(level) for level in tree._levels]
         tree._levels = levels  # type: ignore[assignment]
-        passed = sum(len(part.cells) for part in tree.cut(deposit.starts, deposit.directions, deposit.lengths))
+        passed = sum(len(part.cells) for part in tree.cut(segments.starts, segments.directions, segments.lengths))
         opened = sum(level.opened for level in levels)
         # 6.1 in the ball, 1.0 in the block.
         assert opened < 8.0 * passed
-        tested = [len(cells) for *_, cells in tree._near(deposit.starts, deposit.directions, deposit.lengths)]
+        tested = [len(cells) for *_, cells in tree._near(segments.starts, segments.directions, segments.lengths)]
         # 2.7 and 2.1.
         assert sum(tested) < 4.0 * passed
-        assert max(tested) <= cell_tree.PORTION
+        assert max(tested) <= cell_tree.PAIRS_AT_ONCE
 
 
 def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:
@@ -265,9 +266,9 @@ def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     grid = np.unique(mesh.points[:, 0])
     starts = np.array([[x, low[1], high[2]] for x in grid])
-    deposit = beams(starts, starts + np.array([0.0, 0.0, low[2] - high[2]]))
+    segments = beams(starts, starts + np.array([0.0, 0.0, low[2] - high[2]]))
     tree = mesh.tree
-    (part,) = tree.cut(deposit.starts, deposit.directions, deposit.lengths)
+    (part,) = tree.cut(segments.starts, segments.directions, segments.lengths)
     assert (part.cells >= 0).all()
     assert (tree.locate(mesh.points)[0] >= 0).all()
 
@@ -301,7 +302,7 @@ def test_points_outside_go_to_the_nearest_nodes(ball_mesh: TetMesh) -> None:
     face = ball_mesh.boundary_faces[5]
     middle = ball_mesh.points[face].mean(axis=0)
     points = np.vstack([middle * (10.0 / np.linalg.norm(middle)), 0.5 * middle])
-    load = load_vector(ball_mesh, coefficients_of(FORWARD), Deposit(points=points, powers=np.array([2.0, 3.0])))
+    load = load_vector(ball_mesh, coefficients_of(FORWARD), SourceTerms(points=points, powers=np.array([2.0, 3.0])))
     assert load.sum() == pytest.approx(5.0, rel=1e-12)
     assert load[face].sum() == pytest.approx(2.0, rel=1e-12)
 
@@ -309,8 +310,9 @@ def test_points_outside_go_to_the_nearest_nodes(ball_mesh: TetMesh) -> None:
 def test_points_and_lines_add_up() -> None:
     mesh = block((2, 2, 2), (2.0, 2.0, 2.0))
     line = beams([0.1, 0.2, 0.0], [0.3, -0.4, -2.0])
-    points = Deposit(points=np.array([[0.5, 0.4, -0.3]]), powers=np.array([2.0]))
-    both = replace(line, points=points.points, powers=points.powers, transmitted_irradiance=3.0)
-    diffuse = Deposit(transmitted_irradiance=3.0)
-    apart = sum(load_vector(mesh, coefficients_of(FORWARD), deposit) for deposit in (line, points, diffuse))
+    points = SourceTerms(points=np.array([[0.5, 0.4, -0.3]]), powers=np.array([2.0]))
+    both = SourceTerms(points.points, points.powers, segments=line, transmitted_irradiance=3.0)
+    diffuse = SourceTerms(transmitted_irradiance=3.0)
+    parts = (SourceTerms(segments=line), points, diffuse)
+    apart = sum(load_vector(mesh, coefficients_of(FORWARD), part) for part in parts)
     assert load_vector(mesh, coefficients_of(FORWARD), both) == pytest.approx(apart, abs=1e-14)

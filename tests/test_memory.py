@@ -64,7 +64,7 @@ def test_control_groups_of_the_first_version(tmp_path: Path) -> None:
 
 def test_a_mesh_that_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     mesh, light = block((8, 8, 8), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))]
-    needed = memory.need(len(mesh.tetrahedra))
+    needed = memory.estimate_memory(len(mesh.tetrahedra))
     monkeypatch.setattr(memory, "available", lambda: 1.01 * needed)
     solve(mesh, TISSUE, light)
     monkeypatch.setattr(memory, "available", lambda: 0.9 * needed)
@@ -77,7 +77,7 @@ def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.M
     light = [PointSource((0.0, 0.0, 9.0))]
     free = solve(ball, TISSUE, light, tolerance=0.003)
     assert not any("memory" in warning for warning in free.warnings)
-    monkeypatch.setattr(memory, "available", lambda: memory.need(9_000, refined=True))
+    monkeypatch.setattr(memory, "available", lambda: memory.estimate_memory(9_000, refined=True))
     tight = solve(ball, TISSUE, light, tolerance=0.003)
     assert len(tight.mesh.tetrahedra) < 9_000 < len(free.mesh.tetrahedra)
     (warning,) = [warning for warning in tight.warnings if "memory" in warning]
@@ -88,7 +88,7 @@ def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't start new thread")])
-@pytest.mark.parametrize("stage", ["solve_each", "results_of", "write_mesh"])
+@pytest.mark.parametrize("stage", ["solve_each", "collect_results", "write_mesh"])
 def test_memory_that_runs_out_fails_its_case_only(
     error: Exception, stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -169,7 +169,7 @@ def test_the_need_is_what_is_measured(cells: int, lights: int, channels: int) ->
         check=True,
     )
     tetrahedra, peak = (int(word) for word in done.stdout.split())
-    assert 0.95 * peak <= memory.need(tetrahedra, channels, lights * channels) <= 1.5 * peak
+    assert 0.95 * peak <= memory.estimate_memory(tetrahedra, channels, lights * channels) <= 1.5 * peak
 
 
 MEASURE = """\

@@ -284,7 +284,7 @@ def test_holes_are_closed_by_the_case_file(tmp_path: Path, capsys: pytest.Captur
         assert message in capsys.readouterr().err
     case.write_text(text.replace("file: scan.obj", "sphere: {radius: 9}").replace("HOLES", "close"))
     assert main(["check", str(case)]) == 2
-    assert "holes belongs to a file" in capsys.readouterr().err
+    assert "holes applies to a surface file" in capsys.readouterr().err
 
 
 def crumb(size: float, *center: float) -> Arrays:

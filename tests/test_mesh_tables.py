@@ -6,7 +6,7 @@ import pytest
 from tests.test_assembly import random_mesh
 from tetlux.meshing import TetMesh, refine
 from tetlux.meshing.host import blocks
-from tetlux.meshing.host.blocks import group_keys, in_blocks, once
+from tetlux.meshing.host.blocks import find_single_keys, group_keys, run_in_blocks
 from tetlux.meshing.tets.topology import EDGES
 
 
@@ -14,7 +14,7 @@ from tetlux.meshing.tets.topology import EDGES
 @pytest.mark.parametrize("most", [3, 1000, 2**40, 2**64 - 1])
 def test_group_keys_is_unique_with_inverse(monkeypatch: pytest.MonkeyPatch, most: int, part: int) -> None:
     """Keys that leave no room for their places are sorted another way, and must come out the same."""
-    monkeypatch.setattr(blocks, "PART", part)
+    monkeypatch.setattr(blocks, "KEYS_AT_ONCE", part)
     keys = np.random.default_rng(0).integers(0, most, 900, dtype=np.uint64, endpoint=True)
     keys[::3] = keys[0]
     unique, inverse = group_keys(keys)
@@ -28,8 +28,8 @@ def test_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(blocks, "_HASH_BITS", 2)
     keys = np.random.default_rng(1).integers(0, 500, 900, dtype=np.uint64)
     unique, count = np.unique(keys, return_counts=True)
-    assert (once(keys) == np.flatnonzero(np.isin(keys, unique[count == 1]))).all()
-    assert len(once(np.zeros(4, dtype=np.uint64))) == 0
+    assert (find_single_keys(keys) == np.flatnonzero(np.isin(keys, unique[count == 1]))).all()
+    assert len(find_single_keys(np.zeros(4, dtype=np.uint64))) == 0
 
 
 def test_blocks_cover_everything_once_and_pass_errors_on() -> None:
@@ -38,7 +38,7 @@ def test_blocks_cover_everything_once_and_pass_errors_on() -> None:
     def work(block: slice) -> None:
         seen[block] += 1
 
-    in_blocks(work, 1000, 64)
+    run_in_blocks(work, 1000, 64)
     assert (seen == 1).all()
 
     def fail(block: slice) -> None:
@@ -46,7 +46,7 @@ def test_blocks_cover_everything_once_and_pass_errors_on() -> None:
             raise ValueError("in a thread")
 
     with pytest.raises(ValueError, match="in a thread"):
-        in_blocks(fail, 1000, 64)
+        run_in_blocks(fail, 1000, 64)
 
 
 def test_edges() -> None:

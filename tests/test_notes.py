@@ -13,7 +13,7 @@ from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, Solution, solve
 from tetlux.fem.body.body import Body
 from tetlux.meshing import InputError, Surface, TetMesh, mesh_from_arrays, sphere, surface_from_arrays
-from tetlux.meshing.notes import Note, codes_of, in_region, prefixed
+from tetlux.meshing.notes import Note, add_prefix, codes_of, in_region
 
 NOTE = Note("low-albedo", "the reduced albedo is 0.5.", region="core", value=0.5)
 
@@ -38,11 +38,11 @@ def test_a_copied_note_keeps_its_code(copied: Note) -> None:
 
 
 def test_a_prefix_keeps_the_code() -> None:
-    both = prefixed(in_region(NOTE, "heart"), "in red: ")
+    both = add_prefix(in_region(NOTE, "heart"), "in red: ")
     assert both == "in red: heart: the reduced albedo is 0.5."
     assert parts(both) == ("low-albedo", "heart", 0.5)
     assert in_region(both, "lung") == "in red: lung: the reduced albedo is 0.5."
-    assert prefixed("a sentence.", "in red: ") == "in red: a sentence."
+    assert add_prefix("a sentence.", "in red: ") == "in red: a sentence."
     assert in_region("a sentence.", "lung") == "lung: a sentence."
 
 

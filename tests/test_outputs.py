@@ -13,11 +13,12 @@ import pyvista
 import trimesh
 
 from tetlux.cases import run as run_module
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
 from tetlux.cases.file.colours import LUMINANCE, preview, to_linear, to_srgb
-from tetlux.cases.file.sensors import readings
+from tetlux.cases.file.detectors import read_detectors
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import run_case
-from tetlux.cases.write.results import Results, results_of
+from tetlux.cases.write.results import Results, collect_results
 from tetlux.fem import solve
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
@@ -51,7 +52,7 @@ class Finished:
 
     @property
     def results(self) -> Results:
-        return results_of(self.case, self.solutions)
+        return collect_results(self.case, self.solutions)
 
 
 @pytest.fixture(scope="module")
@@ -263,14 +264,14 @@ def test_one_channel_and_one_light_have_no_names_beside(tmp_path: Path) -> None:
 
 def test_vertices_are_chosen_by_all_channels_together(finished: Finished) -> None:
     case, solutions = finished.case, finished.solutions
-    results = results_of(case, solutions)
+    results = collect_results(case, solutions)
     given = len(case.surface.points)
     np.testing.assert_array_equal(results.surface.points[:given], case.surface.points)
     assert len(results.surface.points) > 10 * given
     # The point source lights a corner where the beam's channel alone would not ask for more.
     total = sum(solution.exitance_on(results.surface.points) for solution in solutions)
     np.testing.assert_allclose(results.exitance(), total, rtol=1e-9)
-    assert readings(case.sensors, [("red", "all", solutions[0])])[0]["exitance"] > 0
+    assert read_detectors(case.detectors, [("red", "all", solutions[0])])[0]["exitance"] > 0
 
 
 @pytest.mark.parametrize(

@@ -171,7 +171,7 @@ def test_a_case_that_is_shown_can_be_run_from_elsewhere(tmp_path: Path, capsys: 
 def test_what_cannot_be_shown_gets_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "binary.yaml").write_bytes(b"\xff\xfe\x00")
     for request, words in (
-        ("hair", 'hair: did you mean "hare"? it is neither a file nor one of the cases that ship: candle,'),
+        ("hair", 'hair: did you mean "hare"? it is neither a file nor one of the shipped cases: candle,'),
         (str(tmp_path), "Is a directory"),
         (str(tmp_path / "binary.yaml"), "is not UTF-8 text"),
         ("no/such.yaml", "No such file"),

@@ -4,19 +4,15 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
-from tetlux.fem import Deposit, DiffuseLight, DiffusePatch, Medium, PointSource, Solution, System
+from tests.lights_made import deposit_on_mesh
+from tetlux.fem import DiffuseLight, DiffusePatch, Medium, PointSource, Solution, System
 from tetlux.fem.body.body import Body
-from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.fresnel import moments
 from tetlux.meshing import InputError, Surface, TetMesh
 
 CUBE = block((12, 12, 8), (12.0, 12.0, 8.0))
 PLATE = block((12, 12, 2), (12.0, 12.0, 1.0))
 TOP = (0.3, 0.1, 0.0)
-
-
-def on_mesh(patch: DiffusePatch, mesh: TetMesh) -> Deposit:
-    return patch.deposit_in(Body(mesh.surface, (TISSUE,))).on(mesh, mesh.surface, coefficients_of(TISSUE))
 
 
 def power(mesh: TetMesh, irradiance: object) -> float:
@@ -29,19 +25,19 @@ def solved(mesh: TetMesh, *lights: DiffusePatch | DiffuseLight | PointSource) ->
 
 @pytest.mark.parametrize("radius", [0.01, 0.2, 1.0, 3.7, 5.0])
 def test_it_lights_a_disc_of_a_flat_face(radius: float) -> None:
-    deposit = on_mesh(DiffusePatch(TOP, radius, 2.0), CUBE)
+    deposit = deposit_on_mesh(DiffusePatch(TOP, radius, 2.0), CUBE, TISSUE)
     incident = 2.0 * np.pi * radius**2
-    assert power(CUBE, deposit.irradiance) == pytest.approx(incident, rel=2e-3)
+    assert power(CUBE, deposit.terms.irradiance) == pytest.approx(incident, rel=2e-3)
     c1, _ = moments(TISSUE.eta)
     entered = incident * TISSUE.eta**2 * (1.0 - 2.0 * c1)
-    assert power(CUBE, deposit.transmitted_irradiance) == pytest.approx(entered, rel=2e-3)
+    assert power(CUBE, deposit.terms.transmitted_irradiance) == pytest.approx(entered, rel=2e-3)
 
 
 def test_it_lights_a_cap_of_a_ball(ball_mesh: TetMesh) -> None:
     """A sphere cuts a cap of area pi radius² off another one through its center; facets lie some per cent within."""
     for radius in (3.0, 8.0, 15.0):
-        deposit = on_mesh(DiffusePatch((0.0, 0.0, 10.0), radius, 1.0), ball_mesh)
-        assert power(ball_mesh, deposit.irradiance) == pytest.approx(np.pi * radius**2, rel=0.03)
+        deposit = deposit_on_mesh(DiffusePatch((0.0, 0.0, 10.0), radius, 1.0), ball_mesh, TISSUE)
+        assert power(ball_mesh, deposit.terms.irradiance) == pytest.approx(np.pi * radius**2, rel=0.03)
 
 
 def test_on_all_of_a_body_it_is_diffuse_light(ball: Surface, ball_mesh: TetMesh) -> None:
@@ -77,10 +73,10 @@ def test_a_small_patch_is_a_point_on_the_surface() -> None:
 
 
 def test_the_far_side_of_a_plate_stays_dark() -> None:
-    deposit = on_mesh(DiffusePatch(TOP, 2.0, 1.0), PLATE)
+    deposit = deposit_on_mesh(DiffusePatch(TOP, 2.0, 1.0), PLATE, TISSUE)
     below = PLATE.points[PLATE.boundary_nodes][:, 2] < -0.9
-    assert np.asarray(deposit.irradiance)[below].max() == 0.0
-    assert power(PLATE, deposit.irradiance) == pytest.approx(4.0 * np.pi, rel=2e-3)
+    assert np.asarray(deposit.terms.irradiance)[below].max() == 0.0
+    assert power(PLATE, deposit.terms.irradiance) == pytest.approx(4.0 * np.pi, rel=2e-3)
 
 
 def test_what_is_wrong_is_said() -> None:

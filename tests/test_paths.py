@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
+from tests.lights_made import deposit_on_mesh
 from tetlux.fem import CollimatedBeam, Light, Medium, PencilBeam, Rectangle, System
 from tetlux.fem.ballistic import follow as paths
-from tetlux.fem.ballistic.follow import Rays, follow
-from tetlux.fem.body.body import Body
+from tetlux.fem.ballistic.follow import follow
+from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.operators.loads import load_vector
@@ -106,12 +107,12 @@ def test_what_stays_in_a_thin_plate(thickness: float) -> None:
     """By its thickness in mean free paths: what is not followed is a millionth of that, not of the beam."""
     of = medium(1.4, sigma_a=0.4 * thickness, sigma_s=0.6 * thickness, g=0.0)
     lost, through, back = plate_by_hand(of, 1.0)
-    deposit = PencilBeam((0.3, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
+    beam = PencilBeam((0.3, 0.2, 5.0), (0.0, 0.0, -1.0), deposit="line")
     plate = block((6, 6, 2), (16.0, 16.0, 1.0))
-    found = deposit.deposit_in(Body(plate.surface, (of,))).on(plate, plate.surface, coefficients_of(of))
-    scattered = load_vector(plate, coefficients_of(of), found).sum()
+    found = deposit_on_mesh(beam, plate, of)
+    scattered = load_vector(plate, coefficients_of(of), found.terms).sum()
     stays = 1.0 - lost - through - back
-    assert found.absorbed == pytest.approx(0.4 * stays, rel=1e-5)
+    assert found.ledger.absorbed == pytest.approx(0.4 * stays, rel=1e-5)
     assert scattered == pytest.approx(0.6 * stays, rel=1e-5)
 
 
@@ -138,14 +139,15 @@ def test_what_is_left_in_each_wall(kind: str) -> None:
     """At matched indices, without diffusion: power scattered or absorbed in a wall is what it takes off the beam."""
     of = medium(1.0)
     light = thin_beam((-10.0, 0.3, -1.4), (1.0, 0.0, 0.0), kind)
-    deposit = light.deposit_in(Body(TROUGH.surface, (of,))).on(TROUGH, TROUGH.surface, coefficients_of(of))
-    beyond = deposit.starts[:, 0] > 0
+    deposit = deposit_on_mesh(light, TROUGH, of)
+    segments = deposit.terms.segments
+    beyond = segments.starts[:, 0] > 0
     fade = math.exp(-4.0 * extinction(of))
-    entered = [float(deposit.fluxes[some].sum()) / deposit.incident for some in (~beyond, beyond)]
+    entered = [float(segments.fluxes[some].sum()) / deposit.ledger.incident for some in (~beyond, beyond)]
     assert entered == pytest.approx([1.0, fade], rel=1e-9)
-    assert deposit.lengths == pytest.approx(np.full(len(deposit.lengths), 4.0))
-    assert deposit.starts[beyond][:, 0] == pytest.approx(np.full(beyond.sum(), 2.0))
-    assert deposit.ballistic / deposit.incident == pytest.approx(fade**2, rel=1e-9)
+    assert segments.lengths == pytest.approx(np.full(len(segments.lengths), 4.0))
+    assert segments.starts[beyond][:, 0] == pytest.approx(np.full(beyond.sum(), 2.0))
+    assert deposit.ledger.ballistic / deposit.ledger.incident == pytest.approx(fade**2, rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", ["pencil", "spot"])
@@ -158,29 +160,30 @@ def test_a_wedge_refracts(kind: str) -> None:
     points[:, 2] *= (3.0 + slope * (points[:, 0] + 4.0)) / 8.0
     wedge, of = TetMesh(points, whole.tetrahedra), medium(1.4)
     light = thin_beam((0.5, 0.3, 5.0), (0.0, 0.0, -1.0), kind)
-    coefficients = coefficients_of(of)
-    deposit = light.deposit_in(Body(wedge.surface, (of,))).on(wedge, wedge.surface, coefficients)
+    deposit = deposit_on_mesh(light, wedge, of)
+    segments = deposit.terms.segments
     length = 3.0 + slope * 4.5
-    first = np.argmax(deposit.fluxes)
-    assert deposit.directions[first] == pytest.approx([0.0, 0.0, -1.0], abs=1e-12)
-    assert deposit.lengths[first] == pytest.approx(length, abs=0.04)
+    first = np.argmax(segments.fluxes)
+    assert segments.directions[first] == pytest.approx([0.0, 0.0, -1.0], abs=1e-12)
+    assert segments.lengths[first] == pytest.approx(length, abs=0.04)
     # What comes out, caught by a screen: another body below, of the same medium.
     screen = block((2, 2, 1), (60.0, 60.0, 1.0))
     both = TetMesh(
         np.vstack([points, screen.points - [0.0, 0.0, 20.0]]),
         np.vstack([whole.tetrahedra, screen.tetrahedra + len(points)]),
     )
-    deposit = light.deposit_in(Body(both.surface, (of,))).on(both, both.surface, coefficients)
-    caught = np.flatnonzero(np.abs(deposit.starts[:, 2] + 20.0) < 1e-9)
+    deposit = deposit_on_mesh(light, both, of)
+    segments = deposit.terms.segments
+    caught = np.flatnonzero(np.abs(segments.starts[:, 2] + 20.0) < 1e-9)
     bend = math.asin(1.4 * math.sin(math.radians(20.0))) - math.radians(20.0)
     # Away from the normal, which is towards the thick end, +x.
     expected = 0.5 + (20.0 - length) * math.tan(bend)
-    direct = caught[np.abs(deposit.starts[caught, 0] - expected) < 0.15]
+    direct = caught[np.abs(segments.starts[caught, 0] - expected) < 0.15]
     face = float(reflectance(math.cos(math.radians(20.0)), 1.4))
     onto = float(reflectance(math.cos(bend), 1.0 / 1.4))
     top = float(reflectance(1.0, 1.0 / 1.4))
     share = (1.0 - top) * math.exp(-extinction(of) * length) * (1.0 - face) * (1.0 - onto)
-    assert float(deposit.fluxes[direct].sum()) / deposit.incident == pytest.approx(share, rel=0.01)
+    assert float(segments.fluxes[direct].sum()) / deposit.ledger.incident == pytest.approx(share, rel=0.01)
 
 
 def test_light_beyond_the_critical_angle_stays_inside_and_leaves_by_the_end() -> None:
@@ -193,11 +196,14 @@ def test_light_beyond_the_critical_angle_stays_inside_and_leaves_by_the_end() ->
         starts = np.column_stack([np.full(300, -20.0), rng.uniform(-1.9, 1.9, 300), rng.uniform(-0.99, -0.01, 300)])
         directions = np.tile([along, 0.0, cosine], (300, 1))
         deposit = follow(guide, coefficients_of(of), Rays(starts, directions, np.full(300, 1.0 / 300)))
+        segments = deposit.terms.segments
         lost, fade = float(reflectance(along, 1.4)), math.exp(-0.05 * 40.0 / along)
         # To and fro between the ends.
-        assert deposit.ballistic == pytest.approx(fade * (1.0 - lost) / (1.0 - lost * fade), rel=1e-4)
-        scattered = float(deposit.fluxes @ -np.expm1(-0.05 * deposit.lengths)) * 0.6 + float(deposit.powers.sum())
-        assert deposit.absorbed + deposit.ballistic + scattered == pytest.approx(1.0, rel=1e-12)
+        assert deposit.ledger.ballistic == pytest.approx(fade * (1.0 - lost) / (1.0 - lost * fade), rel=1e-4)
+        scattered = float(segments.fluxes @ -np.expm1(-0.05 * segments.lengths)) * 0.6 + float(
+            deposit.terms.powers.sum()
+        )
+        assert deposit.ledger.absorbed + deposit.ledger.ballistic + scattered == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("uniform", [True, False])
@@ -213,13 +219,13 @@ def test_a_beam_that_fades_stays_on_its_way(uniform: bool) -> None:
         coefficients = same if uniform else each
         starts = np.array([[0.3, 0.2, 0.0], [-0.7, 0.1, 0.0]])
         deposit = follow(CUBE, coefficients, Rays(starts, np.array([[0.0, 0.0, -1.0]] * 2), np.array([1.0, 2.0])))
-        load = load_vector(CUBE, coefficients, deposit)
-        assert deposit.absorbed + load.sum() + deposit.ballistic == pytest.approx(3.0, rel=1e-14)
-        assert load.sum() == pytest.approx(0.6 * (3.0 - deposit.ballistic), rel=1e-12)
+        load = load_vector(CUBE, coefficients, deposit.terms)
+        assert deposit.ledger.absorbed + load.sum() + deposit.ledger.ballistic == pytest.approx(3.0, rel=1e-14)
+        assert load.sum() == pytest.approx(0.6 * (3.0 - deposit.ledger.ballistic), rel=1e-12)
         # Up to 23 mean free paths light is followed to the far side.
         through = 3.0 * math.exp(-4.0 * thick) * (1.0 - float(reflectance(1.0, 1.4)))
-        assert deposit.ballistic == pytest.approx(through if thick < 5.7 else 0.0, rel=1e-2)
-        assert (deposit.powers <= paths.FAINTEST_AGAIN * 1.5).all()
+        assert deposit.ledger.ballistic == pytest.approx(through if thick < 5.7 else 0.0, rel=1e-2)
+        assert (deposit.terms.powers <= paths.NEGLIGIBLE_REFLECTION * 1.5).all()
 
 
 # Along faces, through edges and corners, at grazing incidence, and where it just touches.
@@ -277,7 +283,7 @@ def test_the_path_on_a_finer_mesh_is_the_same() -> None:
     for counts in ((1, 1, 1), (2, 3, 5), (8, 8, 8)):
         mesh = block(counts, (4.0, 4.0, 4.0))
         light = thin_beam((-4.0, 0.3, 1.0), (1.0, 0.1, -0.9), "pencil")
-        deposit = light.deposit_in(Body(mesh.surface, (of,))).on(mesh, mesh.surface, coefficients_of(of))
-        found.append(np.array([deposit.specular, deposit.absorbed, deposit.ballistic]))
+        deposit = deposit_on_mesh(light, mesh, of)
+        found.append(np.array([deposit.ledger.specular, deposit.ledger.absorbed, deposit.ledger.ballistic]))
     assert found[1] == pytest.approx(found[0], rel=1e-6)
     assert found[2] == pytest.approx(found[0], rel=1e-6)

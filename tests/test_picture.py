@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from tetlux.cases.picture import draw as picture
-from tetlux.cases.picture.draw import Ray, Scene, draw
+from tetlux.cases.picture.draw import PictureScene, Ray, draw_picture
 from tetlux.cases.picture.frame import LEFT, TOP, bar_ticks
-from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.rasterizer import rasterize
 from tetlux.cases.picture.stage import (
     BACKGROUND,
     DARK,
@@ -31,15 +31,15 @@ from tetlux.meshing.surface.surface import Surface
 DIES: tuple[str, ...] = (sys.executable, "-c", "import os; os.abort()")
 
 
-def lit(surface: Surface, entry: Vector, start: Vector) -> Scene:
+def lit(surface: Surface, entry: Vector, start: Vector) -> PictureScene:
     """A body that glows round an entry point, over more decades than are drawn."""
     distance = np.linalg.norm(surface.points - np.asarray(entry), axis=1)
     exitance = 0.1 * np.exp(-1.5 * distance) / (distance + 0.5)
-    return Scene(surface.points, surface.faces, exitance, "mm", "a case", (Ray(start, entry),))
+    return PictureScene(surface.points, surface.faces, exitance, "mm", "a case", (Ray(start, entry),))
 
 
 @pytest.fixture(scope="module")
-def ball() -> Scene:
+def ball() -> PictureScene:
     # Its entry point is oblique to every axis, so that a mirrored picture would show.
     entry = (8.0, 0.0, 6.0)
     return lit(sphere(10.0, subdivisions=3), entry, (16.0, 0.0, 12.0))
@@ -50,11 +50,11 @@ def pixels(path: Path) -> FloatArray:
         return np.asarray(image.convert("RGB"), dtype=np.float64)
 
 
-def camera_of(scene: Scene) -> Camera:
+def camera_of(scene: PictureScene) -> Camera:
     return build_stage(scene.points, scene.triangles, scene.exitance, scene.lights).camera
 
 
-def brightest(image: FloatArray, camera: Camera, scene: Scene) -> tuple[FloatArray, FloatArray]:
+def brightest(image: FloatArray, camera: Camera, scene: PictureScene) -> tuple[FloatArray, FloatArray]:
     """Middle of the yellow pixels of the panel, and where the entry point should be, in pixels of the panel."""
     panel = image[TOP : TOP + PANEL[1], LEFT : LEFT + PANEL[0]]
     # Yellow, as no other colour of the picture: much green, and more of it than of blue.
@@ -70,7 +70,7 @@ def rendering() -> None:
     body = sphere(10.0, subdivisions=1)
     scene = lit(body, (0.0, 0.0, 10.0), (0.0, 0.0, 20.0))
     stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights)
-    if picture._drawn_with_pyvista(stage) is None:
+    if picture._render_with_pyvista(stage) is None:
         if os.environ.get("CI"):
             pytest.fail("CI has to render: apt-get install libgl1 libegl1")
         pytest.skip("PyVista cannot render here: apt-get install libgl1 libegl1")
@@ -78,14 +78,14 @@ def rendering() -> None:
 
 @pytest.mark.parametrize("plain", [False, True])
 def test_brightest_colours_are_at_the_entry_point(
-    ball: Scene, plain: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+    ball: PictureScene, plain: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:
     if not plain:
         request.getfixturevalue("rendering")
     if plain:
         monkeypatch.setattr(picture, "RENDERER", DIES)
     target = tmp_path / "picture.png"
-    warnings = draw(ball, target)
+    warnings = draw_picture(ball, target)
     image = pixels(target)
     assert image.shape == (1050, 1400, 3)
     found, wanted = brightest(image, camera_of(ball), ball)
@@ -105,8 +105,8 @@ def test_both_drawers_draw_the_same() -> None:
     body = torus(10.0, 4.0, segments=48)
     scene = lit(body, (-14.0, 0.0, 0.0), (-30.0, 0.0, 0.0))
     stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights)
-    ours = draw_plain(stage).astype(np.int64)
-    theirs = picture._drawn_with_pyvista(stage)
+    ours = rasterize(stage).astype(np.int64)
+    theirs = picture._render_with_pyvista(stage)
     assert theirs is not None
     assert ours.shape == theirs.shape == (OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3)
     # Measured: 0.12 to 0.17 % of the pixels differ by more than three steps, those on outlines.
@@ -120,8 +120,8 @@ def test_both_drawers_draw_the_same_colours() -> None:
     scene = lit(body, (-14.0, 0.0, 0.0), (-30.0, 0.0, 0.0))
     colours = np.clip(0.5 + body.points / 30.0, 0.0, 1.0)
     stage = build_stage(scene.points, scene.triangles, scene.exitance, scene.lights, colours)
-    ours = draw_plain(stage).astype(np.int64)
-    theirs = picture._drawn_with_pyvista(stage)
+    ours = rasterize(stage).astype(np.int64)
+    theirs = picture._render_with_pyvista(stage)
     assert theirs is not None
     apart = np.abs(ours - theirs.astype(np.int64)).max(axis=2)
     assert (apart > 3).mean() < 0.004
@@ -132,7 +132,7 @@ def test_a_body_in_its_own_colours_is_drawn_on_a_dark_ground(tmp_path: Path, mon
     cube = box((2.0, 2.0, 2.0))
     colours = np.tile(np.array([200, 100, 50], dtype=np.uint8), (8, 1))
     target = tmp_path / "picture.png"
-    draw(Scene(cube.points, cube.faces, np.ones(8), "mm", "orange", (), (colours, 0.25)), target)
+    draw_picture(PictureScene(cube.points, cube.faces, np.ones(8), "mm", "orange", (), (colours, 0.25)), target)
     image = pixels(target)
     middle = image[TOP + PANEL[1] // 2, LEFT + PANEL[0] // 2]
     # Shaded, the same in all three colours.
@@ -148,33 +148,33 @@ def test_a_body_in_its_own_colours_is_drawn_on_a_dark_ground(tmp_path: Path, mon
 
 @pytest.mark.parametrize("command", [DIES, ("no-such-command",), (sys.executable, "-c", "")])
 def test_a_renderer_that_fails_is_done_without(
-    command: tuple[str, ...], ball: Scene, monkeypatch: pytest.MonkeyPatch
+    command: tuple[str, ...], ball: PictureScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(picture, "RENDERER", command)
     stage = build_stage(ball.points, ball.triangles, ball.exitance, ball.lights)
-    assert picture._drawn_with_pyvista(stage) is None
+    assert picture._render_with_pyvista(stage) is None
 
 
-def test_a_renderer_that_hangs_is_stopped(ball: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_renderer_that_hangs_is_stopped(ball: PictureScene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, "RENDERER", (sys.executable, "-c", "import time; time.sleep(60)"))
     monkeypatch.setattr(picture, "TIME_LIMIT", 0.3)
     stage = build_stage(ball.points, ball.triangles, ball.exitance, ball.lights)
-    assert picture._drawn_with_pyvista(stage) is None
+    assert picture._render_with_pyvista(stage) is None
 
 
 def test_a_failure_leaves_the_old_picture_and_nothing_else(
-    ball: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ball: PictureScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def half(path: Path, *_: object, **__: object) -> None:
         path.write_bytes(b"half a picture")
         raise OSError("the disk is full")
 
     monkeypatch.setattr(picture, "RENDERER", DIES)
-    monkeypatch.setattr(picture, "frame", half)
+    monkeypatch.setattr(picture, "draw_frame", half)
     target = tmp_path / "picture.png"
     target.write_bytes(b"the old one")
     with pytest.raises(OSError, match="disk is full"):
-        draw(ball, target)
+        draw_picture(ball, target)
     assert target.read_bytes() == b"the old one"
     assert list(tmp_path.iterdir()) == [target]
 
@@ -184,7 +184,7 @@ def test_dark_and_even_bodies_are_drawn(exitance: FloatArray, tmp_path: Path, mo
     monkeypatch.setattr(picture, "RENDERER", DIES)
     cube = box((2.0, 2.0, 2.0))
     target = tmp_path / "picture.png"
-    draw(Scene(cube.points, cube.faces, exitance, "mm", "$ in a title", ()), target)
+    draw_picture(PictureScene(cube.points, cube.faces, exitance, "mm", "$ in a title", ()), target)
     middle = pixels(target)[TOP + PANEL[1] // 2, LEFT + PANEL[0] // 2]
     assert np.abs(middle - 255 * np.asarray(BACKGROUND)).max() > 30
 

@@ -9,11 +9,12 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import run
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
-from tetlux.cases.picture.draw import Ray, Scene, Shape, draw
+from tetlux.cases.picture.draw import PictureScene, Ray, RegionOutline, draw_picture
 from tetlux.cases.picture.frame import LEFT, TOP
-from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.rasterizer import rasterize
 from tetlux.cases.picture.stage import (
     ARROW_OPACITY,
     BACKGROUND,
@@ -42,7 +43,7 @@ Z, Y, X = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 def _grey(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is drawn over the body is the same in both drawers, and quicker to see over one that is grey all over."""
     image = np.full((OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3), 150, dtype=np.uint8)
-    monkeypatch.setattr(picture, "_drawn_with_pyvista", lambda _: image)
+    monkeypatch.setattr(picture, "_render_with_pyvista", lambda _: image)
 
 
 def case_of(more: str, folder: Path) -> Case:
@@ -112,7 +113,7 @@ def test_the_case_file_turns_the_picture(keys: str, toward: Vector | None, tmp_p
     [
         ("camera: {}", "camera: give position or azimuth, not neither"),
         ("camera: {azimuth: 3, position: [0, 0, 30]}", "camera: give position or azimuth, not both"),
-        ("camera: {elevation: 3, position: [0, 0, 30]}", "camera: elevation belongs to azimuth"),
+        ("camera: {elevation: 3, position: [0, 0, 30]}", "camera: elevation goes with azimuth"),
         ("camera: {azimuth: 3, elevation: 91}", "camera.elevation: expected a number less than or equal to 90"),
         ("camera: {position: [0, 0, 3]}", "camera.position: the camera is inside the body"),
         ("up: [0, 0, 0]", "line 6: up: up"),
@@ -140,10 +141,10 @@ def test_from_right_above_x_runs_to_the_right() -> None:
     np.testing.assert_allclose([camera.right, camera.up], [X, Y], atol=1e-12)
 
 
-def cube_from_the_front(**more: Any) -> Scene:
+def cube_from_the_front(**more: Any) -> PictureScene:
     """A cube of 10 mm that looks the same everywhere, seen from -y."""
     cube = box((10.0, 10.0, 10.0))
-    return Scene(cube.points, cube.faces, np.ones(8), "mm", "cube", toward=np.array([0.0, -1.0, 0.0]), **more)
+    return PictureScene(cube.points, cube.faces, np.ones(8), "mm", "cube", toward=np.array([0.0, -1.0, 0.0]), **more)
 
 
 def front_camera() -> Camera:
@@ -153,7 +154,9 @@ def front_camera() -> Camera:
 @pytest.mark.usefixtures("_grey")
 def test_regions_are_outlined_and_named(tmp_path: Path) -> None:
     ball = sphere(2.5, center=(1.0, 0.0, 0.0))
-    draw(cube_from_the_front(regions=(Shape("core", ball.points, ball.faces),)), tmp_path / "outlined.png")
+    draw_picture(
+        cube_from_the_front(regions=(RegionOutline("core", ball.points, ball.faces),)), tmp_path / "outlined.png"
+    )
     changed = np.abs(pixels(tmp_path / "outlined.png") - 150).max(axis=2)
     camera = front_camera()
     (middle,) = camera.project(np.array([[1.0, 0.0, 0.0]]))[:, :2]
@@ -174,7 +177,7 @@ def test_regions_are_outlined_and_named(tmp_path: Path) -> None:
 def test_detectors_are_dots_with_names_and_those_behind_the_body_are_hollow(tmp_path: Path) -> None:
     camera = front_camera()
     places: dict[str, Vector] = {"front": (-2.0, -5.0, 1.0), "back": (3.0, 5.0, -2.0)}
-    draw(cube_from_the_front(detectors=tuple(places.items())), tmp_path / "marked.png")
+    draw_picture(cube_from_the_front(detectors=tuple(places.items())), tmp_path / "marked.png")
     marked = pixels(tmp_path / "marked.png")
     for name, place in places.items():
         (x, y) = camera.project(np.array([place]))[0, :2].astype(int)
@@ -188,7 +191,7 @@ def test_detectors_are_dots_with_names_and_those_behind_the_body_are_hollow(tmp_
 @pytest.mark.usefixtures("_grey")
 def test_names_do_not_cover_each_other_and_are_left_out_where_there_is_no_room(tmp_path: Path) -> None:
     row = tuple((f"detector_{i}", (0.05 * i, -5.0, 0.0)) for i in range(60))
-    draw(cube_from_the_front(detectors=row), tmp_path / "row.png")
+    draw_picture(cube_from_the_front(detectors=row), tmp_path / "row.png")
     dark = (pixels(tmp_path / "row.png") < 60).all(axis=2)
     # Sixty names would need some 60 * 12 * 50 pixels of ink.
     assert 500 < dark.sum() < 15_000
@@ -200,8 +203,8 @@ def test_an_arrow_does_not_hide_what_it_lights() -> None:
     ray = Ray((0.0, -9.0, 6.0), (0.0, -5.0, 0.0))
     toward = np.array([0.0, -1.0, 0.0])
     stage = build_stage(cube.points, cube.faces, np.ones(8), (ray,), toward=toward)
-    lit = draw_plain(stage).astype(np.float64)
-    bare = draw_plain(replace(stage, arrows=np.empty((0, 3, 3)), arrow_normals=np.empty((0, 3, 3))))
+    lit = rasterize(stage).astype(np.float64)
+    bare = rasterize(replace(stage, arrows=np.empty((0, 3, 3)), arrow_normals=np.empty((0, 3, 3))))
     over = (np.abs(lit - bare) > 3).any(axis=2)
     assert 500 < over.sum() < 0.01 * over.size
     # What is seen is half the face, of one colour, and half the arrow, whose colours are LIGHT's, shaded.
@@ -221,14 +224,14 @@ def test_arrows_in_front_of_nothing_are_solid() -> None:
 
 
 def test_a_run_draws_its_regions_and_detectors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    scenes: list[Scene] = []
+    scenes: list[PictureScene] = []
 
-    def kept(scene: Scene, path: Path) -> list[str]:
+    def kept(scene: PictureScene, path: Path) -> list[str]:
         scenes.append(scene)
         path.write_bytes(b"")
         return []
 
-    monkeypatch.setattr(run, "draw", kept)
+    monkeypatch.setattr(run, "draw_picture", kept)
     case = case_of(
         "up: [0, 1, 0]\ncamera: {azimuth: 10}\n"
         "regions: [{name: core, surface: {sphere: {radius: 4}}, medium: {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}}]\n"

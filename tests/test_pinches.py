@@ -13,8 +13,8 @@ from tetlux.meshing.mesher.deviation import two_sided_distance
 from tetlux.meshing.mesher.proxy import proxy
 from tetlux.meshing.repair.pinches import parts_of, pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies
-from tetlux.meshing.surface.subdivide import edges_of, split_edges
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.subdivide import number_triangle_edges, split_edges
+from tetlux.meshing.surface.triangles import signed_volume
 
 BALL = sphere(10.0)
 
@@ -73,7 +73,7 @@ def voxels() -> tuple[Surface, int]:
     number = number.reshape(-1, 4)
     places, faces = points.astype(np.float64), np.concatenate([number[:, :3], number[:, [0, 2, 3]]])
     for _ in range(2):
-        edges = edges_of(faces)
+        edges = number_triangle_edges(faces)
         places, faces, _ = split_edges(places, faces, edges, np.ones(len(edges[0]), dtype=bool))
     return surface_from_arrays(places, faces), len(cells)
 

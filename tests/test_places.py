@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
+from tests.layers_made import CLEAR, DENSE, DOWN, layer
 from tetlux.fem import (
     Body,
     CollimatedBeam,
@@ -15,12 +16,15 @@ from tetlux.fem import (
     Disc,
     Emission,
     EnvironmentLight,
+    Ledger,
     Light,
     Medium,
+    MeshHints,
     PencilBeam,
     PointSource,
     Region,
     Solution,
+    SourceTerms,
     VaryingMedium,
     solve,
 )
@@ -31,20 +35,10 @@ from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 
-DENSE = Medium(sigma_a=0.05, sigma_s=10.0, g=0.8, eta=1.4)
-CLEAR = Medium(sigma_a=0.002, sigma_s=2.0, g=0.8, eta=1.4)
-DOWN = (0.0, 0.0, -1.0)
-
-
-def plate(low: float, high: float) -> Surface:
-    """What lies between two depths."""
-    return box((16.0, 16.0, high - low), center=(0.0, 0.0, -0.5 * (low + high)))
-
-
 # One mesh for all ways of writing it, so that they agree to rounding.
 MESH = block((8, 8, 8), (16.0, 16.0, 8.0))
 UPPER = (MESH.points[MESH.tetrahedra].mean(axis=1)[:, 2] > -3.0).astype(np.int64)
-ABOVE, BELOW = plate(0.0, 3.0), plate(3.0, 8.0)
+ABOVE, BELOW = layer(0.0, 3.0), layer(3.0, 8.0)
 PLACES = np.array([[2.0, 0.0, 0.0], [0.0, -5.0, 0.0], [8.0, 0.0, -2.0], [0.0, 3.0, -8.0]])
 
 # Where a light goes by the number of a region, that of the upper layer is put in.
@@ -116,7 +110,8 @@ class Wire:
     def deposit_in(self, body: Body) -> Deposit:
         points = np.column_stack([np.linspace(-4.0, 4.0, 9), np.zeros(9), np.full(9, -2.0)])
         finest = float(body.mean_free_paths(points).min())
-        return Deposit(incident=1.0, points=points, powers=np.full(9, 1.0 / 9.0), resolution=finest)
+        terms = SourceTerms(points=points, powers=np.full(9, 1.0 / 9.0))
+        return Deposit(Ledger(incident=1.0), terms, MeshHints(resolution=finest))
 
 
 def test_a_light_of_ones_own_is_told_the_medium_of_each_place() -> None:
@@ -124,23 +119,23 @@ def test_a_light_of_ones_own_is_told_the_medium_of_each_place() -> None:
     assert_same(one, other)
     assert one.power.incident == 1.0
     assert abs(one.power.balance_error) < 1e-12
-    deposit = Wire().deposit_in(Body(plate(0.0, 8.0), (CLEAR, DENSE), SurfacePartition([ABOVE])))
-    assert deposit.resolution == pytest.approx(DENSE.mean_free_path)
+    deposit = Wire().deposit_in(Body(layer(0.0, 8.0), (CLEAR, DENSE), SurfacePartition([ABOVE])))
+    assert deposit.hints.resolution == pytest.approx(DENSE.mean_free_path)
 
 
 Depth = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def deposited(media: tuple[AnyMedium, ...], light: Light, *surfaces: Surface) -> tuple[FloatArray, FloatArray]:
-    deposit = light.deposit_in(Body(plate(0.0, 8.0), media, SurfacePartition(surfaces)))
-    return deposit.points, deposit.powers
+    deposit = light.deposit_in(Body(layer(0.0, 8.0), media, SurfacePartition(surfaces)))
+    return deposit.terms.points, deposit.terms.powers
 
 
 @pytest.mark.parametrize("thickness", [1e-3, 0.1, 0.4, 0.6, 3.0])
 def test_a_pencil_is_deposited_at_an_optical_depth_of_one(thickness: float) -> None:
     """Whatever layers it takes to get there, of which the thinnest change nothing."""
     light = PencilBeam((0.0, 0.0, 5.0), DOWN)
-    layers = plate(0.0, thickness), plate(thickness, 8.0)
+    layers = layer(0.0, thickness), layer(thickness, 8.0)
     in_upper = min(thickness * DENSE.sigma_t_prime, 1.0)
     depth = min(thickness, DENSE.mean_free_path) + (1.0 - in_upper) * CLEAR.mean_free_path
     # Of what is lost on the whole way, which is more than that to the deposit.
@@ -167,8 +162,8 @@ def test_a_pencil_is_deposited_at_an_optical_depth_of_one(thickness: float) -> N
 @pytest.mark.parametrize("sideways", [0.0, 0.3])
 def test_a_pencil_along_a_border_is_in_the_same_layer_however_it_is_written(sideways: float) -> None:
     light = PencilBeam((20.0, 0.2, -3.0), (-1.0, sideways, 0.0))
-    one, _ = deposited((CLEAR, DENSE), light, plate(0.0, 3.0))
-    other, _ = deposited((DENSE, CLEAR), light, plate(3.0, 8.0))
+    one, _ = deposited((CLEAR, DENSE), light, layer(0.0, 3.0))
+    other, _ = deposited((DENSE, CLEAR), light, layer(3.0, 8.0))
     assert one == pytest.approx(other, abs=1e-9)
     assert 8.0 - one[0, 0] == pytest.approx(DENSE.mean_free_path, rel=0.05)
 
@@ -176,9 +171,9 @@ def test_a_pencil_along_a_border_is_in_the_same_layer_however_it_is_written(side
 def test_half_the_optical_depth_of_a_thin_body() -> None:
     """0.2 of a dense and 0.4 of a clear medium are an optical depth of 0.41 + 0.1608."""
     body = box((16.0, 16.0, 0.6), center=(0.0, 0.0, -0.3))
-    partition = SurfacePartition([plate(0.0, 0.2)])
+    partition = SurfacePartition([layer(0.0, 0.2)])
     deposit = PencilBeam((0.0, 0.0, 5.0), DOWN).deposit_in(Body(body, (CLEAR, DENSE), partition))
-    assert deposit.points[0, 2] == pytest.approx(-0.5 * (0.2 * 2.05 + 0.4 * 0.402) / 2.05, abs=1e-9)
+    assert deposit.terms.points[0, 2] == pytest.approx(-0.5 * (0.2 * 2.05 + 0.4 * 0.402) / 2.05, abs=1e-9)
     assert "less than two mean free paths" in deposit.warnings[0]
 
 
@@ -197,9 +192,9 @@ def test_optical_depth_in_coefficients_that_vary() -> None:
     ):
         body = Body(surface, (VaryingMedium(base=base, sigma_s_prime=sigma),))
         paths = body.paths(starts, directions, lengths)
-        assert paths.totals == pytest.approx(depth(lengths, cosines), rel=1e-3)
+        assert paths.total_depths == pytest.approx(depth(lengths, cosines), rel=1e-3)
         for wanted in (0.1, 1.0, 2.0):
-            assert depth(paths.place(np.full(8, wanted)), cosines) == pytest.approx(np.full(8, wanted), rel=1e-3)
+            assert depth(paths.distances_at(np.full(8, wanted)), cosines) == pytest.approx(np.full(8, wanted), rel=1e-3)
         assert paths.error <= 2e-3
         assert paths.albedo == pytest.approx(np.ones(8))
 
@@ -215,7 +210,7 @@ def test_a_mesh_knows_its_regions_as_their_surfaces_do() -> None:
     # Facets of the mesh lie up to 0.2 beside the core's surface, and what grazes it may meet the core or not.
     smaller, larger = (SurfacePartition([sphere(radius, subdivisions=3)]) for radius in (4.7, 5.1))
     least, found, most = (
-        Body(body, (CLEAR, DENSE), partition).paths(starts, directions, np.full(40, 9.0)).totals
+        Body(body, (CLEAR, DENSE), partition).paths(starts, directions, np.full(40, 9.0)).total_depths
         for partition in (smaller, MeshPartition(mesh), larger)
     )
     assert (least <= found + 1e-9).all()
@@ -227,7 +222,7 @@ def test_a_mesh_knows_its_regions_as_their_surfaces_do() -> None:
 def test_two_layers_are_those_of_the_closed_form(upper_first: bool) -> None:
     upper = Medium(sigma_a=0.05, sigma_s_prime=2.0, eta=1.4)
     lower = Medium(sigma_a=0.2, sigma_s_prime=0.8, eta=1.4)
-    body, outside, inner = plate(0.0, 8.0), upper, Region(BELOW, lower)
+    body, outside, inner = layer(0.0, 8.0), upper, Region(BELOW, lower)
     if upper_first:
         outside, inner = lower, Region(ABOVE, upper)
     solution = solve(body, outside, [PencilBeam((0.0, 0.0, 5.0), DOWN)], regions=[inner])
@@ -278,7 +273,7 @@ def test_a_skin_counts_by_its_optical_depth() -> None:
     dark = Medium(sigma_a=1.0, sigma_s_prime=1.0, eta=1.4)
 
     def albedo(thickness: float) -> float:
-        region = Region(plate(0.0, thickness), dark)
+        region = Region(layer(0.0, thickness), dark)
         solution = solve(thin_skin(thickness), CLEAR, [DiffuseLight(1.0)], regions=[region])
         assert solution.validity is not None
         # In the middle of the plate; towards its edges it is thinner.

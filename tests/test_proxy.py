@@ -55,7 +55,7 @@ def test_a_larger_deviation_makes_fewer_triangles() -> None:
 def test_a_first_try_that_is_too_coarse_is_followed_by_finer_ones() -> None:
     bumpy = _bumpy(0.1)
     coarse = proxy_of(bumpy, 0.01 * bumpy.diagonal)
-    first = proxy.TRIANGLES * bumpy.area / (0.01 * bumpy.diagonal**2)
+    first = proxy.TRIANGLES_NEEDED * bumpy.area / (0.01 * bumpy.diagonal**2)
     assert 1.1 * first < len(coarse.faces) < 0.8 * len(bumpy.faces)
 
 
@@ -63,7 +63,7 @@ def test_the_result_is_measured_at_more_places_than_the_tries(monkeypatch: pytes
     ball = sphere(1.0)
 
     def distance(_: Surface, __: Surface, samples: int = 10**6) -> float:
-        return 0.008 if samples == proxy.ROUGHLY else 0.011
+        return 0.008 if samples == proxy.FIRST_SAMPLES else 0.011
 
     monkeypatch.setattr(proxy, "two_sided_distance", distance)
     assert proxy_of(ball, 0.01) is ball
@@ -117,7 +117,7 @@ def test_flaps_and_crumbs_go() -> None:
     for extra in (flap, crumb):
         faces = np.vstack([ball.faces, extra]).astype(np.int64)
         assert not proxy._is_manifold(faces)
-        assert sorted(map(tuple, proxy._without_flaps(faces))) == sorted(map(tuple, ball.faces))
+        assert sorted(map(tuple, proxy._remove_flaps(faces))) == sorted(map(tuple, ball.faces))
 
 
 @pytest.mark.parametrize("deviation", [0.0, -1.0, float("nan"), float("inf")])

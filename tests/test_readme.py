@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.meshes_made import cube_of_cubes
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.meshing import TetMesh
 from tetlux.meshing.files.meshes import write_mesh

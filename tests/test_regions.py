@@ -28,9 +28,9 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.files.meshes import read_mesh, write_mesh
 from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import shells
-from tetlux.meshing.mesher.cache import mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.cache import load_cached_mesh, mesh_key, store_cached_mesh
 from tetlux.meshing.tets.nesting import Nesting, nesting
-from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.refine import move_to_surface
 from tetlux.meshing.tets.tagging import tag_tetrahedra
 
 OUTER, INNER = sphere(10.0, subdivisions=3), sphere(5.0, subdivisions=3)
@@ -160,7 +160,7 @@ def test_nodes_where_surfaces_meet_aslant_go_to_both() -> None:
     top = box((10.0, 10.0, 5.0), center=(0.0, 0.0, -2.5))
     wedge = Surface(top.points + np.outer(top.points[:, 2] < -1.0, [0.0, 0.0, 0.5]) * top.points[:, :1], top.faces)
     mesh = TetMesh(sheared, mesh.tetrahedra, regions=upper.astype(np.int64))
-    moved = moved_to_surface(mesh, slab(10.0, 10.0), [wedge])
+    moved = move_to_surface(mesh, slab(10.0, 10.0), [wedge])
     points = moved.points[np.unique(mesh.interfaces[0])]
     assert points[:, 2] == pytest.approx(0.5 * points[:, 0] - 5.0, abs=1e-6)
     assert np.abs(points[:, 0]).max() == pytest.approx(5.0, abs=1e-6)
@@ -180,12 +180,12 @@ def test_what_the_mesher_may_stray_follows_from_thickness_unless_nothing_is_left
             box((60.0, 60.0, upper), center=(0.0, 0.0, -0.5 * upper)),
             box((60.0, 60.0, 5.0 - upper), center=(0.0, 0.0, -0.5 * (upper + 5.0))),
         ]
-        body, *_ = shells.shells_of(slab(60.0, 5.0), layers, 1.0)
+        body, *_ = shells.make_shells(slab(60.0, 5.0), layers, 1.0)
         assert body.deviation == 1.0
-    body, inner = shells.shells_of(OUTER, [sphere(9.9, subdivisions=3)], 2.0)
+    body, inner = shells.make_shells(OUTER, [sphere(9.9, subdivisions=3)], 2.0)
     # The gap is 0.1 wide, and both of its sides are to keep out of each other's way.
     assert (body.deviation, inner.deviation) == pytest.approx((0.025, 0.025), rel=0.02)
-    body, inner = shells.shells_of(OUTER, [INNER], 0.6)
+    body, inner = shells.make_shells(OUTER, [INNER], 0.6)
     assert body.deviation == 0.6
     assert inner.deviation == pytest.approx(shells.INNER_DEVIATION * 10.0 * np.sqrt(3), rel=0.01)
 
@@ -309,8 +309,8 @@ def test_the_cache_tells_regions_and_remembers_them(tmp_path: Path) -> None:
     ]
     assert len(set(keys)) == len(keys)
     mesh = cubes()
-    remember_mesh("a", tmp_path, mesh)
-    again = remembered_mesh("a", tmp_path, "mm")
+    store_cached_mesh("a", tmp_path, mesh)
+    again = load_cached_mesh("a", tmp_path, "mm")
     assert again is not None
     assert (again.regions == mesh.regions).all()
     for regions in (None, mesh.regions[:-1], mesh.regions - 1, mesh.regions.astype(np.float64)):
@@ -318,7 +318,7 @@ def test_the_cache_tells_regions_and_remembers_them(tmp_path: Path) -> None:
         if regions is not None:
             content["regions"] = regions
         np.savez(tmp_path / "a.npz", **content)  # type: ignore[arg-type]
-        assert remembered_mesh("a", tmp_path, "mm") is None
+        assert load_cached_mesh("a", tmp_path, "mm") is None
 
 
 def test_the_mesher_runs_once_for_the_same_regions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -431,7 +431,7 @@ def test_a_region_that_the_mesher_lost_is_missed(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(mesher, "run_pytetwild", run)
     with pytest.raises(RunError, match=r"region 1 \(sphere\): the mesh lost it, .*; leave it out, or make it larger\."):
         tetrahedralize(BODY, [sphere(0.2, center=(0.1, 0.2, 0.3))], cache=False)
-    assert epsilons[1] == pytest.approx(mesher.SECOND * epsilons[0])
+    assert epsilons[1] == pytest.approx(mesher.SECOND_ATTEMPT * epsilons[0])
     with pytest.raises(
         RunError, match=r"region 1 \(sphere\): the mesh's area is .* make them thicker, or leave them out\."
     ):

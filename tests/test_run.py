@@ -12,7 +12,8 @@ from PIL import Image
 
 from tetlux.cases import batch, run
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import run_case
 from tetlux.cases.shipped import find_case_file

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tetlux.cases.cli import main
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, Region, solve
 from tetlux.meshing import sphere

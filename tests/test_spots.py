@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.fem import CollimatedBeam, Deposit, Disc, Gaussian, Image, Medium, Rectangle
-from tetlux.fem.body.body import Body
+from tests.lights_made import deposit_on_mesh
+from tetlux.fem import CollimatedBeam, Disc, Gaussian, Image, Medium, Rectangle
 from tetlux.fem.lights.spots import Spot
-from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.meshing import InputError, TetMesh, box
 from tetlux.meshing.arrays import FloatArray, Vector
 
@@ -22,12 +21,8 @@ RNG = np.random.default_rng(0)
 NOISE = RNG.random((64, 48))
 
 
-def on_mesh(beam: CollimatedBeam, mesh: TetMesh) -> Deposit:
-    return beam.deposit_in(Body(mesh.surface, (MATCHED,))).on(mesh, mesh.surface, coefficients_of(MATCHED))
-
-
 def power(spot: Spot, mesh: TetMesh, *, direction: Vector = DOWN, from_center: bool = False) -> float:
-    return on_mesh(CollimatedBeam(direction, 1.0, spot, from_center=from_center), mesh).incident
+    return deposit_on_mesh(CollimatedBeam(direction, 1.0, spot, from_center=from_center), mesh, MATCHED).ledger.incident
 
 
 SPOTS: dict[str, Spot] = {
@@ -72,9 +67,10 @@ def test_a_slanting_spot_falls_on_more_of_the_face_with_the_same_power(name: str
 
 def lit_middles(spot: Spot) -> tuple[FloatArray, FloatArray]:
     """Where rays of a spot meet the face, (r, 2), and their powers."""
-    deposit = on_mesh(CollimatedBeam(DOWN, 1.0, spot), MESHES["seven"])
-    assert deposit.starts[:, 2] == pytest.approx(0.0)
-    return deposit.starts[:, :2], deposit.fluxes
+    deposit = deposit_on_mesh(CollimatedBeam(DOWN, 1.0, spot), MESHES["seven"], MATCHED)
+    segments = deposit.terms.segments
+    assert segments.starts[:, 2] == pytest.approx(0.0)
+    return segments.starts[:, :2], segments.fluxes
 
 
 @pytest.mark.parametrize(
@@ -91,13 +87,17 @@ def test_a_bright_quarter_lights_that_quarter_of_the_face(direction: Vector, up:
     """Brightness 1 at the upper left, 2 at the upper right, 3 and 4 below: as seen by one who looks along the beam."""
     pixels = np.array([[1.0, 2.0], [3.0, 4.0]])
     spot = Image((0.0, 0.0, -2.0), 4.0, pixels, up=up)
-    deposit = on_mesh(CollimatedBeam(direction, 1.0, spot), MESHES["thirty"])
+    deposit = deposit_on_mesh(CollimatedBeam(direction, 1.0, spot), MESHES["thirty"], MATCHED)
+    segments = deposit.terms.segments
     raised = np.array(up) * [1.0, 1.0, 0.0]
-    u, v = deposit.starts @ np.array(right), deposit.starts @ raised / np.linalg.norm(raised)
-    found = np.histogram2d(-v, u, bins=(2, 2), range=[(-2, 2), (-2, 2)], weights=deposit.fluxes)[0]
+    u, v = (
+        segments.starts @ np.array(right),
+        segments.starts @ raised / np.linalg.norm(raised),
+    )
+    found = np.histogram2d(-v, u, bins=(2, 2), range=[(-2, 2), (-2, 2)], weights=segments.fluxes)[0]
     # Parts across the middle lines lie in one quarter or the other, by their own middles.
     assert found == pytest.approx(4.0 * pixels, rel=0.06)
-    assert deposit.fluxes.sum() == pytest.approx(40.0, rel=5e-3)
+    assert segments.fluxes.sum() == pytest.approx(40.0, rel=5e-3)
 
 
 def test_rays_lie_where_the_spot_is_bright_and_balance_about_its_middle() -> None:
@@ -113,7 +113,7 @@ def test_rays_lie_where_the_spot_is_bright_and_balance_about_its_middle() -> Non
 def test_a_facet_has_one_ray_from_the_middle_of_what_it_sees(name: str) -> None:
     """However many parts of it were looked at: a finer mesh has more rays."""
     mesh, spot = MESHES["seven"], SPOTS[name]
-    rays, normals = CollimatedBeam(DOWN, spot=spot)._falling(mesh)
+    rays, normals = CollimatedBeam(DOWN, spot=spot)._incident_rays(mesh)
     facets = mesh.closest_boundary(rays.starts)[1]
     assert len(np.unique(facets)) == len(facets) == len(normals)
     assert (mesh.boundary_cells[facets] == rays.cells).all()
@@ -139,10 +139,12 @@ def test_light_from_its_center_passes_by_what_is_behind_it() -> None:
     both = TetMesh(np.vstack([lower.points, lower.points + height]), cells)
     spot = Disc((0.0, 0.0, 2.0), 1.0)
     # Without scattering to speak of between them, all rays are where the light enters and where it enters again.
-    far, near = (on_mesh(CollimatedBeam(DOWN, 1.0, spot, from_center=near), both) for near in (False, True))
-    assert far.starts[:, 2].max() == pytest.approx(10.0)
-    assert near.starts[:, 2].max() == pytest.approx(0.0)
-    assert near.incident == pytest.approx(far.incident, rel=1e-9)
+    far, near = (
+        deposit_on_mesh(CollimatedBeam(DOWN, 1.0, spot, from_center=near), both, MATCHED) for near in (False, True)
+    )
+    assert far.terms.segments.starts[:, 2].max() == pytest.approx(10.0)
+    assert near.terms.segments.starts[:, 2].max() == pytest.approx(0.0)
+    assert near.ledger.incident == pytest.approx(far.ledger.incident, rel=1e-9)
 
 
 def test_a_few_bright_pixels_are_found() -> None:
@@ -160,13 +162,13 @@ def test_a_few_bright_pixels_are_found() -> None:
 @pytest.mark.parametrize("spot", SPOTS.values(), ids=SPOTS)
 def test_places_that_are_looked_at_are_bright_and_all_over_the_spot(spot: Spot) -> None:
     direction = np.array([0.0, 0.6, -0.8])
-    offsets = spot.looks(2000, direction)
+    offsets = spot.samples(2000, direction)
     bright = spot.brightness(offsets, direction) > 0
     assert bright.mean() > 0.99
-    assert spot.away(offsets, direction) == pytest.approx(np.zeros(len(offsets)), abs=1e-9 * spot.reach)
+    assert spot.distances(offsets, direction) == pytest.approx(np.zeros(len(offsets)), abs=1e-9 * spot.reach)
     beyond = 3.0 * spot.reach * np.cross(direction, [1.0, 0.0, 0.0])[None]
     assert not spot.brightness(beyond, direction).any()
-    assert spot.away(beyond, direction)[0] >= 2.0 * spot.reach - 1e-9
+    assert spot.distances(beyond, direction)[0] >= 2.0 * spot.reach - 1e-9
 
 
 @pytest.mark.parametrize(

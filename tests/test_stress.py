@@ -20,7 +20,7 @@ from tetlux.cases.stress.command import stress
 from tetlux.cases.stress.files import COLUMNS, FILES
 from tetlux.cases.stress.grid import PANELS
 from tetlux.cases.stress.measure import Diagnostics, measure
-from tetlux.cases.stress.meshes import ball_of_layers, degrade
+from tetlux.cases.stress.meshes import degrade, layered_ball
 from tetlux.cases.stress.panels import Axis, Panel, Value
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
@@ -115,7 +115,7 @@ def test_every_panel_makes_its_scenes() -> None:
 
 
 def test_bad_tetrahedra_are_as_bad_as_asked_for_and_the_same_each_time() -> None:
-    good = ball_of_layers(1.0, 2, 5)
+    good = layered_ball(1.0, 2, 5)
     assert good.quality.min() > 0.3
     mesh = degrade(good, 1e-4)
     assert mesh.quality.min() == pytest.approx(1e-4, rel=0.01)
@@ -125,7 +125,7 @@ def test_bad_tetrahedra_are_as_bad_as_asked_for_and_the_same_each_time() -> None
 
 
 def test_a_core_of_layers_is_a_region_of_its_own() -> None:
-    mesh = ball_of_layers(2.0, 2, 5, core=3)
+    mesh = layered_ball(2.0, 2, 5, core=3)
     radii = np.linalg.norm(mesh.points[mesh.tetrahedra], axis=2)
     assert (radii[mesh.regions == 1] < 1.2 + 1e-9).all()
     assert (radii[mesh.regions == 0].max(axis=1) > 1.2 + 1e-9).all()
@@ -188,12 +188,14 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("kind", scenarios.LENGTH_KINDS[:4])
 def test_lengths_are_compared_with_scale_1(kind: str) -> None:
-    scenario = scenarios.by_length(1e3, kind)
+    scenario = scenarios.ball_by_length_and_light(1e3, kind)
     diagnostics = measure(scenario, DEFAULT)
     assert diagnostics.scaling is not None
     assert diagnostics.scaling < 1e-8
     assert scenario.unit_scale is not None
-    other = replace(scenario, unit_scale=replace(scenario.unit_scale, medium=scenarios.turbid(0.98, free_path=0.1)))
+    other = replace(
+        scenario, unit_scale=replace(scenario.unit_scale, medium=scenarios.medium_of_albedo(0.98, free_path=0.1))
+    )
     assert (measure(other, DEFAULT).scaling or 0.0) > 1e-3
 
 
@@ -247,7 +249,7 @@ def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[st
     out = tmp_path / "map"
     grid = [
         panel(scenarios.diffuse_by_decay_and_albedo, 1.0, 0.9, DEFAULT, CONSISTENT, name="fine"),
-        panel(scenarios.by_radius_and_depth, 0.1, 0.01, name="small"),
+        panel(scenarios.point_by_radius_and_depth, 0.1, 0.01, name="small"),
     ]
     assert stress(out, panels=grid) == 0
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)

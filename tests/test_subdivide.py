@@ -8,8 +8,8 @@ from tetlux.fem.exact import half_space
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import slab
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 
 def smallest_angle(points: FloatArray, faces: IntArray) -> float:
@@ -24,12 +24,12 @@ def test_a_closed_surface_stays_closed_and_its_triangles_do_not_get_thin() -> No
     points, faces = plate.points, plate.faces
     thinnest = smallest_angle(points, faces)
     for _ in range(12):
-        edges = ends, _ = edges_of(faces)
+        edges = ends, _ = number_triangle_edges(faces)
         near = np.linalg.norm(points[ends].mean(axis=1) - [1.0, 2.0, 0.0], axis=1)
         marked = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1) > 0.5 * near
-        points, faces, parents = split_edges(points, faces, edges, with_longest(points, edges, marked))
+        points, faces, parents = split_edges(points, faces, edges, mark_longest_edges(points, edges, marked))
         assert len(parents) == len(faces)
-    _, edge = edges_of(faces)
+    _, edge = number_triangle_edges(faces)
     assert (np.bincount(edge.ravel()) == 2).all()
     assert np.isclose(triangle_areas(points, faces)[1].sum(), plate.area)
     assert np.isclose(signed_volume(points, faces), plate.volume)

@@ -205,9 +205,9 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
         sources = sources_of([point, wide], Body(ball, (TISSUE,)), "half-space")
         assert len(sources.charges[0].positions) > 1
         assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
-        assert sum(float(d.powers.sum()) for d in sources.on_mesh) + sum(
+        assert sum(float(d.terms.powers.sum()) for d in sources.remaining) + sum(
             float(c.strengths[: c.sources].sum()) for c in sources.charges
-        ) == pytest.approx(sum(float(d.powers.sum()) for d in sources.deposits))
+        ) == pytest.approx(sum(float(d.terms.powers.sum()) for d in sources.deposits))
         assert len(sources.charges) >= 1 + most
 
 

@@ -302,7 +302,7 @@ def test_self_intersections_are_those_of_every_edge_with_every_triangle(roughnes
 
 @pytest.mark.parametrize("portion", [1 << 18, 50])
 def test_boxes_that_overlap_are_found_once(portion: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(proximity, "PORTION", portion)
+    monkeypatch.setattr(proximity, "BOX_PAIRS_AT_ONCE", portion)
     random = np.random.default_rng(0)
     low = random.uniform(size=(300, 3))
     # Sizes over three orders of magnitude, and some boxes that are points.

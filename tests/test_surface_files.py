@@ -20,7 +20,7 @@ from tetlux.meshing.files.formats.ply import read_ply
 from tetlux.meshing.files.formats.scene import check_gltf
 from tetlux.meshing.files.formats.stl import read_stl
 from tetlux.meshing.host.quiet import quiet
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.triangles import signed_volume
 
 BALL = sphere(10.0, subdivisions=2)
 CUBE = b"v 0 0 0\nv 0 0 2\nv 0 2 0\nv 0 2 2\nv 2 0 0\nv 2 0 2\nv 2 2 0\nv 2 2 2\n"

@@ -28,7 +28,7 @@ from tetlux.meshing.mesher import api as mesher
 from tetlux.meshing.mesher import child as child_mesher
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.repair.topology import bodies
-from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.refine import move_to_surface
 
 
 def test_the_mesher_fills_the_body(ball: Surface, ball_mesh: TetMesh) -> None:
@@ -187,7 +187,7 @@ def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
     """A cube whose nodes are called onto a ball far larger: corners would be drawn out, faces pushed flat."""
     cube = block((4, 4, 4), (2.0, 2.0, 2.0))
     target = sphere(2.0, center=(0.0, 0.0, -1.0))
-    moved = moved_to_surface(cube, target)
+    moved = move_to_surface(cube, target)
     assert moved.volume > 1.1 * cube.volume
     assert (moved.volumes >= 0.399 * cube.volumes).all()
     assert (moved.quality >= np.minimum(cube.quality, np.maximum(0.1, 0.4 * cube.quality)) - 1e-9).all()
@@ -196,7 +196,7 @@ def test_a_move_to_the_surface_spares_the_tetrahedra() -> None:
 def test_a_move_to_the_surface_does_not_shrink_tetrahedra_away() -> None:
     """All nodes are on the boundary, and called to a tenth of their distance: shapes would stay as they are."""
     cube = block((1, 1, 1), (2.0, 2.0, 2.0))
-    moved = moved_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
+    moved = move_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
     assert (moved.volumes >= 0.399 * cube.volumes).all()
     assert moved.volume < 0.9 * cube.volume
 
@@ -212,7 +212,7 @@ def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(mesher, "run_pytetwild", run)
     assert len(tetrahedralize(box((1.0, 1.0, 1.0)), cache=False).tetrahedra) == len(cube.tetrahedra)
-    assert given[1] == pytest.approx(mesher.SECOND * given[0])
+    assert given[1] == pytest.approx(mesher.SECOND_ATTEMPT * given[0])
 
 
 def test_a_mesh_that_lost_a_part_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -294,9 +294,9 @@ def _lives(pid: int) -> bool:
 @pytest.mark.parametrize("found", [True, False])
 def test_pytetwild_is_loaded_without_pyvista_and_if_need_be_with_it(found: bool) -> None:
     code = (
-        "import importlib.util, sys; from tetlux.meshing.mesher._mesher_process import _without_package;"
+        "import importlib.util, sys; from tetlux.meshing.mesher._mesher_process import _import_tetrahedralize;"
         "folder = importlib.util.find_spec('pytetwild').submodule_search_locations[0];"
-        f"function = _without_package(folder if {found} else '/nowhere');"
+        f"function = _import_tetrahedralize(folder if {found} else '/nowhere');"
         "print(function.__name__, 'pyvista' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -11,7 +11,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.exact import sphere_light
 from tetlux.fem.media.coefficients import coefficients_of
-from tetlux.fem.sources.deposit import Light
+from tetlux.fem.sources.light import Light
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import warnings_for, warnings_for_regions
 from tetlux.meshing import Surface, TetMesh, cylinder, sphere, tetrahedralize

@@ -1,4 +1,4 @@
-"""What runs in NGSolve's own process: netgen meshes the exact shape, NGSolve solves the same equation on it.
+"""The program of NGSolve's own process: netgen meshes the exact shape, NGSolve solves the same equation on it.
 
 NGSolve (LGPL) is an optional peer on the chart (``pip install "tetlux[peers]"``); nothing else imports it.
 """
@@ -12,14 +12,14 @@ import numpy as np
 
 from tetlux.meshing.surface.surface import Surface
 
-# Rounds of Newton's method that find a point of a curved facet; the facets are nearly flat.
-ROUNDS = 3
+# Newton steps to find a point on a curved facet; few are enough, since facets are nearly flat.
+NEWTON_STEPS = 3
 # Relative residual of the linear solver.
 RESIDUAL = 1e-9
 
 
 def main(job_path: str, result_path: str) -> None:
-    """Solve the job in ``job_path`` (npz), and leave exitance, seconds and sizes in ``result_path`` (npz)."""
+    """Solve the job in ``job_path`` (npz), and write exitance, seconds and sizes to ``result_path`` (npz)."""
     import ngsolve  # noqa: PLC0415
 
     with np.load(job_path) as data:
@@ -40,7 +40,7 @@ def main(job_path: str, result_path: str) -> None:
 
 
 def _solve(job: dict[str, Any]) -> tuple[Any, Any]:
-    """Make a mesh and the fluence on it."""
+    """Make a mesh and compute the fluence on it."""
     import ngsolve as ng  # noqa: PLC0415
 
     order = int(job["order"])
@@ -65,7 +65,7 @@ def _solve(job: dict[str, Any]) -> tuple[Any, Any]:
 
 
 def _mesh(job: dict[str, Any]) -> Any:
-    """Mesh the exact shape, as finely as ``resolution`` (netgen's grading) says; curved from the second order on."""
+    """Mesh the exact shape with ``resolution`` as netgen's grading; elements of order 2 and more are curved."""
     import ngsolve as ng  # noqa: PLC0415
     from netgen.meshing import MeshingParameters  # noqa: PLC0415
 
@@ -80,7 +80,7 @@ def _mesh(job: dict[str, Any]) -> Any:
 
 
 def _geometry(job: dict[str, Any]) -> Any:
-    """The exact shape; a torus by OpenCASCADE, since netgen's own often cannot be meshed."""
+    """The exact shape; a torus by OpenCASCADE, since netgen often fails to mesh its own torus."""
     from netgen import csg, occ  # noqa: PLC0415
 
     sizes, center = job["sizes"].tolist(), job["center"].tolist()
@@ -100,21 +100,21 @@ def _geometry(job: dict[str, Any]) -> Any:
 
 
 def _evaluate_on_surface(mesh: Any, fluence: Any, samples: Any) -> Any:
-    """Fluence on the curved facets where they are nearest to samples (n, 3), (n,)."""
+    """Fluence at the points of the curved facets nearest to samples (n, 3), (n,)."""
     import ngsolve as ng  # noqa: PLC0415
 
     corners = np.asarray(mesh.ngmesh.Coordinates())
     facets = np.array([[vertex.nr for vertex in element.vertices] for element in mesh.Elements(ng.BND)])
     near, facet = Surface(corners, facets, "mm", "netgen").closest(samples)
     last = corners[facets[facet, 2]]
-    # NGSolve's coordinates in a triangle are the weights of its first two corners.
+    # NGSolve's coordinates in a triangle are the barycentric coordinates of its first two corners.
     slope = np.linalg.pinv(np.stack([corners[facets[facet, 0]] - last, corners[facets[facet, 1]] - last], axis=2))
     place = np.einsum("nij,nj->ni", slope, near - last)
     inside = np.mean([corners[vertex.nr] for vertex in mesh[ng.ElementId(ng.VOL, 0)].vertices], axis=0)
     where = np.repeat(mesh(*inside[:, None]), len(samples))
     where["VorB"], where["nr"] = 1, facet
     position = ng.CF((ng.x, ng.y, ng.z))
-    for _ in range(ROUNDS):
+    for _ in range(NEWTON_STEPS):
         where["x"], where["y"] = place.T
         place += np.einsum("nij,nj->ni", slope, samples - position(where))
     where["x"], where["y"] = place.T

@@ -1,4 +1,4 @@
-"""What runs in redbirdpy's own process: linear elements on a mesh that is given, by this project's mesher.
+"""The program of redbirdpy's own process: linear elements on a mesh made by this project's mesher.
 
 redbirdpy is under the GPL, an optional peer on the chart (``pip install "tetlux[peers]"``). This file is a program
 of its own: it imports nothing of tetlux, nothing of tetlux imports it, and they exchange files.
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def main(job_path: str, result_path: str) -> None:
-    """Solve the job in ``job_path`` (npz), and leave fluence at the nodes and seconds in ``result_path`` (npz)."""
+    """Solve the job in ``job_path`` (npz), and write fluence at the nodes and seconds to ``result_path`` (npz)."""
     import redbirdpy  # noqa: PLC0415
 
     with np.load(job_path) as data:
@@ -27,7 +27,7 @@ def main(job_path: str, result_path: str) -> None:
 
 def _solve(redbirdpy: Any, job: dict[str, Any]) -> Any:
     nodes, cells = job["nodes"], job["tetrahedra"]
-    # Its boundary term is (1 - R)/(1 + R)/2, ours 1/(2A).
+    # redbirdpy's boundary term is (1 - R)/(1 + R)/2, that of tetlux is 1/(2A).
     reflection = (1.0 - 2.0 * float(job["robin"])) / (1.0 + 2.0 * float(job["robin"]))
     scattering = 1.0 / (3.0 * float(job["diffusion"])) - float(job["sigma_a"])
     config, _ = redbirdpy.meshprep(
@@ -37,16 +37,16 @@ def _solve(redbirdpy: Any, job: dict[str, Any]) -> Any:
             "seg": np.ones(len(cells), dtype=int),
             "prop": np.array([[0.0, 0.0, 1.0, 1.0], [float(job["sigma_a"]), scattering, 0.0, float(job["eta"])]]),
             "reff": reflection,
-            # With a direction it would move them a mean free path along that.
+            # With a direction redbirdpy would move the sources by a mean free path along it.
             "srcpos": job["points"],
             "srcdir": np.zeros((1, 3)),
-            # It asks for a detector.
+            # redbirdpy requires a detector.
             "detpos": job["points"][:1],
             "detdir": np.zeros((1, 3)),
             "omega": 0.0,
         }
     )
-    # The quickest of its solvers for a symmetric, positive matrix.
+    # The fastest of its solvers for a symmetric positive definite matrix.
     _, fluence = redbirdpy.runforward(config, method="cg+amg", spd=True)
     return np.asarray(fluence)[:, : len(job["points"])] @ job["powers"]
 

@@ -1,4 +1,4 @@
-"""A benchmark: a case, the points where its exitance is measured, and the true exitance there."""
+"""`Benchmark`: a case, sample points of its surface, and the reference exitance there."""
 
 from dataclasses import dataclass
 
@@ -9,30 +9,30 @@ from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.file.case import Case
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact.registry import ideal_sources
-from tetlux.fem.grading import lit_points
+from tetlux.fem.grading import places_to_resolve
 from tetlux.fem.lights import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.surface.solids import Shape
 
-# Other programs of the machine disturb a run: a short one is repeated so many times.
+# Short runs are repeated this many times, since other processes disturb their timing.
 REPEATS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Benchmark:
-    """A case that methods are measured on.
+    """A case on which methods are compared.
 
     Attributes
     ----------
     case : Case
     deposits : list of Deposit
-        What its lights leave in the body.
+        The deposits of its lights.
     samples : Samples
-        Where exitance is compared.
+        Points where exitance is compared.
     reference : Reference
     repeats : int
-        How often a short run is made at most; the quickest counts.
+        How many times a short run is made; the fastest counts.
     """
 
     case: Case
@@ -43,22 +43,23 @@ class Benchmark:
 
     @property
     def shape(self) -> Shape | None:
-        """The built-in shape of its surface, if that has one."""
+        """The built-in shape of the surface, if it has one."""
         return self.case.surface.shape
 
     @property
     def lit(self) -> tuple[FloatArray, FloatArray]:
-        """See `tetlux.fem.grading.lit_points`."""
-        return lit_points(self.deposits)
+        """Points where light is deposited, and the lengths to resolve there; see `places_to_resolve`."""
+        return places_to_resolve(self.deposits)
 
     @property
     def sources(self) -> list[tuple[FloatArray, float]]:
-        """Positions (3,) and powers, W, of all points where light is deposited."""
-        return [(point, float(power)) for d in self.deposits for point, power in zip(d.points, d.powers, strict=True)]
+        """Positions (3,) and powers, W, of all point deposits."""
+        terms = [deposit.terms for deposit in self.deposits]
+        return [(point, float(power)) for t in terms for point, power in zip(t.points, t.powers, strict=True)]
 
     @property
-    def in_points(self) -> bool:
-        """Whether all light is deposited in points."""
+    def has_point_sources(self) -> bool:
+        """Whether all deposits are points."""
         sources = ideal_sources(self.deposits)
         return sources is not None and sources.are_points
 
@@ -67,25 +68,25 @@ class Benchmark:
         return relative_error(exitance, self.reference.exitance, self.samples.weights)
 
 
-def benchmark_of(case: Case, *, quick: bool = False) -> Benchmark:
-    """Take samples of a case, and find the true exitance there.
+def prepare_benchmark(case: Case, *, quick: bool = False) -> Benchmark:
+    """Choose sample points of a case, and compute the reference exitance there.
 
     Raises
     ------
     RunError
-        If the run that is to be the reference fails, no light leaves the body, or it has several media.
+        If the case has several media, the reference run fails, or no light leaves the body.
     """
-    if not case.is_simple:
-        raise RunError("a chart is of one channel and one even medium; leave lists, regions and fields out.")
+    if not case.has_single_medium:
+        raise RunError("a chart needs one channel and one uniform medium; leave lists, regions and fields out.")
     surface, medium = case.surface, case.medium
     deposits = [light.deposit_in(Body(surface, (medium,))) for light in case.lights]
-    samples = surface_samples(surface, *lit_points(deposits))
-    measured = closed_form_reference(surface.shape, medium, deposits, samples)
-    if measured is None:
-        # A surface is more than its triangles where these stand for a curve.
+    samples = surface_samples(surface, *places_to_resolve(deposits))
+    referenced = closed_form_reference(surface.shape, medium, deposits, samples)
+    if referenced is None:
+        # Triangles may stand for a smooth surface: move the samples onto it.
         samples = samples._replace(points=surface.project(samples.points)[0])
-        measured = samples, finer_run_reference(case, samples, quick=quick)
-    samples, reference = measured
+        referenced = samples, finer_run_reference(case, samples, quick=quick)
+    samples, reference = referenced
     if not np.max(reference.exitance, initial=0.0) > 0:
-        raise RunError("no light leaves the body, so there is nothing to measure.")
+        raise RunError("no light leaves the body; give a smaller or less absorbing one.")
     return Benchmark(case, deposits, samples, reference, 1 if quick else REPEATS)

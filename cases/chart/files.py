@@ -1,4 +1,4 @@
-"""What a chart writes: a table, the same as JSON, and a picture."""
+"""The files of a chart: a table, the same as JSON, and a picture."""
 
 import csv
 import json
@@ -11,31 +11,27 @@ from typing import Any
 
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.picture import draw_chart
-from tetlux.cases.chart.runs import Charted, Measurement, exponents
-from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.chart.runs import MeasuredBenchmark, Measurement, exponents
+from tetlux.cases.write.publish import replace_files
 from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
 FILES = ("chart.csv", "chart.png", "chart.json")
 
 
-def write_chart(charted: Sequence[Charted], out: Path) -> None:
-    """Write the three files, whole: into a folder beside them first.
+def write_chart(measured: Sequence[MeasuredBenchmark], out: Path) -> None:
+    """Write the three files, all or none.
 
     Raises
     ------
     RunError
         If they cannot be written.
     """
-    with claimed(out, ".") as folder:
-        try:
-            _write_table([run for one in charted for run in one.runs], folder / "chart.csv")
-            draw_chart(charted, folder / "chart.png")
-            text = json.dumps(as_data(charted), indent=2, allow_nan=False)
-            (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
-            publish(folder, out, FILES)
-        except OSError as error:
-            raise cannot_write(out, error) from error
+    with replace_files(out, FILES) as folder:
+        _write_table([run for entry in measured for run in entry.runs], folder / "chart.csv")
+        draw_chart(measured, folder / "chart.png")
+        text = json.dumps(as_data(measured), indent=2, allow_nan=False)
+        (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
 
 
 def _write_table(runs: Sequence[Measurement], path: Path) -> None:
@@ -45,27 +41,27 @@ def _write_table(runs: Sequence[Measurement], path: Path) -> None:
         writer.writerows(asdict(run) for run in runs)
 
 
-def as_data(charted: Sequence[Charted]) -> dict[str, Any]:
-    """The chart as plain data."""
+def as_data(measured: Sequence[MeasuredBenchmark]) -> dict[str, Any]:
+    """Convert a chart to plain data."""
     return {
-        "cases": {one.benchmark.case.name: _case_as_data(one) for one in charted},
-        "runs": [asdict(run) for one in charted for run in one.runs],
-        "seconds": "from the surface in memory to the exitance at the surface; imports and the mesh cache do not count",
+        "cases": {entry.benchmark.case.name: _case_as_data(entry) for entry in measured},
+        "runs": [asdict(run) for entry in measured for run in entry.runs],
+        "seconds": "from the surface in memory to the exitance at the surface, without imports and mesh cache",
         "error": "relative L2 error of the exitance over the samples of the surface; for Monte Carlo, which solves "
-        "radiative transfer, the difference of the two models",
+        "radiative transfer, the difference between the two models",
         "machine": {"cores": os.cpu_count(), "processor": platform.machine()},
         "versions": {"python": platform.python_version()}
         | installed_versions((*LIBRARIES, *(peer.package for peer in PEERS))),
     }
 
 
-def _case_as_data(charted: Charted) -> dict[str, Any]:
-    benchmark = charted.benchmark
+def _case_as_data(measured: MeasuredBenchmark) -> dict[str, Any]:
+    benchmark = measured.benchmark
     surface, reference = benchmark.case.surface, benchmark.reference
     return {
         "unit": surface.unit,
         "triangles": len(surface.faces),
         "samples": len(benchmark.samples.points),
         "reference": {"kind": reference.kind, "is": reference.description, "error": reference.error},
-        "exponents": exponents(charted.runs),
+        "exponents": exponents(measured.runs),
     }

@@ -1,4 +1,4 @@
-"""Methods of the chart: the finite elements of this project, plain and with what it adds to them."""
+"""Methods of the chart: tetlux's finite elements, plain and with grading, adaptivity and subtraction."""
 
 import time
 from collections.abc import Callable
@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.methods import Method, Outcome, fastest_run
-from tetlux.fem.grading import graded_towards
+from tetlux.fem.grading import grade_mesh
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
@@ -21,14 +21,14 @@ MOST_TETRAHEDRA = 2_000_000
 
 
 def _time_solution(benchmark: Benchmark, solution_for: Callable[[Surface], Solution]) -> Outcome:
-    """Time what makes a solution of a surface."""
+    """Time a function that solves on a surface."""
 
     def run() -> Outcome:
-        # A copy that has nothing cached from earlier runs.
+        # A copy, which has no cached results of earlier runs.
         surface = replace(benchmark.case.surface)
         started = time.perf_counter()
         solution = solution_for(surface)
-        solution.exitance  # noqa: B018 - computed when first asked for
+        solution.exitance  # noqa: B018 - computed at first access
         seconds = time.perf_counter() - started
         return Outcome(
             solution.exitance_at(benchmark.samples.points),
@@ -44,7 +44,7 @@ def _time_solution(benchmark: Benchmark, solution_for: Callable[[Surface], Solut
 def _on_mesh(
     mesh_for: Callable[[Benchmark, Surface, float], TetMesh], subtract: Subtract
 ) -> Callable[[Benchmark, float], Outcome]:
-    """Runs on a mesh that is made first, whatever the error."""
+    """Make a method that solves once, on a given kind of mesh."""
 
     def run(benchmark: Benchmark, value: float) -> Outcome:
         case = benchmark.case
@@ -66,13 +66,13 @@ def _uniform_mesh(_benchmark: Benchmark, surface: Surface, refinements: float) -
 
 
 def graded_mesh(benchmark: Benchmark, surface: Surface, longest: float) -> TetMesh:
-    """A mesh whose edges are no longer than `longest` times their distance from the light."""
+    """Make a mesh whose edges are at most `longest` times their distance from the light."""
     mesh = tetrahedralize(surface, cache=False)
-    return graded_towards(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest)
+    return grade_mesh(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest)
 
 
 def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:
-    """Runs that refine until their own estimate meets a tolerance."""
+    """Make a method that refines until the estimated error meets a tolerance."""
 
     def run(benchmark: Benchmark, tolerance: float) -> Outcome:
         case = benchmark.case
@@ -93,8 +93,8 @@ def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:
     return run
 
 
-def _in_points(benchmark: Benchmark) -> bool:
-    return benchmark.in_points
+def _has_point_sources(benchmark: Benchmark) -> bool:
+    return benchmark.has_point_sources
 
 
 def _has_light_to_grade_to(benchmark: Benchmark) -> bool:
@@ -115,9 +115,19 @@ FINITE_ELEMENTS = (
         _has_light_to_grade_to,
     ),
     Method("P1, adaptive", "tolerance", TOLERANCES, _adaptive("nothing"), quick=2),
-    Method("free-space subtracted, adaptive", "tolerance", (*TOLERANCES, 0.005), _adaptive("free-space"), _in_points),
     Method(
-        "half-space subtracted, uniform", "refinements", REFINEMENTS, _on_mesh(_uniform_mesh, "half-space"), _in_points
+        "free-space subtracted, adaptive",
+        "tolerance",
+        (*TOLERANCES, 0.005),
+        _adaptive("free-space"),
+        _has_point_sources,
+    ),
+    Method(
+        "half-space subtracted, uniform",
+        "refinements",
+        REFINEMENTS,
+        _on_mesh(_uniform_mesh, "half-space"),
+        _has_point_sources,
     ),
     Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("half-space"), quick=2),
 )

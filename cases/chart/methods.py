@@ -1,4 +1,4 @@
-"""What a method of the chart is, and what one run of it gives."""
+"""`Method` of the chart, and the `Outcome` of one run."""
 
 import time
 from collections.abc import Callable
@@ -7,26 +7,26 @@ from dataclasses import dataclass
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.meshing.arrays import FloatArray
 
-# Runs that take longer than this together, seconds, are not repeated.
+# A run is not repeated once its repetitions have taken this long together, seconds.
 REPEAT_SECONDS = 2.0
-# A tolerance that is measured against a finer run is no less than so many times that run's own error.
+# A tolerance is at least this many times the error of the reference, if that is a finer run.
 COARSER = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What one run of a method gave.
+    """The result of one run of a method.
 
     Attributes
     ----------
     exitance : (n,) ndarray
-        At the samples of the benchmark, W/unit².
+        Exitance at the samples of the benchmark, W/unit².
     seconds : float
         From the surface in memory to the exitance at the surface.
     unknowns, tetrahedra : int or None
-        None for what has no mesh.
+        None without a mesh.
     estimate : float or None
-        What the method itself believes its error to be.
+        The method's own estimate of its error.
     """
 
     exitance: FloatArray
@@ -38,30 +38,30 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to the exitance, with one number that sets its resolution.
+    """A way to compute the exitance, with one number that sets its resolution.
 
     Attributes
     ----------
     name : str
     parameter : str
-        What the number is called.
-    ladder : tuple of float
+        Name of that number.
+    values : tuple of float
         Its values, the coarsest first.
     run : callable
-        One run on a benchmark.
+        Makes one run on a benchmark.
     fits : callable
-        Whether it can do a benchmark.
+        Whether the method applies to a benchmark.
     comparable : bool
-        False if what is called its error is a difference of models: it does not compete for the front then.
+        False if its error is a difference between models, which keeps it out of the Pareto front.
     quick : int
         How many of the values a quick chart takes.
     warm_up : callable
-        What is done once, untimed, before the first run on a benchmark.
+        Called once, untimed, before the first run on a benchmark.
     """
 
     name: str
     parameter: str
-    ladder: tuple[float, ...]
+    values: tuple[float, ...]
     run: Callable[[Benchmark, float], Outcome]
     fits: Callable[[Benchmark], bool] = lambda _: True
     comparable: bool = True
@@ -69,13 +69,13 @@ class Method:
     warm_up: Callable[[Benchmark], object] = lambda _: None
 
     def label(self, value: float) -> str:
-        """The parameter and a value of it, as in ``tolerance=0.02``."""
+        """Format the parameter and a value, as in ``tolerance=0.02``."""
         return f"{self.parameter}={value:.10g}" if self.parameter else ""
 
-    def ladder_for(self, benchmark: Benchmark, *, quick: bool = False) -> tuple[float, ...]:
-        """The values that the reference of a benchmark is good enough for; a few of them if `quick`."""
+    def values_for(self, benchmark: Benchmark, *, quick: bool = False) -> tuple[float, ...]:
+        """The values for which the reference of a benchmark is accurate enough; if `quick`, the first few."""
         least = COARSER * benchmark.reference.error if self.parameter == "tolerance" else 0.0
-        values = tuple(value for value in self.ladder if value >= least)
+        values = tuple(value for value in self.values if value >= least)
         return values[: self.quick] if quick else values
 
 

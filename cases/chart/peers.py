@@ -1,4 +1,4 @@
-"""Other people's solvers on the chart, where they are installed: each run is a process of its own."""
+"""Other solvers on the chart, if they are installed; each run is a process of its own."""
 
 import importlib.util
 import subprocess
@@ -19,7 +19,7 @@ from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
 from tetlux.meshing.surface.solids import Slab, Sphere, Torus
 
-# Seconds until a peer is stopped.
+# A peer is stopped after this many seconds.
 TIME_LIMIT = 300.0
 # Netgen's longest edge, as a share of the body's mean thickness 2 V/A.
 LONGEST = 0.75
@@ -33,7 +33,7 @@ class Peer:
     ----------
     name : str
     package : str
-        What has to be installed.
+        The Python package that it needs.
     methods : tuple of Method
     """
 
@@ -42,13 +42,13 @@ class Peer:
     methods: tuple[Method, ...]
 
     @property
-    def installed(self) -> bool:
-        """Whether its package can be imported here; it is not imported to find out."""
+    def is_installed(self) -> bool:
+        """Whether its package is installed; found out without importing it."""
         return importlib.util.find_spec(self.package) is not None
 
 
 def _problem(benchmark: Benchmark) -> dict[str, Any]:
-    """The equation and its sources, as any solver needs them."""
+    """The equation and its sources, as every peer needs them."""
     medium = benchmark.case.medium
     return {
         "diffusion": medium.diffusion,
@@ -64,7 +64,7 @@ def _problem(benchmark: Benchmark) -> dict[str, Any]:
 
 
 def run_peer(script: str, job: dict[str, Any]) -> dict[str, Any]:
-    """Run a script of this folder on a job in a process of its own, and return what it leaves.
+    """Run a script of this folder on a job in a process of its own, and return its result.
 
     Raises
     ------
@@ -74,15 +74,15 @@ def run_peer(script: str, job: dict[str, Any]) -> dict[str, Any]:
     with scratch("peer") as folder:
         job_path, result_path = folder / "job.npz", folder / "result.npz"
         np.savez(job_path, **job)
-        # -P: modules of this folder must not be imported in place of others of the same name.
+        # -P keeps modules of this folder from shadowing others of the same name.
         command = [sys.executable, "-P", str(Path(__file__).with_name(script)), str(job_path), str(result_path)]
         try:
             done = run_child(command, folder, TIME_LIMIT)
         except subprocess.TimeoutExpired as error:
             raise RunError(f"stopped after {TIME_LIMIT:g} s") from error
         if done.returncode != 0 or not result_path.exists():
-            said = (done.stderr.strip().splitlines() or ["no message"])[-1]
-            raise RunError(f"signal {-done.returncode}" if done.returncode < 0 else said)
+            last_line = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            raise RunError(f"signal {-done.returncode}" if done.returncode < 0 else last_line)
         with np.load(result_path) as data:
             return {key: data[key] for key in data.files}
 
@@ -99,7 +99,7 @@ def _exact_shape(benchmark: Benchmark) -> dict[str, Any]:
 
 
 def _ngsolve(order: int) -> Callable[[Benchmark, float], Outcome]:
-    """Netgen on the exact shape, graded towards the source; curved elements from the second order on."""
+    """Make a method that solves with NGSolve on netgen's mesh of the exact shape, graded towards the source."""
 
     def run(benchmark: Benchmark, grading: float) -> Outcome:
         surface = benchmark.case.surface
@@ -116,7 +116,7 @@ def _ngsolve(order: int) -> Callable[[Benchmark, float], Outcome]:
 
 
 def _redbird(benchmark: Benchmark, longest: float) -> Outcome:
-    """Its solver on this project's graded mesh, whose seconds count."""
+    """Solve with redbirdpy on tetlux's graded mesh; the seconds include meshing."""
     surface = replace(benchmark.case.surface)
     started = time.perf_counter()
     mesh = graded_mesh(benchmark, surface, longest)
@@ -132,12 +132,12 @@ def _redbird(benchmark: Benchmark, longest: float) -> Outcome:
     )
 
 
-def _in_points(benchmark: Benchmark) -> bool:
-    return benchmark.in_points
+def _has_point_sources(benchmark: Benchmark) -> bool:
+    return benchmark.has_point_sources
 
 
 def _has_exact_shape(benchmark: Benchmark) -> bool:
-    return benchmark.in_points and isinstance(benchmark.shape, Sphere | Slab | Torus)
+    return benchmark.has_point_sources and isinstance(benchmark.shape, Sphere | Slab | Torus)
 
 
 PEERS = (
@@ -153,6 +153,6 @@ PEERS = (
     Peer(
         "redbirdpy",
         "redbirdpy",
-        (Method("redbirdpy P1", "longest edge over distance", GRADINGS[:-1], _redbird, _in_points),),
+        (Method("redbirdpy P1", "longest edge over distance", GRADINGS[:-1], _redbird, _has_point_sources),),
     ),
 )

@@ -1,4 +1,4 @@
-"""The picture of a chart: a row for each case, of error against seconds, and both against unknowns."""
+"""The picture of a chart: for each case a row of error over seconds, error over unknowns, seconds over unknowns."""
 
 import math
 import textwrap
@@ -14,16 +14,16 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.finite_elements import OURS
-from tetlux.cases.chart.models import MONTE_CARLO
-from tetlux.cases.chart.runs import Charted, Measurement, exponents
+from tetlux.cases.chart.meshless import MONTE_CARLO
+from tetlux.cases.chart.runs import MeasuredBenchmark, Measurement, exponents
 
 INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
-# Inches: the picture's width, a row's height and what of it is above and below the panels, and where these begin and
-# how wide they are. The last one is the key.
+# Inches: width of the picture, height of a row, margins above and below its panels; left edge and width of each panel,
+# the last of which is the key.
 WIDTH, ROW, ABOVE, BELOW = 16.0, 4.7, 0.6, 0.7
 PANELS = ((1.1, 3.7), (5.9, 2.4), (9.05, 2.4), (11.7, 4.2))
-WIDEST = 150  # characters of a line of notes
-# Columns of the key by their places: what their exponents are of, and their heads.
+WIDEST = 150  # most characters in a line of notes
+# Columns of the key, by position: the quantity whose exponent is shown, and the heading.
 KEY_COLUMNS = {0.89: ("error", "p"), 1.0: ("seconds", "q")}
 NOTE = (
     "Seconds: from the surface in memory to the exitance at the surface, meshing included, with nothing cached. "
@@ -32,15 +32,15 @@ NOTE = (
     "p, q: error ~ unknowns^p, seconds ~ unknowns^q, by least squares over the runs shown."
 )
 NOTE_OF_MONTE_CARLO = (
-    "Monte Carlo solves radiative transfer from the same sources: what is shown is the difference between that and "
-    "diffusion, an error of neither."
+    "Monte Carlo solves radiative transfer from the same sources; its value is the difference between the two models, "
+    "not an error."
 )
 NOTE_OF_FINER_RUN = (
-    "Dashed: the estimated error of a reference that is itself a finer run; errors near it or below mean little."
+    "Dashed: the estimated error of a reference that is a finer run; errors near or below it are not reliable."
 )
 
 
-class Look(NamedTuple):
+class Style(NamedTuple):
     """How a method is drawn."""
 
     color: str
@@ -50,68 +50,68 @@ class Look(NamedTuple):
     size: float = 7.5
 
 
-LOOKS = {
-    OURS: Look("#d1203f", "o", width=3.0, size=9.5),
-    "half-space subtracted, uniform": Look("#ef8a2c", "s"),
-    "free-space subtracted, adaptive": Look("#b8860b", "D"),
-    "P1, adaptive": Look("#12355b", "^"),
-    "P1, graded": Look("#3d7ebf", "v"),
-    "P1, uniform": Look("#8fbbe0", "<"),
-    "NGSolve P1": Look("#8fd18a", "P", size=9.0),
-    "NGSolve P2": Look("#4caf50", "P", size=9.0),
-    "NGSolve P3": Look("#1b5e20", "P", size=9.0),
-    "redbirdpy P1": Look("#8e44ad", "X", size=9.0),
-    "dipole alone": Look("#6d4c41", "*", "", size=14.0),
-    "half-space alone": Look("#ef8a2c", "*", "", size=14.0),
-    MONTE_CARLO.name: Look(FAINT, "x", ":"),
+STYLES = {
+    OURS: Style("#d1203f", "o", width=3.0, size=9.5),
+    "half-space subtracted, uniform": Style("#ef8a2c", "s"),
+    "free-space subtracted, adaptive": Style("#b8860b", "D"),
+    "P1, adaptive": Style("#12355b", "^"),
+    "P1, graded": Style("#3d7ebf", "v"),
+    "P1, uniform": Style("#8fbbe0", "<"),
+    "NGSolve P1": Style("#8fd18a", "P", size=9.0),
+    "NGSolve P2": Style("#4caf50", "P", size=9.0),
+    "NGSolve P3": Style("#1b5e20", "P", size=9.0),
+    "redbirdpy P1": Style("#8e44ad", "X", size=9.0),
+    "dipole alone": Style("#6d4c41", "*", "", size=14.0),
+    "half-space alone": Style("#ef8a2c", "*", "", size=14.0),
+    MONTE_CARLO.name: Style(FAINT, "x", ":"),
 }
 
 
-def draw_chart(charted: Sequence[Charted], path: Path) -> None:
+def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
     """Draw all cases.
 
     Parameters
     ----------
-    charted : sequence of Charted
+    measured : sequence of MeasuredBenchmark
     path : Path
-        Where the PNG goes, 2000 pixels wide.
+        The PNG to write, 2000 pixels wide.
     """
-    lines = _notes(charted)
+    lines = _notes(measured)
     foot = 0.35 + 0.25 * len(lines)
-    rows = len(charted)
+    rows = len(measured)
     height = ROW * rows + foot
     figure = Figure(figsize=(WIDTH, height), dpi=125, facecolor="white")
     FigureCanvasAgg(figure)
-    for row, one in enumerate(charted):
+    for row, entry in enumerate(measured):
         bottom = foot + ROW * (rows - 1 - row) + BELOW
         left, middle, right, key = (
             figure.add_axes((x / WIDTH, bottom / height, width / WIDTH, (ROW - BELOW - ABOVE) / height))
             for x, width in PANELS
         )
-        _draw_runs(one.runs, left, middle, right)
-        _draw_reference(one.benchmark, left, middle)
-        _draw_key(one.runs, key)
+        _draw_runs(entry.runs, left, middle, right)
+        _draw_reference(entry.benchmark, left, middle)
+        _draw_key(entry.runs, key)
     figure.text(
         PANELS[0][0] / WIDTH, 0.2 / height, "\n".join(lines), fontsize=12.5, color=INK, va="bottom", linespacing=1.3
     )
     figure.savefig(path)
 
 
-def _notes(charted: Sequence[Charted]) -> list[str]:
-    """What is to be read with the picture, in lines."""
+def _notes(measured: Sequence[MeasuredBenchmark]) -> list[str]:
+    """The lines of the notes below the picture."""
     lines = textwrap.wrap(NOTE, WIDEST)
-    if any(run.method == MONTE_CARLO.name for one in charted for run in one.runs):
+    if any(run.method == MONTE_CARLO.name for entry in measured for run in entry.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
-    if any(one.benchmark.reference.error > 0 for one in charted):
+    if any(entry.benchmark.reference.error > 0 for entry in measured):
         lines += textwrap.wrap(NOTE_OF_FINER_RUN, WIDEST)
     return lines
 
 
 def _draw_reference(benchmark: Benchmark, left: Axes, middle: Axes) -> None:
-    """Title a row with its case and reference, and draw the reference's own error."""
+    """Write the case and its reference above a row, and draw the error of the reference."""
     reference = benchmark.reference
     for axes in (left, middle):
-        # Below this line the reference is no better than what is measured against it.
+        # Below this line the reference is no more accurate than the runs.
         low, high = axes.get_ylim()
         if low < reference.error < high:
             axes.axhline(reference.error, color=INK, linestyle="--", linewidth=1.2, zorder=1.5)
@@ -133,16 +133,16 @@ def _draw_reference(benchmark: Benchmark, left: Axes, middle: Axes) -> None:
 def _draw_runs(runs: Sequence[Measurement], left: Axes, middle: Axes, right: Axes) -> None:
     """Error over seconds, error over unknowns, seconds over unknowns."""
     _draw_front(runs, left)
-    for name, look in LOOKS.items():
+    for name, style in STYLES.items():
         mine = [run for run in runs if run.method == name]
         sized = [run for run in mine if run.unknowns is not None]
         unknowns = [float(run.unknowns or 0) for run in sized]
-        _line(left, look, [run.seconds for run in mine], [run.error for run in mine])
-        _line(middle, look, unknowns, [run.error for run in sized])
-        _line(right, look, unknowns, [run.seconds for run in sized])
+        _plot_line(left, style, [run.seconds for run in mine], [run.error for run in mine])
+        _plot_line(middle, style, unknowns, [run.error for run in sized])
+        _plot_line(right, style, unknowns, [run.seconds for run in sized])
     error = "relative L2 error of exitance"
     for axes, below, beside in ((left, "seconds", error), (middle, "unknowns", error), (right, "unknowns", "seconds")):
-        _style(axes, below, beside)
+        _format_axes(axes, below, beside)
 
 
 def _draw_front(runs: Sequence[Measurement], axes: Axes) -> None:
@@ -159,8 +159,8 @@ def _draw_front(runs: Sequence[Measurement], axes: Axes) -> None:
     )
 
 
-def _style(axes: Axes, below: str, beside: str) -> None:
-    """Logarithmic axes with their labels."""
+def _format_axes(axes: Axes, below: str, beside: str) -> None:
+    """Make axes logarithmic and label them."""
     axes.set(xscale="log", yscale="log")
     axes.set_xlabel(below, fontsize=14, color=INK)
     axes.set_ylabel(beside, fontsize=14, color=INK)
@@ -172,23 +172,23 @@ def _style(axes: Axes, below: str, beside: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _line(axes: Axes, look: Look, x: list[float], y: list[float]) -> None:
+def _plot_line(axes: Axes, style: Style, x: list[float], y: list[float]) -> None:
     axes.plot(
         x,
         y,
-        color=look.color,
-        marker=look.marker,
-        linestyle=look.line,
-        linewidth=look.width,
-        markersize=look.size,
-        markeredgecolor=look.color if look.marker == "x" else "white",
-        markeredgewidth=1.2 if look.marker == "x" else 0.6,
-        zorder=look.width + 2.0,
+        color=style.color,
+        marker=style.marker,
+        linestyle=style.line,
+        linewidth=style.width,
+        markersize=style.size,
+        markeredgecolor=style.color if style.marker == "x" else "white",
+        markeredgewidth=1.2 if style.marker == "x" else 0.6,
+        zorder=style.width + 2.0,
     )
 
 
 def _tick(axis: Axis, limits: tuple[float, float], quantity: str) -> None:
-    """Label powers of ten, and values between them where an axis spans fewer than two."""
+    """Label powers of ten, and values between them if an axis spans fewer than two decades."""
     decades = math.log10(limits[1] / limits[0])
     between = (1.0, 2.0, 5.0) if decades < 1.0 else (1.0, 3.0) if decades < 2.0 else (1.0,)
     axis.set_major_locator(LogLocator(subs=between, numticks=12))
@@ -204,10 +204,10 @@ def _tick(axis: Axis, limits: tuple[float, float], quantity: str) -> None:
 
 
 def _draw_key(runs: Sequence[Measurement], axes: Axes) -> None:
-    """Methods with their exponents, in columns."""
+    """Draw the key: methods, and their exponents in columns."""
     fitted = exponents(runs)
-    shown = [name for name in LOOKS if name in fitted]
-    axes.set(xlim=(0.0, 1.0), ylim=(len(LOOKS), -1.0))
+    shown = [name for name in STYLES if name in fitted]
+    axes.set(xlim=(0.0, 1.0), ylim=(len(STYLES), -1.0))
     axes.axis("off")
     for x, (quantity, head) in KEY_COLUMNS.items():
         if any(fitted[name][quantity] is not None for name in shown):
@@ -215,13 +215,13 @@ def _draw_key(runs: Sequence[Measurement], axes: Axes) -> None:
     for y, name in enumerate(shown):
         _draw_key_of(name, fitted[name], y, axes)
     axes.plot([0.0, 0.08], [len(shown)] * 2, color=FRONT, linewidth=8.0, solid_capstyle="round", clip_on=False)
-    axes.text(0.12, len(shown), "not beaten (Pareto front)", fontsize=12, va="center", color=INK)
+    axes.text(0.12, len(shown), "Pareto front", fontsize=12, va="center", color=INK)
 
 
 def _draw_key_of(name: str, fitted: dict[str, float | None], y: float, axes: Axes) -> None:
-    look = LOOKS[name]
-    _line(axes, look._replace(marker="", size=0.0), [0.0, 0.08], [y, y])
-    _line(axes, look, [0.04], [y])
+    style = STYLES[name]
+    _plot_line(axes, style._replace(marker="", size=0.0), [0.0, 0.08], [y, y])
+    _plot_line(axes, style, [0.04], [y])
     axes.text(0.12, y, name, fontsize=12, va="center", color=INK, fontweight="bold" if name == OURS else None)
     for x, (quantity, _) in KEY_COLUMNS.items():
         exponent = fitted[quantity]

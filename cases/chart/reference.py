@@ -1,4 +1,4 @@
-"""The true exitance of a case: a closed form, or else a far finer run."""
+"""The reference exitance of a benchmark: a closed form, or else a far finer run of tetlux."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.solids import Shape, Slab, Sphere
 
-# The far finer run that is the reference where there is no closed form: the first of these tolerances that is met,
-# or else the run that came closest.
+# Tolerances of the reference run if there is no closed form: the first one that is met counts, or else the run with
+# the least estimated error.
 REFERENCE_TOLERANCES, REFERENCE_TETRAHEDRA = (0.001, 0.002, 0.005), 500_000
 QUICK_TOLERANCES = (0.01,)
-# Closed forms of a whole body, as people read them. That of a cylinder is of its side alone.
+# Descriptions of closed forms that hold on the whole body; that of a cylinder holds on its side only.
 DESCRIPTIONS: dict[type, str] = {
     Sphere: "the same equation and boundary on the true sphere, solved in closed form",
     Slab: "the same equation and boundary on the endless slab, solved in closed form; both faces, away from the rim",
@@ -29,17 +29,17 @@ DESCRIPTIONS: dict[type, str] = {
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """The true exitance at the samples.
+    """The reference exitance at the samples.
 
     Attributes
     ----------
     kind : {"closed form", "finer run"}
     description : str
-        What it is, for people.
+        A phrase for the reader of a chart.
     exitance : (n,) ndarray
-        At the samples, W/unit².
+        Exitance at the samples, W/unit².
     error : float
-        What is known of its own relative L2 error; 0 for a closed form.
+        Estimated relative L2 error of the reference itself; 0 for a closed form.
     """
 
     kind: str
@@ -51,13 +51,13 @@ class Reference:
 def closed_form_reference(
     shape: Shape | None, medium: Medium, deposits: Sequence[Deposit], samples: Samples
 ) -> tuple[Samples, Reference] | None:
-    """The solver's own model in closed form.
+    """Evaluate the closed form of the equation and boundary condition that the solver solves.
 
     Returns
     -------
     tuple of Samples and Reference, or None
-        The samples where it holds, on the true shape. None if it is not known for this shape or light, or a source lies
-        too near to where it does not hold.
+        The samples where it holds, on the exact shape. None if there is no closed form for this shape or light, or a
+        source is too near to a part where it does not hold.
     """
     if type(shape) not in DESCRIPTIONS:
         return None
@@ -74,7 +74,7 @@ def closed_form_reference(
 
 
 def finer_run_reference(case: Case, samples: Samples, *, quick: bool) -> Reference:
-    """A run of tetlux itself at the finest tolerance that it meets, or the best of its runs."""
+    """Run tetlux at the finest tolerance that it meets, or return the most accurate of its runs."""
     best: Solution | None = None
     for tolerance in QUICK_TOLERANCES if quick else REFERENCE_TOLERANCES:
         solution = solve(

@@ -1,4 +1,4 @@
-"""Runs of methods on a benchmark, and what they add up to."""
+"""Runs of methods on a benchmark, with their Pareto front and exponents."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.methods import Method, Outcome
-from tetlux.cases.chart.statistics import fitted_exponent, pareto_front
+from tetlux.cases.chart.statistics import fit_exponent, pareto_front
 from tetlux.meshing.errors import TetluxError
 
-# After a run that took longer than this, seconds, nothing finer of its method is run.
+# A method is not run at finer resolutions after a run that took longer than this, seconds.
 LONGEST_RUN = 8.0
 
 
@@ -26,9 +26,9 @@ class Measurement:
     error : float
         Relative L2 error of the exitance over the surface, against the reference.
     estimate : float or None
-        What the method believes its error to be.
+        The method's own estimate of its error.
     on_front : bool or None
-        Whether no other run was both quicker and more accurate; None for what does not compete.
+        Whether no other run was both faster and more accurate; None for methods that do not compete.
     reference : str
         "closed form" or "finer run".
     """
@@ -46,7 +46,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
-class Charted:
+class MeasuredBenchmark:
     """A benchmark and the runs on it."""
 
     benchmark: Benchmark
@@ -56,7 +56,7 @@ class Charted:
 def measure_methods(
     benchmark: Benchmark, methods: Sequence[Method], *, quick: bool, report: Callable[[str], None]
 ) -> list[Measurement]:
-    """Run the methods that fit a benchmark, each from coarse to fine."""
+    """Run all methods that apply to a benchmark, each from coarse to fine."""
     runs: list[Measurement] = []
     competing: list[int] = []
     for method in methods:
@@ -77,7 +77,7 @@ def _measure(
 ) -> Iterator[Measurement]:
     """Run one method, from coarse to fine, until a run takes too long."""
     method.warm_up(benchmark)
-    for value in method.ladder_for(benchmark, quick=quick):
+    for value in method.values_for(benchmark, quick=quick):
         name = f"{method.name} {method.label(value)}".strip()
         try:
             outcome = method.run(benchmark, value)
@@ -111,13 +111,13 @@ def _row(benchmark: Benchmark, method: Method, value: float, outcome: Outcome, e
 
 
 def exponents(runs: Sequence[Measurement]) -> dict[str, dict[str, float | None]]:
-    """By method: the exponents p of ``error ~ unknowns^p`` and ``seconds ~ unknowns^p``, where they can be fitted."""
+    """Fit for each method the exponents p of ``error ~ unknowns^p`` and ``seconds ~ unknowns^p``; None if it cannot."""
     found = {}
     for name in dict.fromkeys(run.method for run in runs):
         sized = [run for run in runs if run.method == name and run.unknowns is not None]
         unknowns = [float(run.unknowns or 0) for run in sized]
         found[name] = {
-            "error": fitted_exponent(unknowns, [run.error for run in sized]),
-            "seconds": fitted_exponent(unknowns, [run.seconds for run in sized]),
+            "error": fit_exponent(unknowns, [run.error for run in sized]),
+            "seconds": fit_exponent(unknowns, [run.seconds for run in sized]),
         }
     return found

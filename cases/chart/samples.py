@@ -1,4 +1,4 @@
-"""Points of a surface where exitance is compared, and the relative error over them."""
+"""Quadrature points of a surface where exitance is compared, and the relative error over them."""
 
 import math
 from typing import NamedTuple
@@ -8,14 +8,15 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface.solids import Sphere
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
-# Exitance falls like 1/r³ from where light enters: the pieces that are sampled are no longer than this times their
-# distance from the light, and no longer than this share of the body's diagonal.
+# Exitance falls off like 1/r³ from the entry of light, so sampled pieces are no longer than PIECE times their distance
+# from the light, and no longer than LONGEST_PIECE times the body's diagonal.
 PIECE, LONGEST_PIECE = 0.2, 0.05
-# A rule of degree 2 inside a triangle (Strang & Fix 1973), which avoids its centre: there flat facets lie deepest below
-# the curved surface.
+# A rule of degree 2 inside a triangle (Strang & Fix 1973), which avoids the centre, where flat facets lie deepest below
+# a curved surface.
 _RULE = np.full((3, 3), 1.0 / 6.0) + 0.5 * np.eye(3)
 
 
@@ -27,7 +28,7 @@ class Samples(NamedTuple):
     points, normals : (n, 3) ndarray
         Points, unit, and outward unit normals there.
     weights : (n,) ndarray
-        The areas that they stand for, unit².
+        Quadrature weights, unit².
     """
 
     points: FloatArray
@@ -35,18 +36,18 @@ class Samples(NamedTuple):
     weights: FloatArray
 
     def where(self, mask: BoolArray) -> "Samples":
-        """Those that a mask (n,) selects."""
+        """The samples that a mask (n,) selects."""
         return Samples(self.points[mask], self.normals[mask], self.weights[mask])
 
 
 def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) -> Samples:
-    """Points of a surface, dense where light is near, with the area that each stands for.
+    """Choose quadrature points of a surface, densely where light is near.
 
     Parameters
     ----------
     surface : Surface
     lit, resolutions : (s, 3), (s,) ndarray
-        Where light is deposited, and the length to resolve there: see `tetlux.fem.grading.lit_points`.
+        Points where light is deposited, and the lengths to resolve there: see `tetlux.fem.grading.places_to_resolve`.
 
     Returns
     -------
@@ -63,7 +64,7 @@ def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) 
             limit = np.minimum(limit, PIECE * np.maximum(distance, 0.5 * resolutions[nearest]))
         small = longest_sides(corners) <= limit
         done.append((corners[small], normals[small]))
-        corners, normals = quartered(corners[~small]), np.repeat(normals[~small], 4, axis=0)
+        corners, normals = quarter_triangles(corners[~small]), np.repeat(normals[~small], 4, axis=0)
     pieces, of_pieces = (np.concatenate(parts) for parts in zip(*done, strict=True))
     across = np.cross(pieces[:, 1] - pieces[:, 0], pieces[:, 2] - pieces[:, 0])
     areas = 0.5 * np.linalg.norm(across, axis=1)
@@ -71,7 +72,7 @@ def surface_samples(surface: Surface, lit: FloatArray, resolutions: FloatArray) 
 
 
 def project_to_sphere(samples: Samples, sphere: Sphere) -> Samples:
-    """Move samples of the triangles of a sphere to the sphere itself; weights keep the solid angles."""
+    """Move samples from the triangles of a sphere to the sphere itself, with weights for the same solid angles."""
     distances = np.linalg.norm(samples.points - sphere.center, axis=1)
     outward = (samples.points - sphere.center) / distances[:, None]
     stretch = np.einsum("ij,ij->i", outward, samples.normals) * (sphere.radius / distances) ** 2

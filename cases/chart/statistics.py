@@ -1,4 +1,4 @@
-"""What runs add up to: the Pareto front, and fitted exponents."""
+"""Statistics of runs: the Pareto front, and fitted exponents."""
 
 import math
 from collections.abc import Sequence
@@ -7,12 +7,12 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray
 
-# Fewer points than this make no line.
+# The least number of points that a line is fitted to.
 FEWEST_FOR_A_FIT = 3
 
 
 def pareto_front(seconds: Sequence[float], errors: Sequence[float]) -> BoolArray:
-    """Which runs (n,) are not beaten: no other is as quick and as accurate, and better in one of the two."""
+    """Which runs are on the Pareto front, (n,): no other is as fast and as accurate, and better in one of the two."""
     front = np.zeros(len(seconds), dtype=bool)
     best = math.inf
     for index in np.lexsort((errors, seconds)):
@@ -21,8 +21,8 @@ def pareto_front(seconds: Sequence[float], errors: Sequence[float]) -> BoolArray
     return front
 
 
-def fitted_exponent(x: Sequence[float], y: Sequence[float]) -> float | None:
-    """The p of ``y = c x^p`` by least squares of the logarithms; None for fewer than three points or one x."""
+def fit_exponent(x: Sequence[float], y: Sequence[float]) -> float | None:
+    """Fit p of ``y = c x^p`` by least squares of logarithms; None for fewer than three points or a single x."""
     if len(x) < FEWEST_FOR_A_FIT or min(*x, *y) <= 0 or max(x) == min(x):
         return None
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])

@@ -1,1 +1,1 @@
-"""Comparison of a run with closed forms, which `compare:` in a case file asks for."""
+"""Comparison of a run with closed forms, as the key ``compare`` of a case file asks for it."""

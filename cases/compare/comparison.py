@@ -1,4 +1,4 @@
-"""Which closed forms a run is compared with, and along which coordinate."""
+"""`Comparison`: the closed forms that a run is compared with, and the coordinate that they are drawn over."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere
 
-# By shape: the names of its closed forms.
+# Names of the closed forms of each shape.
 NAMES: dict[type, tuple[str, ...]] = {
     Slab: ("robin", "images", "dipole"),
     Sphere: ("series",),
@@ -24,16 +24,16 @@ NAMES: dict[type, tuple[str, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Coordinate:
-    """What exitance is drawn against.
+    """The coordinate that exitance is drawn over.
 
     Attributes
     ----------
     name : str
         With its unit, unless that is the case's unit of length.
     along : callable
-        Its values (n,) at points (n, 3).
+        Maps points (n, 3) to its values (n,).
     single_valued : bool
-        Whether it alone determines the exitance, so that closed forms are lines over it.
+        Whether the exitance is a function of this coordinate alone, so that closed forms are drawn as lines.
     """
 
     name: str
@@ -43,16 +43,16 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Closed forms for one case.
+    """The closed forms that one case is compared with.
 
     Attributes
     ----------
     coordinate : Coordinate
     forms : dict of str to ClosedForm
     holds_at : callable
-        Whether points (n, 3) are compared, (n,).
+        Maps points (n, 3) to whether they are compared, (n,).
     note : str
-        What all closed forms leave out.
+        An assumption that all the closed forms share.
     """
 
     coordinate: Coordinate
@@ -62,30 +62,34 @@ class Comparison:
 
 
 def comparison_for(shape: Shape | None, medium: Medium, deposits: list[Deposit], names: Sequence[str]) -> Comparison:
-    """Closed forms of a built-in shape that holds point sources.
+    """Choose the closed forms of a built-in shape with point sources.
 
     Parameters
     ----------
     shape : Sphere, Slab, Cylinder or another, optional
         ``surface.shape`` of the body.
     medium : Medium
-        Of the whole body.
+        The medium of the whole body.
     deposits : list of Deposit
-        What the lights leave in it.
+        The deposits of the lights.
     names : sequence of str
-        Of the closed forms wanted.
+        Names of the closed forms that are wanted.
+
+    Returns
+    -------
+    Comparison
 
     Raises
     ------
     InputError
-        If one is not known for this shape or for these lights.
+        If there is no such closed form for this shape or these lights.
     """
     _check_names(shape, names)
     sources = ideal_sources(deposits)
     if sources is None or not sources.are_points:
         raise InputError(
-            'closed forms here are those of point sources; give pencil beams deposit: "point", and no diffuse light, '
-            "beams of another kind or emission."
+            'closed forms exist for point sources only; give point sources, or pencil beams with deposit: "point", '
+            "or leave compare out."
         )
     try:
         known = closed_forms(shape, medium, deposits)
@@ -94,13 +98,13 @@ def comparison_for(shape: Shape | None, medium: Medium, deposits: list[Deposit],
             raise
         raise InputError(error.text, remedy=f"{error.remedy}, or leave compare out") from error
     forms = {name: known[name] for name in names}
-    scattered_from_beam = any(d.specular > 0 or d.absorbed > 0 for d in deposits)
+    scattered_from_beam = any(d.ledger.specular > 0 or d.ledger.absorbed > 0 for d in deposits)
     note = "All use the same sources, isotropic points."
     return Comparison(
         _coordinate(shape, sources),
         forms,
-        _compared_places(shape, list(forms.values())),
-        f"{note} {source_model(medium)}" if scattered_from_beam else note,
+        _places_to_compare(shape, list(forms.values())),
+        f"{note} {describe_source_model(medium)}" if scattered_from_beam else note,
     )
 
 
@@ -109,12 +113,12 @@ def _check_names(shape: Shape | None, names: Sequence[str]) -> None:
     kind = "file" if shape is None else type(shape).__name__.lower()
     for name in names:
         if name not in known:
-            have = f"for a {kind} there is {', '.join(known)}" if known else f"there is none for a {kind}"
-            raise InputError(f'"{name}" is no closed form here; {have}.')
+            have = f"for a {kind} give {', '.join(known)}" if known else f"a {kind} has none, so leave compare out"
+            raise InputError(f'there is no closed form "{name}" here; {have}.')
 
 
-def _compared_places(shape: Shape | None, forms: Sequence[ClosedForm]) -> Callable[[FloatArray], BoolArray]:
-    """Where all closed forms hold; of a slab, on its upper face."""
+def _places_to_compare(shape: Shape | None, forms: Sequence[ClosedForm]) -> Callable[[FloatArray], BoolArray]:
+    """Choose points where all closed forms hold; for a slab only those on its upper face."""
 
     def holds_at(points: FloatArray) -> BoolArray:
         front = points[:, 2] > -1e-9 * shape.width if isinstance(shape, Slab) else np.ones(len(points), dtype=bool)
@@ -147,13 +151,13 @@ def _coordinate(shape: Shape | None, sources: IdealSources) -> Coordinate:
     )
 
 
-def source_model(medium: Medium) -> str:
-    """Say what it changes that a beam's deposit is isotropic points, by closed forms of the half-space."""
+def describe_source_model(medium: Medium) -> str:
+    """Describe by how much a point deposit differs from a line deposit, by closed forms of the half-space."""
     rho = medium.mean_free_path * np.linspace(1.0, 10.0, 200)
     point = medium.albedo * half_space.point_exitance(medium, depth=medium.mean_free_path, rho=rho)
     line = half_space.pencil_exitance(medium, rho=rho)
     change = math.sqrt((rho @ (line - point) ** 2) / (rho @ point**2))
     return (
-        "A pencil beam that fades along a line (delta-Eddington) instead would change the exitance of a half-space of "
+        "A pencil beam deposited along a line instead (delta-Eddington) would change the exitance of a half-space of "
         f"this medium by {change:.1%} in L2, between one and ten mean free paths from the entry."
     )

@@ -1,4 +1,4 @@
-"""By how much a solution differs from closed forms."""
+"""The differences between a solution and closed forms."""
 
 import math
 from dataclasses import dataclass
@@ -11,36 +11,37 @@ from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import RunError
 
-# What each closed form is, and what a difference from the finite elements therefore means.
+# What each closed form is, and the cause of its difference from the finite elements.
 MEANINGS = {
     "robin": "the same equation and boundary on the infinite slab, solved exactly: the difference is discretisation",
-    "images": "the slab with fluence zero on extrapolated planes (Contini 1997): beyond discretisation, the difference "
-    "is the boundary model",
+    "images": "the slab with fluence zero on extrapolated planes (Contini 1997): the difference is discretisation and "
+    "the boundary model",
     "dipole": "the dipole, a half-space with fluence zero on an extrapolated plane (Farrell 1992), with this medium's "
-    "A (classic for the published curve): beyond discretisation, the difference is the boundary model and the slab's "
-    "other face",
+    "A (classic for the published curve): the difference is discretisation, the boundary model and the slab's other "
+    "face",
     "series": "the same equation and boundary, solved exactly: the difference is discretisation",
 }
-# Relative differences are taken where the closed form is above this share of its largest value.
+# Relative differences are computed where the closed form exceeds this share of its maximum.
 FLOOR = 1e-6
-# Below this an exitance is lost to arithmetic, W/unit².
+# An exitance below this has underflowed, W/unit².
 DARK = 1e-200
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
-    """Finite elements beside closed forms, at the boundary nodes where these hold, in order of the coordinate.
+class ComparisonResult:
+    """Exitance by finite elements and by closed forms, at the boundary nodes where these hold, sorted by coordinate.
 
     Attributes
     ----------
     coordinate : str
-        Name of what exitance is drawn against.
+        Name of the coordinate that exitance is drawn over.
     along, exitance : (n,) ndarray
-        That coordinate, and the solution's exitance, W/unit².
+        Values of the coordinate, and the solution's exitance, W/unit².
     forms : dict of (n,) ndarray
         Exitance by each closed form, W/unit².
     differences : dict
-        By closed form: ``l2``, relative, weighted by area; ``largest``, relative at a node; and ``at``, where that is.
+        For each closed form: ``l2``, the relative L2 difference by area; ``largest``, the largest relative difference
+        at a node; and ``at``, the coordinate of that node.
     note : str
     single_valued : bool
         See `Coordinate`.
@@ -55,13 +56,13 @@ class Compared:
     single_valued: bool
 
 
-def compare(comparison: Comparison, solution: Solution) -> Compared:
+def compare(comparison: Comparison, solution: Solution) -> ComparisonResult:
     """Compare a solution with closed forms at its boundary nodes.
 
     Raises
     ------
     RunError
-        If there is nothing to compare: no node where the closed forms hold, or no light at them.
+        If no light leaves at the nodes where the closed forms hold, or there are none.
     """
     points = solution.mesh.boundary_points
     here = np.flatnonzero(comparison.holds_at(points))
@@ -69,7 +70,7 @@ def compare(comparison: Comparison, solution: Solution) -> Compared:
     here, along = here[np.argsort(along)], np.sort(along)
     exitance, weights = solution.exitance[here], solution.mesh.boundary_node_areas[here]
     forms = {name: form.exitance(points[here]) for name, form in comparison.forms.items()}
-    return Compared(
+    return ComparisonResult(
         comparison.coordinate.name,
         along,
         exitance,
@@ -81,7 +82,7 @@ def compare(comparison: Comparison, solution: Solution) -> Compared:
 
 
 def bright_enough(truth: FloatArray) -> BoolArray:
-    """Where a closed form (n,) is large enough for a relative difference, (n,)."""
+    """Whether a closed form (n,) is large enough for a relative difference, (n,)."""
     return np.asarray(truth > FLOOR * truth.max())
 
 
@@ -103,15 +104,15 @@ def _difference(
     }
 
 
-def as_json(compared: Compared) -> dict[str, Any]:
-    """A comparison as plain data."""
+def as_data(result: ComparisonResult) -> dict[str, Any]:
+    """Convert a comparison to plain data."""
     return {
-        "coordinate": compared.coordinate,
+        "coordinate": result.coordinate,
         "differences": {
-            name: {**difference, "meaning": MEANINGS[name]} for name, difference in compared.differences.items()
+            name: {**difference, "meaning": MEANINGS[name]} for name, difference in result.differences.items()
         },
-        "note": compared.note,
-        "along": compared.along.tolist(),
-        "fem": compared.exitance.tolist(),
-        "closed_forms": {name: values.tolist() for name, values in compared.forms.items()},
+        "note": result.note,
+        "along": result.along.tolist(),
+        "fem": result.exitance.tolist(),
+        "closed_forms": {name: values.tolist() for name, values in result.forms.items()},
     }

@@ -1,1 +1,1 @@
-"""From a case file to `Case`s: read, validated, swept, its surfaces and media loaded."""
+"""From a case file to `Case`s: read, validate, expand the sweep, load surfaces and media."""

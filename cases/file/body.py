@@ -1,22 +1,22 @@
-"""From the case file's body to what is solved on: a surface and its regions, or a mesh and its labels."""
+"""The body of a case with its media, built from the case file: a surface and regions, or a mesh and labels."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from tetlux.cases.file.channels import check_different
+from tetlux.cases.file.channels import check_unique_names
 from tetlux.cases.file.document import Document, Key
-from tetlux.cases.file.lighting import BODY
-from tetlux.cases.file.media import media_of
-from tetlux.cases.file.reading import Reader
+from tetlux.cases.file.light_names import BODY
+from tetlux.cases.file.media import read_media
+from tetlux.cases.file.reader import Reader
 from tetlux.cases.file.schema.case import CaseSpec, MeshSpec
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
-from tetlux.fem.labelled import label_of, outermost_first
+from tetlux.fem.labels import find_label, order_outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
 from tetlux.fem.media.region import Region
-from tetlux.fem.scene import media_of as media_of_scenes
-from tetlux.fem.validity.notes import check_media, check_size, check_together
+from tetlux.fem.scenes import media_by_scene
+from tetlux.fem.validity.notes import check_compatible, check_media, check_size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface
@@ -26,21 +26,21 @@ from tetlux.meshing.tets.nesting import check_regions
 
 @dataclass(frozen=True, eq=False)
 class CaseBody:
-    """What a case is solved on.
+    """The body of a case, with its media in every channel.
 
     Attributes
     ----------
     surface : Surface
-        The body's; of a mesh, its boundary.
+        The surface of the body; the boundary of a mesh.
     media : tuple of AnyMedium
-        Of the body, or of its outermost label, one for each channel.
+        The medium of the body, or of its outermost label, in each channel.
     parts : mapping of str to int
-        Numbers of regions, or labels, by name; None is the whole body.
+        Numbers of regions, or labels, by name; None stands for the whole body.
     regions : tuple of Region
     mesh : TetMesh, optional
-        If it is given.
+        A mesh that the case gives.
     by_label : tuple of mapping
-        The media of the mesh's labels, for each channel.
+        The media by label of that mesh, in each channel.
     """
 
     surface: Surface
@@ -50,23 +50,18 @@ class CaseBody:
     mesh: TetMesh | None = None
     by_label: tuple[MediaByLabel, ...] = ()
 
-    @property
-    def is_uniform(self) -> bool:
-        """Whether it is of one medium in each channel."""
-        return not self.regions and all(len(media) == 1 for media in self.by_label)
-
     @cached_property
-    def of_channels(self) -> list[Body]:
-        """What light falls on in each channel."""
+    def bodies(self) -> list[Body]:
+        """The body as lights see it, in each channel."""
         if self.mesh is not None:
             return [Body(self.surface, media, MeshPartition(self.mesh)) for media in self.by_label]
         partition = SurfacePartition([region.surface for region in self.regions])
-        each = media_of_scenes(self.media, self.regions, len(self.media))
-        return [Body(self.surface, media, partition) for media in each]
+        by_channel = media_by_scene(self.media, self.regions, len(self.media))
+        return [Body(self.surface, media, partition) for media in by_channel]
 
 
-def body_of(document: Document, spec: CaseSpec, channels: int, reader: Reader) -> CaseBody:
-    """The body of a case.
+def read_body(document: Document, spec: CaseSpec, channels: int, reader: Reader) -> CaseBody:
+    """Read the body of a case and check it.
 
     Raises
     ------
@@ -74,65 +69,69 @@ def body_of(document: Document, spec: CaseSpec, channels: int, reader: Reader) -
         With the file, the line and the key.
     """
     if spec.mesh is not None:
-        return _of_mesh(document, spec.mesh, spec.unit, channels, reader)
+        return _read_mesh_body(document, spec.mesh, spec.unit, channels, reader)
     assert spec.surface is not None
     assert spec.medium is not None
     with document.at(("surface",)):
         surface = reader.surface(spec.surface, spec.unit)
         check_thickness(surface)
-    media = media_of(document, ("medium",), spec.medium, surface.points, surface.unit, channels, reader)
-    names, regions = _regions(document, spec, surface, media, reader)
+    media = read_media(document, ("medium",), spec.medium, surface.points, surface.unit, channels, reader)
+    names, regions = _read_regions(document, spec, surface, media, reader)
     parts = {name: number for number, name in enumerate((BODY, *names))} if regions else {BODY: None}
     body = CaseBody(surface, media, parts, regions)
     with document.at(("surface",)):
-        for each in body.of_channels:
+        for each in body.bodies:
             check_size(each)
     return body
 
 
-def _regions(
+def _read_regions(
     document: Document, spec: CaseSpec, surface: Surface, media: tuple[AnyMedium, ...], reader: Reader
 ) -> tuple[tuple[str, ...], tuple[Region, ...]]:
-    """Names of the regions, and the regions."""
+    """Read the regions and their names."""
     names = tuple(region.name or f"region_{i}" for i, region in enumerate(spec.regions, 1))
-    check_different(document, "regions", names)
+    check_unique_names(document, "regions", names)
     if BODY in names:
-        raise document.error(("regions", names.index(BODY)), f'"{BODY}" is what is outside all regions; rename it.')
+        raise document.error(
+            ("regions", names.index(BODY)),
+            f'"{BODY}" is the part outside of all regions; give another name.',
+        )
     regions = []
     for i, region in enumerate(spec.regions):
         key: Key = ("regions", i)
         with document.at((*key, "surface")):
             inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
-        own = media_of(document, (*key, "medium"), region.medium, inner.points, inner.unit, len(media), reader)
+        own = read_media(document, (*key, "medium"), region.medium, inner.points, inner.unit, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
-                check_together((outside, inside))
+                check_compatible((outside, inside))
         regions.append(Region(inner, own))
     with document.at(("regions",)):
         check_regions(surface, [region.surface for region in regions])
     return names, tuple(regions)
 
 
-def _of_mesh(document: Document, spec: MeshSpec, unit: str, channels: int, reader: Reader) -> CaseBody:
+def _read_mesh_body(document: Document, spec: MeshSpec, unit: str, channels: int, reader: Reader) -> CaseBody:
+    """The body of a case that gives a mesh and the media of its labels."""
     with document.at(("mesh",)):
         mesh = reader.mesh(spec, unit)
     media: dict[int, tuple[AnyMedium, ...]] = {}
     for name, medium in spec.labels.items():
         key: Key = ("mesh", "labels", name)
         with document.at(key):
-            label = label_of(mesh, name)
+            label = find_label(mesh, name)
             if label in media:
-                raise InputError(f"label {mesh.named([label])} has a medium already; give it one.")
+                raise InputError(f"label {mesh.named([label])} has two media; give it one.")
         nodes = mesh.points[mesh.tetrahedra[mesh.regions == label].reshape(-1)]
-        media[label] = media_of(document, key, medium, nodes, mesh.unit, channels, reader)
+        media[label] = read_media(document, key, medium, nodes, mesh.unit, channels, reader)
     with document.at(("mesh", "labels")):
         check_labels(mesh, media)
-        order = outermost_first(mesh, media)
+        order = order_outermost_first(mesh, media)
         by_label = tuple({label: media[label][channel] for label in order} for channel in range(channels))
     parts: dict[str, int | None] = {str(label): label for label in order}
     parts |= {name: label for label, name in mesh.labels.items() if label in media}
     body = CaseBody(mesh.surface, media[order[0]], parts, mesh=mesh, by_label=by_label)
     with document.at(("mesh", "labels")):
-        for each in body.of_channels:
+        for each in body.bodies:
             check_media(each)
     return body

@@ -1,18 +1,18 @@
-"""Channels: how many a case has, what they are called, and which of a list's values is whose."""
+"""Channels of a case: their number, their names, and the values of each."""
 
 from collections.abc import Iterator
 
 from tetlux.cases.file.colours import RGB
-from tetlux.cases.file.document import Document, Key, dotted
+from tetlux.cases.file.document import Document, Key, format_key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.media import MaterialSpec, Media
 
-# The name of the only channel, and what the sum of all lights is called.
+# The name of a single channel, and that of the sum of all lights.
 ALL = "all"
 
 
-def of_channel(value: float | list[float], channel: int) -> float:
-    """What a value is in one channel."""
+def value_in_channel(value: float | list[float], channel: int) -> float:
+    """The value in one channel of what may be a list with a value for each."""
     return value[channel] if isinstance(value, list) else value
 
 
@@ -22,7 +22,7 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        If its lists differ in length, or names stand twice.
+        If its lists differ in length, or a name is given twice.
     """
     first: tuple[Key, int] | None = None
     for key, length in _lists(spec):
@@ -30,20 +30,20 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
         if length != first[1]:
             raise document.error(
                 key,
-                f"this makes {_describe(length)}, and {dotted(first[0])} makes {_describe(first[1])}; give one value "
-                "for each channel, or a single one for all.",
+                f"this makes {_describe(length)}, and {format_key(first[0])} makes {_describe(first[1])}; give a "
+                "value for each channel, or a single one for all.",
             )
     count = first[1] if first else 1
     if spec.channels is None:
         return RGB if count == 3 else (ALL,) if count == 1 else tuple(str(i) for i in range(1, count + 1))
-    check_different(document, "channels", spec.channels)
+    check_unique_names(document, "channels", spec.channels)
     if set(spec.channels) == set(RGB) and tuple(spec.channels) != RGB:
-        raise document.error(("channels",), "red, green and blue stand in this order, as in materials and images.")
+        raise document.error(("channels",), "give red, green and blue in this order, that of materials and images.")
     return tuple(spec.channels)
 
 
-def check_different(document: Document, section: str, names: list[str] | tuple[str, ...]) -> None:
-    """Refuse a name that a section's list gives twice.
+def check_unique_names(document: Document, section: str, names: list[str] | tuple[str, ...]) -> None:
+    """Refuse a list of a section in which a name is given twice.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def check_different(document: Document, section: str, names: list[str] | tuple[s
     """
     for i, name in enumerate(names):
         if name in names[:i]:
-            raise document.error((section, i), f'the name "{name}" stands here twice; give another one.')
+            raise document.error((section, i), f'the name "{name}" is given twice; give one of them another name.')
 
 
 def _describe(length: int) -> str:
@@ -59,7 +59,7 @@ def _describe(length: int) -> str:
 
 
 def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
-    """Everything that says how many channels there are, with how many."""
+    """The keys of all values that are lists by channel, and their lengths."""
     if spec.channels is not None:
         yield ("channels",), len(spec.channels)
     if spec.medium is not None:

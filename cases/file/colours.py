@@ -1,44 +1,45 @@
-"""Colours: sRGB and linear light (IEC 61966-2-1), and what three channels look like."""
+"""Colours: sRGB and linear light (IEC 61966-2-1), and a preview of red, green and blue exitance."""
 
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface.surface import Surface, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 
-# Channels of these names, in this order, are shown as colours.
+# Channels with these names in this order are shown as colours.
 RGB = ("red", "green", "blue")
-# Shares of red, green and blue in the luminance of linear sRGB.
+# Weights of red, green and blue in the luminance of linear sRGB.
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# White in a preview is the luminance that this share of the surface stays below: small bright spots burn out.
+# White in a preview is this quantile of the luminance, by area: small bright spots may be overexposed.
 WHITE_SHARE = 0.99
 
 Bytes = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 def to_linear(encoded: FloatArray) -> FloatArray:
-    """Linear light of sRGB values, both from 0 to 1."""
+    """Convert sRGB values to linear light, both from 0 to 1."""
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
 def to_srgb(linear: FloatArray) -> FloatArray:
-    """SRGB values of linear light, both from 0 to 1; what is outside is cut off."""
+    """Convert linear light to sRGB values, both from 0 to 1; values outside are clipped."""
     light = np.clip(linear, 0.0, 1.0)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1.0 / 2.4) - 0.055)
 
 
 def preview(surface: Surface, exitance: FloatArray) -> tuple[Bytes, float]:
-    """What a surface looks like by the exitance of its three channels.
+    """Show the exitance of red, green and blue channels as colours of the surface.
 
     Parameters
     ----------
     surface : Surface
     exitance : (v, 3) ndarray
-        Red, green and blue at its vertices, W/unit².
+        Red, green and blue exitance at its vertices, W/unit².
 
     Returns
     -------
     colours : (v, 3) ndarray of uint8
-        sRGB.
+        sRGB at its vertices.
     white : float
         The luminance that is shown as white, W/unit²; 0 if no light leaves.
     """

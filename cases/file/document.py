@@ -15,13 +15,13 @@ from tetlux.meshing.host.filesystem import exists, is_file
 
 Key = tuple[str | int, ...]
 LARGEST_FILE = 1_000_000
-# Keys and items of lists, those of aliases counted as often as they are used; and how deep they may lie.
+# The most keys and list items, where aliases count as often as they are used; and the deepest nesting.
 MOST_KEYS, DEEPEST = 10_000, 50
 LARGEST_NUMBER = 10**308
 
 
 class _Loader(yaml.SafeLoader):
-    """Plain data only, of a size to be read at once; and 1e-3 is a number, which YAML 1.1 takes for text."""
+    """Loads plain data of bounded size, and takes 1e-3 for a number, which in YAML 1.1 is text."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
@@ -32,7 +32,7 @@ class _Loader(yaml.SafeLoader):
         if getattr(event, "tag", None) is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             raise ConstructorError(
-                None, None, f'tags such as "{tag}" are not read here; write plain values', event.start_mark
+                None, None, f'tags such as "{tag}" are not allowed; write plain values', event.start_mark
             )
         self._nodes += 1
         if self._nodes > 2 * MOST_KEYS:
@@ -47,18 +47,18 @@ class _Loader(yaml.SafeLoader):
         return node
 
     def construct_number(self, node: yaml.ScalarNode) -> float:
-        """A number that a float can hold, or infinity."""
-        make = self.construct_yaml_int if node.tag.endswith(":int") else self.construct_yaml_float
+        """Construct a number in the range of floats, or infinity."""
+        construct = self.construct_yaml_int if node.tag.endswith(":int") else self.construct_yaml_float
         try:
-            value = make(node)
+            value = construct(node)
         except ValueError:
             value = LARGEST_NUMBER + 1
         if isinstance(value, int) and abs(value) > LARGEST_NUMBER:
-            raise ConstructorError(None, None, "this is no number, or one that is too large", node.start_mark)
+            raise ConstructorError(None, None, "this is no number, or too large; give one up to 1e308", node.start_mark)
         return float(value) if isinstance(value, float) else int(value)
 
 
-# A date is text, as everything is that is no number, truth value or nothing.
+# Dates are read as text.
 _Loader.yaml_implicit_resolvers = {
     first: [(tag, form) for tag, form in forms if not tag.endswith(":timestamp")]
     for first, forms in yaml.SafeLoader.yaml_implicit_resolvers.items()
@@ -83,7 +83,7 @@ class Document:
     lines : dict
         Line number of each key, by its path in the document.
     run : str, optional
-        The values of a run of its sweep, of which an error is told.
+        Label of a run of the sweep, which error messages then name.
     """
 
     path: Path
@@ -92,34 +92,35 @@ class Document:
     run: str | None = None
 
     def line(self, key: Key) -> int | None:
-        """The line of a key, or of what holds it: a key that is merged into another (`<<`) has none of its own."""
+        """The line of a key or, where it has none (merged in by `<<`), of the innermost key that contains it."""
         while key and key not in self.lines:
             key = key[:-1]
         return self.lines[key] if key else None
 
     def error(self, key: Key, message: str) -> InputError:
-        """An error that names this file, the line of a key (or of what holds it), and the key."""
+        """An error that names this file, the line of a key, and the key."""
         line = self.line(key)
         where = f"{self.path}, line {line}" if line else f"{self.path}"
-        name = dotted(key)
+        name = format_key(key)
         if self.run is not None:
             message = f"in the run {self.run}: {message}"
         return InputError(f"{where}: {name}: {message}" if name else f"{where}: {message}")
 
     @contextmanager
     def at(self, key: Key, fields: Mapping[str, Key] | None = None) -> Iterator[None]:
-        """Within this, an error is one of the value at a key, or at that of the field that it names.
+        """Make an `InputError` raised within this context name the file, the line and a key.
 
         Parameters
         ----------
         key : Key
+            The key of the value that is being checked.
         fields : mapping of str to Key, optional
-            Where within `key` the values of fields are.
+            For an error that names a field: the key of that field within `key`.
 
         Raises
         ------
         InputError
-            With this file, the line and the key. What is within must not raise such an error itself.
+            With this file, the line and the key. Contexts must not be nested.
         """
         try:
             yield
@@ -128,8 +129,8 @@ class Document:
             raise self.error((*key, *within), str(error)) from error
 
 
-def dotted(key: Key) -> str:
-    """A key as people write it: ``lights[0].pencil.origin``."""
+def format_key(key: Key) -> str:
+    """Format a key as in ``lights[0].pencil.origin``."""
     text = ""
     for part in key:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
@@ -142,12 +143,12 @@ def read_document(path: Path) -> Document:
     Raises
     ------
     InputError
-        If it is missing, unreadable, no YAML, or something else than a mapping.
+        If the file is missing, unreadable, no YAML, or holds anything but a mapping.
     """
     try:
         if not is_file(path):
-            found = "is not a file; give a YAML case file" if exists(path) else "does not exist; check its path"
-            raise InputError(f"{path} {found}.")
+            problem = "is not a file; give a YAML case file" if exists(path) else "does not exist; check its path"
+            raise InputError(f"{path} {problem}.")
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise InputError(f"{path} is {size / 1e6:.0f} MB; a case file is a few lines of YAML.")
@@ -155,40 +156,40 @@ def read_document(path: Path) -> Document:
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8 text; save it as UTF-8.") from error
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from error
+        raise InputError(f"{path} cannot be read: {error.strerror}; check its permissions.") from error
     try:
         loader = _Loader(text)
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
             raise InputError(f"{path} is {'empty' if node is None else 'not a mapping'}; give keys and values.")
         lines: dict[Key, int] = {}
-        _note_lines(path, node, (), lines)
+        _collect_lines(path, node, (), lines)
         data = loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         line = f", line {mark.line + 1}" if mark else ""
         raise InputError(f"{path}{line}: not valid YAML: {error.problem}.") from error
     except RecursionError as error:
-        raise InputError(f"{path}: not valid YAML: an alias stands within what it stands for.") from error
+        raise InputError(f"{path}: not valid YAML: an alias refers to a value that contains the alias.") from error
     except yaml.YAMLError as error:
-        first = (str(error).splitlines() or ["no reason given"])[0]
-        raise InputError(f"{path}: not valid YAML: {first}.") from error
+        reason = (str(error).splitlines() or ["no reason given"])[0]
+        raise InputError(f"{path}: not valid YAML: {reason}.") from error
     return Document(path, data, lines)
 
 
-def _note_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int]) -> None:
+def _collect_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int]) -> None:
+    """Add the line of each key within a node to `lines`."""
     if len(lines) > MOST_KEYS:
         raise InputError(f"{path} holds more than {MOST_KEYS:,} keys; a case file is a few lines of YAML.")
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             part: Key = (*key, str(name.value))
             if part in lines:
-                raise InputError(
-                    f"{path}, line {name.start_mark.line + 1}: {dotted(part)}: this key stands here twice."
-                )
+                where = f"{path}, line {name.start_mark.line + 1}: {format_key(part)}"
+                raise InputError(f"{where}: this key is given twice; give it once.")
             lines[part] = name.start_mark.line + 1
-            _note_lines(path, value, part, lines)
+            _collect_lines(path, value, part, lines)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
             lines[*key, index] = value.start_mark.line + 1
-            _note_lines(path, value, (*key, index), lines)
+            _collect_lines(path, value, (*key, index), lines)

@@ -1,4 +1,4 @@
-"""Coefficients that vary in space, from files: tetrahedra with values, stacks of images, and arrays."""
+"""Coefficients that vary in space, read from files: meshes with values, stacks of images, and NumPy arrays."""
 
 import re
 import warnings
@@ -7,31 +7,31 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.cases.file.images import unreadable
+from tetlux.cases.file.images import unreadable_image
 from tetlux.fem.media.fields import grid_field, mesh_field
 from tetlux.fem.media.varying import Field
 from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.files.meshes import read_with_meshio
 from tetlux.meshing.host.filesystem import is_file, is_folder
-from tetlux.meshing.tets.given import unjoined
+from tetlux.meshing.tets.given import value_mesh
 
-# Values that single precision holds with room for sums.
+# The largest value: single precision holds it and sums of many such values.
 LARGEST = 1e30
 IMAGES = (".png", ".tif", ".tiff")
-# White of the grey images that Pillow reads, by their mode.
+# The value of white in grey images, by Pillow's mode.
 WHITE = {"1": 1, "L": 255, "I;16": 65535, "I;16B": 65535}
 
 
 def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field:
-    """A field from values at the nodes or in the tetrahedra of a volume mesh.
+    """Read a field given at the nodes or in the tetrahedra of a volume mesh.
 
     Parameters
     ----------
     path : str or Path
-        VTU.
+        A VTU file.
     name : str
-        Of the array of values; of two that share it, the one at the nodes.
+        Name of the array of values; if nodes and tetrahedra both have it, the one at the nodes is read.
     scale : float
         Factor on the file's coordinates.
 
@@ -45,7 +45,7 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
     InputError
         If the file is missing or unreadable, holds no tetrahedra or no such array, or a value is not finite.
     """
-    path = _existing(path, (".vtu",))
+    path = _check_file(path, (".vtu",))
     if not np.isfinite(scale) or scale <= 0:
         raise InputError(f"scale is {scale:g}; give a factor greater than 0.")
     data = read_with_meshio(path, "vtu")
@@ -56,8 +56,10 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
         known = ", ".join(dict.fromkeys([*data.point_data, *data.cell_data])) or "none"
         raise InputError(f'{path} holds no array "{name}"; the arrays there are: {known}.')
     try:
-        # Nodes of other cells, whose values may be anything, are left out.
-        mesh, used = unjoined(scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks]))
+        # Nodes of other cells are left out: their values do not matter and may be invalid.
+        mesh, used = value_mesh(
+            scale * np.asarray(data.points), np.vstack([data.cells[block].data for block in blocks])
+        )
         if name in data.point_data:
             return mesh_field(mesh, data.point_data[name][used], at="nodes")
         values = np.concatenate([data.cell_data[name][block] for block in blocks])
@@ -69,21 +71,20 @@ def read_mesh_field(path: str | Path, name: str, *, scale: float = 1.0) -> Field
 def read_image_field(
     path: str | Path, *, origin: Vector, spacing: float | Vector, values: tuple[float, float]
 ) -> Field:
-    """A field from a stack of grey images.
+    """Read a field from a stack of grey images.
 
     Columns run along x, rows along y (the first row has the smallest y), and slices along z.
 
     Parameters
     ----------
     path : str or Path
-        A folder of PNG or TIFF images, taken in the order of their names, where 2 comes before 10; or one file, all
-        of its pages.
+        A folder of PNG or TIFF images, in the order of their names (2 before 10); or one file with all slices as pages.
     origin : (3,) floats
-        Middle of the first slice's first pixel, unit.
+        Centre of the first pixel of the first slice, unit.
     spacing : float or (3,) floats
-        Width of a pixel, its height, and the distance of slices, unit.
+        Width and height of a pixel, and distance between slices, unit.
     values : (2,) floats
-        What black and white stand for; greys lie between, in proportion.
+        The values of black and white; grey is interpolated linearly.
 
     Returns
     -------
@@ -98,17 +99,17 @@ def read_image_field(
     path = Path(path)
     if is_folder(path):
         try:
-            files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES and is_file(f)), key=_in_order)
+            files = sorted((f for f in path.iterdir() if f.suffix.lower() in IMAGES and is_file(f)), key=_natural_order)
         except OSError as error:
             raise InputError(f"{path} cannot be read: {error.strerror}.") from error
         if not files:
             raise InputError(f"{path} holds no images; give a folder of PNG or TIFF slices.")
     else:
-        files = [_existing(path, IMAGES)]
+        files = [_check_file(path, IMAGES)]
     low, high = np.asarray(values, dtype=float)
     if not (np.abs([low, high]) <= LARGEST).all():
         raise InputError(
-            f"values are {values}; give two finite numbers up to {LARGEST:g}, what black and white stand for."
+            f"values are {values}; give two finite numbers up to {LARGEST:g}, the values of black and white."
         )
     slices: list[npt.NDArray[np.float32]] = []
     first = ""
@@ -118,9 +119,9 @@ def read_image_field(
             kind = f"{columns} x {rows} pixels, mode {mode}"
             first = first or kind
             if kind != first:
-                raise InputError(f"{file} has {kind}, and {files[0]} has {first}; slices must be alike.")
+                raise InputError(f"{file} has {kind}, and {files[0]} has {first}; give slices of one size and mode.")
             slices.append((low + (high - low) / WHITE[mode] * pixels).astype(np.float32))
-    # Rows and columns of a picture are y and x.
+    # Rows and columns of an image are y and x.
     try:
         return grid_field(np.stack(slices).transpose(2, 1, 0), origin=origin, spacing=spacing)
     except InputError as error:
@@ -128,14 +129,14 @@ def read_image_field(
 
 
 def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vector) -> Field:
-    """A field from a three-dimensional NumPy array.
+    """Read a field from a three-dimensional NumPy array.
 
     Parameters
     ----------
     path : str or Path
         An .npy file of values ``[x, y, z]``.
     origin : (3,) floats
-        Middle of the first voxel, unit.
+        Centre of the first voxel, unit.
     spacing : float or (3,) floats
         Distance between neighbouring values, unit.
 
@@ -149,10 +150,10 @@ def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vecto
     InputError
         If the file is missing or unreadable, or its array not three-dimensional, real and finite.
     """
-    path = _existing(path, (".npy",))
+    path = _check_file(path, (".npy",))
     try:
         values = np.load(path, allow_pickle=False)
-    except Exception as error:  # NumPy raises whatever its parsing ran into
+    except Exception as error:  # NumPy passes on any error of its parser
         raise InputError(f"{path} is not a readable array of numbers; save it again with numpy.save.") from error
     try:
         return grid_field(values, origin=origin, spacing=spacing)
@@ -160,7 +161,8 @@ def read_array_field(path: str | Path, *, origin: Vector, spacing: float | Vecto
         raise InputError(f"{path}: {error}") from error
 
 
-def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+def _check_file(path: str | Path, suffixes: tuple[str, ...]) -> Path:
+    """The path of a file that exists and has one of some suffixes."""
     path = Path(path)
     if not is_file(path):
         raise InputError(f"{path} does not exist or is no file; check its path.")
@@ -170,24 +172,24 @@ def _existing(path: str | Path, suffixes: tuple[str, ...]) -> Path:
 
 
 def _pages(file: Path) -> list[tuple[str, npt.NDArray[np.generic]]]:
-    """Pages of a grey image file: their mode, as Pillow calls it, and pixels (rows, columns)."""
+    """Read the pages of a grey image file: Pillow's mode, and pixels (rows, columns)."""
     from PIL import Image, ImageSequence  # noqa: PLC0415
 
     try:
-        # Of pages that a file cut short lacks, Pillow only warns.
+        # Pillow only warns of a truncated file.
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(file) as image:
                 pages = [(page.mode, np.asarray(page)) for page in ImageSequence.Iterator(image)]
-    except Exception as error:  # Pillow raises whatever its decoders ran into
-        raise unreadable(file, error) from error
+    except Exception as error:  # Pillow passes on any error of its decoders
+        raise unreadable_image(file, error) from error
     for mode, _ in pages:
         if mode not in WHITE:
-            raise InputError(f"{file} is not a grey image of 8 or 16 bits (its mode is {mode}); convert it.")
+            raise InputError(f"{file} is not a grey image of 8 or 16 bits (its mode is {mode}); convert it to one.")
     return pages
 
 
-def _in_order(file: Path) -> list[tuple[int, str]]:
-    """Names by letters, and by number where they have one."""
+def _natural_order(file: Path) -> list[tuple[int, str]]:
+    """Sort key by which slice2 comes before slice10."""
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", file.name)]

@@ -1,8 +1,8 @@
-"""From the case file's media to those that are solved with."""
+"""Media of the case file, built as `Medium` or `VaryingMedium`."""
 
-from tetlux.cases.file.channels import of_channel
+from tetlux.cases.file.channels import value_in_channel
 from tetlux.cases.file.document import Document, Key
-from tetlux.cases.file.reading import Reader
+from tetlux.cases.file.reader import Reader
 from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.materials import material
@@ -13,24 +13,29 @@ from tetlux.fem.validity.notes import check_scattering
 from tetlux.meshing.arrays import FloatArray
 
 
-def media_of(
+def read_media(
     document: Document, key: Key, spec: Media, points: FloatArray, unit: str, count: int, reader: Reader
 ) -> tuple[AnyMedium, ...]:
-    """The media of a body or a region, one for each channel.
+    """Build the media of a body, a region or a label.
 
     Parameters
     ----------
     document : Document
     key : Key
-        Where in it the medium stands.
+        The key of the medium in it.
     spec : MediumSpec, MaterialSpec or list of MediumSpec
     points : (n, 3) ndarray
-        Of the surface of the body or region, or nodes of a label: what varies must be known at all of them.
+        Vertices of the body or region, or nodes of the label: coefficients that vary must be known at all of them.
     unit : str
-        Of lengths.
+        Unit of length.
     count : int
         Number of channels.
     reader : Reader
+
+    Returns
+    -------
+    tuple of Medium or VaryingMedium
+        One for each channel.
 
     Raises
     ------
@@ -57,7 +62,7 @@ def _medium(
                 fields[name] = reader.field(value)
                 numbers[name] = float(fields[name](points).mean())
         elif value is not None:
-            numbers[name] = of_channel(value, channel)
+            numbers[name] = value_in_channel(value, channel)
     with document.at((*key, "phase")):
         phase = _phase(spec.phase) if spec.phase else None
     with document.at(key, {name: (name,) for name in MediumSpec.model_fields}):

@@ -1,4 +1,4 @@
-"""Whether what a case file says is of the right form, and if not, which key is wrong, in plain words."""
+"""Validation of a case file against the schema, with pydantic's errors turned into plain sentences."""
 
 import re
 from typing import Any
@@ -8,30 +8,30 @@ from pydantic import ValidationError
 from tetlux.cases.file.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.parts import TAG
-from tetlux.cases.nearest import did_you_mean
+from tetlux.cases.hints import did_you_mean
 
-# What pydantic says in words of Python's, by the beginning of its error's kind; of lists, how long they are.
+# Plain words for pydantic's errors, by the beginning of their type; empty: how many numbers are expected.
 PLAIN = {
     "model_": "expected keys and values",
     "dict_": "expected keys and values",
     "list_": "expected a list",
     "tuple_": "",
-    "string_pattern": "a name is of letters, digits, spaces and any of . + = , - _ and begins with a letter or digit",
+    "string_pattern": "expected a name of letters, digits, spaces and . + = , - _ that begins with a letter or digit",
     "string_type": "expected text",
     "too_short": "give at least one",
     "too_long": "",
     "float_type": "expected a number",
 }
-# Values that YAML writes in another way than Python.
-PYTHONS = {None: "nothing", True: "true", False: "false"}
-# Sections in place of which people give one word, and how to write that.
+# How YAML writes values that Python writes differently.
+YAML_WORDS = {None: "nothing", True: "true", False: "false"}
+# How to write a section for which a single word was given.
 ONE_WORD = {"surface": "surface: {{file: {0}}}", "medium": "medium: {{material: {0}}}"}
-# Lists of numbers that are not of three.
+# Lists that do not hold three numbers.
 COUNTS: dict[str | int, str] = {"values": "two"}
 
 
-def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
-    """The data of a document, or of one run of its sweep, as a case.
+def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
+    """Validate the data of a document, or of one run of its sweep.
 
     Raises
     ------
@@ -52,6 +52,7 @@ def validated(document: Document, data: dict[str, Any]) -> CaseSpec:
 
 
 def _sentence(kind: str, message: str, given: object, key: Key) -> str:
+    """What is wrong with the value of a key: by the type, message and input of a pydantic error."""
     several = f"expected a list of {COUNTS.get(key[-2] if len(key) > 1 else '', 'three')} numbers"
     if kind == "missing":
         return f"{several}." if isinstance(key[-1], int) else "this key is missing; the case needs it."
@@ -64,8 +65,8 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
         if kind.startswith(start):
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
-        text = "a name here is of letters from A to Z, digits and any of . + - _ and begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "body", "no_mesh"):
+        text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
+    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"
@@ -74,5 +75,5 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
         text = did_you_mean(given, re.findall(r"'(.*?)'", message)) + text
     if isinstance(given, str) and kind.startswith(("model_", "dict_")) and key and key[-1] in ONE_WORD:
         hint = "; write " + ONE_WORD[str(key[-1])].format(given)
-    shown = PYTHONS[given] if given is None or isinstance(given, bool) else repr(given)
+    shown = YAML_WORDS[given] if given is None or isinstance(given, bool) else repr(given)
     return f"{text}, but found {shown if len(shown) < 60 else shown[:57] + '...'}{hint}."

@@ -1,1 +1,1 @@
-"""The picture of a run, by PyVista or without it."""
+"""The picture of a run, rendered by PyVista or by the built-in rasterizer."""

@@ -1,4 +1,4 @@
-"""What runs in the drawer's own process: without GL libraries, VTK ends in a segmentation fault."""
+"""The program that renders with PyVista in a process of its own, since VTK without GL libraries crashes."""
 
 import sys
 from pathlib import Path
@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def main(job_path: str, image_path: str, parent: str) -> None:
-    """Draw the stage in ``job_path`` (npz) off-screen with PyVista into ``image_path`` (npy, (h, w, 3) uint8).
+    """Render the stage in ``job_path`` (npz) off-screen into ``image_path`` (npy, (h, w, 3) uint8).
 
-    `parent` is the number of the process that it works for.
+    `parent` is the id of the process that waits for the image; if that ends, this one does too.
     """
     die_with(int(parent))
     import pyvista  # noqa: PLC0415
@@ -27,7 +27,7 @@ def main(job_path: str, image_path: str, parent: str) -> None:
     plotter = pyvista.Plotter(off_screen=True, window_size=[width, height], lighting="none")
     plotter.set_background(job["background"].tolist())
     center = job["center"]
-    # Not positional, so only the direction counts.
+    # A directional light: only the direction of its position counts.
     lamp = pyvista.Light(position=center + job["lamp"], focal_point=center, light_type="scene light")
     plotter.add_light(lamp)
     shaded, full = job["shading"].tolist()
@@ -47,7 +47,7 @@ def main(job_path: str, image_path: str, parent: str) -> None:
     camera = plotter.camera
     camera.parallel_projection = True
     camera.focal_point = center.tolist()
-    # Any distance will do in a parallel projection; the clipping planes follow from it.
+    # In a parallel projection the distance matters for the clipping planes only.
     camera.position = (center + float(job["distance"]) * job["toward"]).tolist()
     camera.up = job["up"].tolist()
     camera.parallel_scale = float(job["half_height"])
@@ -62,7 +62,7 @@ def main(job_path: str, image_path: str, parent: str) -> None:
 
 
 def _soup(corners: np.ndarray, normals: np.ndarray) -> "PolyData":
-    """Triangles (m, 3, 3) that share no corner, with a normal for each."""
+    """Triangles (m, 3, 3) that share no vertices, with a normal at each corner."""
     import pyvista  # noqa: PLC0415
 
     order = np.arange(3 * len(corners)).reshape(-1, 3)

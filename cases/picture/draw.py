@@ -1,4 +1,4 @@
-"""The picture of a run: the body in the colours of its exitance."""
+"""`draw_picture`: the body in the colours of its exitance, with lights, regions and detectors."""
 
 import os
 import subprocess
@@ -8,32 +8,32 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.picture.frame import frame
-from tetlux.cases.picture.marks import Shape, marks_of
-from tetlux.cases.picture.plain import draw_plain
+from tetlux.cases.picture.frame import draw_frame
+from tetlux.cases.picture.marks import RegionOutline, project_marks
+from tetlux.cases.picture.rasterizer import rasterize
 from tetlux.cases.picture.stage import FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage, build_stage, exitance_range
 from tetlux.cases.picture.view import PANEL, UPRIGHT, Ray
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.host.scratch import run_child, scratch
 from tetlux.meshing.notes import Note
 
-__all__ = ["Ray", "Scene", "Shape", "draw"]
+__all__ = ["PictureScene", "Ray", "RegionOutline", "draw_picture"]
 
-# The command that draws a body with PyVista; the names of two files and the number of this process are added.
+# The command that renders a body with PyVista; two file names and the id of this process are appended.
 RENDERER: tuple[str, ...] = (sys.executable, "-m", "tetlux.cases.picture._render_process")
-# Seconds; 50,000 triangles take about two without a graphics card.
+# Seconds; 50,000 triangles take about 2 s without a graphics card.
 TIME_LIMIT = 120.0
-# Measured on a bare Debian 12: either package alone is not enough.
+# Tried on a bare Debian 12: both packages are needed.
 WITHOUT_PYVISTA = Note(
     "no-pyvista",
     "the picture was drawn without PyVista, which could not render on this machine; "
-    "on Debian, `apt-get install libgl1 libegl1` brings what it needs.",
+    "on Debian, `apt-get install libgl1 libegl1` installs what it needs.",
 )
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """What is to be seen.
+class PictureScene:
+    """What a picture shows.
 
     Parameters
     ----------
@@ -42,20 +42,20 @@ class Scene:
     triangles : (m, 3) ndarray
         Anticlockwise seen from outside.
     exitance : (n,) ndarray
-        W/unit², at the vertices.
+        Exitance at the vertices, W/unit².
     unit, title : str
     lights : tuple of Ray
-        The lights to draw in.
+        Arrows and points of the lights.
     colours : ((n, 3) ndarray of uint8, float), optional
-        Colours of the vertices, in place of those of their exitance, and what white stands for, W/unit².
+        Colours of the vertices, which replace those of the colour map, and the luminance of white, W/unit².
     up : (3,) floats
-        What is up in the picture.
+        The direction that is up in the picture.
     toward : (3,) ndarray, optional
-        Unit vector to the eye; chosen by the light if not given.
-    regions : tuple of Shape
+        Unit vector from the body to the eye; if not given, it is chosen by the light.
+    regions : tuple of RegionOutline
         Regions to outline.
     detectors : tuple of (str, Vector)
-        Names of the detectors, and their places on the surface.
+        Names of the detectors, and their positions on the surface.
     """
 
     points: FloatArray
@@ -67,26 +67,26 @@ class Scene:
     colours: tuple[Image, float] | None = None
     up: Vector = UPRIGHT
     toward: FloatArray | None = None
-    regions: tuple[Shape, ...] = ()
+    regions: tuple[RegionOutline, ...] = ()
     detectors: tuple[tuple[str, Vector], ...] = ()
 
 
-def draw(scene: Scene, path: Path) -> list[str]:
+def draw_picture(scene: PictureScene, path: Path) -> list[str]:
     """Draw a body in the colours of its exitance.
 
-    The colours follow the logarithm of the exitance, down to six decades below its maximum, or are those given. The
-    camera looks at the lit side, unless it is given. Arrows are seen through, and regions as outlines.
+    Colours map the logarithm of the exitance, down to six decades below its maximum, unless the scene gives colours.
+    The camera looks at the lit side, unless the scene gives a direction. Arrows are translucent.
 
     Parameters
     ----------
-    scene : Scene
+    scene : PictureScene
     path : Path
-        Where the PNG goes, 1400 x 1050 pixels; replaced only when the new picture is complete.
+        The PNG to write, 1400 x 1050 pixels; an older one is replaced only when the new one is complete.
 
     Returns
     -------
     list of str
-        A sentence if PyVista could not render here and a plainer drawing was made instead.
+        A note if PyVista could not render here, so that the built-in rasterizer drew the body.
 
     Raises
     ------
@@ -99,14 +99,14 @@ def draw(scene: Scene, path: Path) -> list[str]:
         scene.points, scene.triangles, scene.exitance, scene.lights, colours, up=scene.up, toward=scene.toward
     )
     extent = np.ptp(scene.points, axis=0)
-    marks = marks_of(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
-    image = _drawn_with_pyvista(stage)
+    marks = project_marks(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
+    image = _render_with_pyvista(stage)
     warnings: list[str] = [] if image is not None else [WITHOUT_PYVISTA]
     unfinished = path.with_name(path.name + ".part")
     try:
-        frame(
+        draw_frame(
             unfinished,
-            _averaged(draw_plain(stage) if image is None else image),
+            _downsample(rasterize(stage) if image is None else image),
             stage.camera,
             scene.lights,
             marks,
@@ -124,8 +124,8 @@ def draw(scene: Scene, path: Path) -> list[str]:
     return warnings
 
 
-def _drawn_with_pyvista(stage: Stage) -> Image | None:
-    """The body as PyVista draws it in a process of its own, or None where it cannot."""
+def _render_with_pyvista(stage: Stage) -> Image | None:
+    """Render the body with PyVista in a process of its own; None if that fails."""
     camera = stage.camera
     try:
         with scratch("picture") as folder:
@@ -157,13 +157,13 @@ def _drawn_with_pyvista(stage: Stage) -> Image | None:
     except (subprocess.TimeoutExpired, OSError):
         return None
     expected = (OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3)
-    # A broken driver may also return without an error and leave the window empty.
+    # A broken driver may report success and render nothing.
     blank = image.shape != expected or bool((image == image[0, 0]).all())
     return None if blank else image
 
 
-def _averaged(image: Image) -> Image:
-    """Every square of `OVERSAMPLING` pixels as one."""
+def _downsample(image: Image) -> Image:
+    """Average each square of `OVERSAMPLING` by `OVERSAMPLING` pixels."""
     n = OVERSAMPLING
     height, width = image.shape[0] // n, image.shape[1] // n
     mean = image.reshape(height, n, width, n, 3).mean(axis=(1, 3), dtype=np.float32)

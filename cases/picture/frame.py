@@ -1,4 +1,4 @@
-"""The frame round a drawn body: title, colour bar, scale bar, axes, marks of the lights."""
+"""The frame of a picture: title, colour bar, scale bar, axes, and marks of lights, regions and detectors."""
 
 import math
 from pathlib import Path
@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 SIZE = (1400, 1050)
 # The panel's left and top edges within the picture.
 LEFT, TOP = 30, 100
-# Colours of lines and words, and the fainter ones, on the light and on the dark background.
+# Colours of lines and text, strong and faint: on the light background, then on the dark one.
 INK, FAINT = "#20242b", "#5d6673"
 PALE, PALE_FAINT = "#e8eaee", "#9aa3b0"
 DPI = 100
 
 
-def frame(
+def draw_frame(
     path: Path,
     image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]],
     camera: Camera,
@@ -44,21 +44,21 @@ def frame(
     Parameters
     ----------
     path : Path
-        Where the PNG goes.
+        The PNG to write.
     image : (h, w, 3) ndarray of uint8
-        The drawn body, of the panel's size.
+        The drawn body, of the size of the panel.
     camera : Camera
     lights : tuple of Ray
     marks : Marks
         Regions and detectors.
     ends : (float, float) or None
-        What the ends of the colour map stand for; None where no light leaves.
+        Exitance at the ends of the colour map, W/unit²; None if no light leaves.
     table : (256, 3) ndarray
         The colour map.
     below : bool
-        Whether some of the body is darker than the lower end.
+        Whether parts of the body are darker than the lower end.
     white : float or None
-        What white stands for where the body is drawn in colours of its own, which have no bar, W/unit².
+        Luminance of white if the body has colours of its own, W/unit²; None if it has a colour bar.
     unit, title : str
     extent : (3,) ndarray
         The body's size along x, y and z, unit.
@@ -66,7 +66,7 @@ def frame(
     from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
     from matplotlib.figure import Figure  # noqa: PLC0415
 
-    # A figure of its own, never pyplot: pyplot's figures and backend belong to the caller.
+    # Not pyplot, whose figures and backend belong to the caller.
     background, ink, faint = (BACKGROUND, INK, FAINT) if white is None else (DARK, PALE, PALE_FAINT)
     figure = Figure(figsize=(SIZE[0] / DPI, SIZE[1] / DPI), dpi=DPI, facecolor=background)
     FigureCanvasAgg(figure)
@@ -74,7 +74,7 @@ def frame(
     canvas.set_axis_off()
     canvas.imshow(image, extent=(LEFT, LEFT + PANEL[0], TOP + PANEL[1], TOP), interpolation="none", zorder=1)
     canvas.set(xlim=(0, SIZE[0]), ylim=(SIZE[1], 0), aspect="auto")
-    canvas.text(LEFT + 12, 56, _fitted(title), size=21, color=ink, va="center", parse_math=False)
+    canvas.text(LEFT + 12, 56, _fit_title(title), size=21, color=ink, va="center", parse_math=False)
     _size_marks(canvas, camera, unit, extent, ink, faint)
     _axes_cross(canvas, camera, faint)
     draw_marks(canvas, marks, LEFT, TOP)
@@ -92,14 +92,14 @@ def _panel(figure: "Figure", box: tuple[float, float, float, float]) -> "Axes":
     return figure.add_axes((left / SIZE[0], 1.0 - (top + height) / SIZE[1], width / SIZE[0], height / SIZE[1]))
 
 
-def _fitted(title: str) -> str:
-    """The title on one line that fits the picture."""
+def _fit_title(title: str) -> str:
+    """Shorten the title to one line of the picture."""
     line = " ".join(title.split())
     return line if len(line) <= 84 else line[:83] + "…"
 
 
 def _size_marks(canvas: "Axes", camera: Camera, unit: str, extent: FloatArray, ink: str, faint: str) -> None:
-    """A scale bar, true since the projection is parallel, and the body's size in words."""
+    """Draw a scale bar, which is exact in a parallel projection, and write the size of the body."""
     length = round_length(0.22 * PANEL[0] * camera.pixel)
     left, low, width = LEFT + 12, SIZE[1] - 36, length / camera.pixel
     canvas.plot([left, left + width], [low, low], color=ink, linewidth=3.2, solid_capstyle="butt")
@@ -117,7 +117,7 @@ def round_length(longest: float) -> float:
 
 
 def _axes_cross(canvas: "Axes", camera: Camera, faint: str) -> None:
-    """Which way x, y and z point, at the lower right."""
+    """Draw the directions of x, y and z at the lower right."""
     x0, y0, length = LEFT + PANEL[0] + 95.0, SIZE[1] - 50.0, 40.0
     for axis, name in zip(np.eye(3), "xyz", strict=True):
         dx, dy = float(length * axis @ camera.right), float(-length * axis @ camera.up)
@@ -129,10 +129,10 @@ def _axes_cross(canvas: "Axes", camera: Camera, faint: str) -> None:
 
 
 def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> None:
-    """A ring with a dot for a light without direction, drawn over the body: it may lie within."""
+    """Draw a ring with a dot for each point source, over the body since it lies inside."""
     points = np.array([ray.end for ray in lights if ray.is_point]).reshape(-1, 3)
     placed = camera.project(points)[:, :2]
-    # The camera leaves out points that are far from the body.
+    # The camera may leave points outside the panel that are far from the body.
     x, y = placed[((placed > 0) & (placed < PANEL)).all(axis=1)].T
     for size, face, edge, width in (
         (15.0, "none", "white", 5.0),
@@ -151,7 +151,7 @@ def _light_marks(canvas: "Axes", camera: Camera, lights: tuple[Ray, ...]) -> Non
 
 
 def _white_note(canvas: "Axes", white: float, unit: str) -> None:
-    """What white stands for in a picture in the body's own colours, under a patch of white."""
+    """Write the luminance of white under a white patch."""
     center, top, size = LEFT + PANEL[0] + 95, 190, 64
     left, right, low = center - size / 2, center + size / 2, top + size
     canvas.fill([left, right, right, left], [top, top, low, low], facecolor="white")
@@ -194,7 +194,7 @@ def _color_bar(figure: "Figure", ends: tuple[float, float] | None, table: FloatA
 
 
 def bar_ticks(bottom: float, top: float) -> list[tuple[float, str]]:
-    """Values between the ends of a logarithmic colour bar, and their labels: decades, or steps on a short bar."""
+    """Ticks of a logarithmic colour bar, values and labels: decades, or finer steps on a short bar."""
     low, high = math.ceil(math.log10(bottom) - 1e-9), math.floor(math.log10(top) + 1e-9)
     if high - low >= 2:
         return [(10.0**n, f"$10^{{{n}}}$") for n in range(low, high + 1)]

@@ -1,4 +1,4 @@
-"""What a picture shows over the body: outlines of regions, which lie within it, and detectors with their names."""
+"""Marks over the drawn body: outlines of the regions inside it, and detectors with their names."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture.plain import nearest_triangles
+from tetlux.cases.picture.rasterizer import nearest_triangles
 from tetlux.cases.picture.stage import OVERSAMPLING
 from tetlux.cases.picture.view import PANEL, Camera, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
@@ -15,21 +15,21 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK, PAPER = "#20242b", "#ffffff"
-# Points of the font of names; pixels of a line of it, and of one of its letters, on average.
+# Size of the names: font, points; line height and mean width of a letter, pixels.
 FONT, LINE, LETTER = 11.5, 18.0, 9.6
 # Pixels between a dot and its name.
 GAP = 10.0
-# Where a name may stand beside a dot, right and down, the best first.
+# Positions of a name relative to its dot (right, down), the best first.
 SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, 1), (1, 1), (-1, -1))
-# Detectors are looked for behind the body up to so many; each costs a test of all triangles.
+# This many detectors are tested for being hidden; each costs a test of all triangles.
 MOST_TESTED = 200
-# How much of what is behind it a region's tint leaves.
+# Opacity of the tint of a region.
 TINT = 0.10
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
-    """A region to be outlined: its name, vertices (n, 3) and triangles (m, 3)."""
+class RegionOutline:
+    """A region to outline: its name, vertices (n, 3) and triangles (m, 3)."""
 
     name: str
     points: FloatArray
@@ -38,15 +38,16 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """What is drawn over the body, in pixels of the panel.
+    """Marks in pixels of the panel.
 
     Parameters
     ----------
     outlines : sequence of (str, (h, w) ndarray)
-        Names of regions, and the share of each pixel that each covers.
+        Names of the regions, and the share of each pixel that they cover.
     names : sequence of str
-        Of the detectors.
+        Names of the detectors.
     dots : (d, 2) ndarray
+        Positions of the detectors.
     hidden : (d,) ndarray of bool
         Whether the body hides the detector.
     """
@@ -57,25 +58,29 @@ class Marks:
     hidden: BoolArray
 
 
-def marks_of(
+def project_marks(
     camera: Camera,
     corners: FloatArray,
-    regions: Sequence[Shape],
+    regions: Sequence[RegionOutline],
     detectors: Sequence[tuple[str, Vector]],
     diagonal: float,
 ) -> Marks:
-    """Regions and detectors as a camera sees them.
+    """Project regions and detectors into the panel of a camera.
 
     Parameters
     ----------
     camera : Camera
     corners : (m, 3, 3) ndarray
-        Of the body's triangles.
-    regions : sequence of Shape
+        Corners of the body's triangles.
+    regions : sequence of RegionOutline
     detectors : sequence of (str, Vector)
-        Name and place on the surface.
+        Name and position on the surface.
     diagonal : float
-        Of the body, unit.
+        Diagonal of the body, unit.
+
+    Returns
+    -------
+    Marks
     """
     places = np.array([place for _, place in detectors], dtype=float).reshape(-1, 3)
     hidden = np.zeros(len(places), dtype=bool)
@@ -88,7 +93,7 @@ def marks_of(
     )
 
 
-def _coverage(camera: Camera, region: Shape) -> FloatArray:
+def _coverage(camera: Camera, region: RegionOutline) -> FloatArray:
     """The share of each pixel of the panel that a region covers, (h, w)."""
     placed = camera.project(region.points)[region.triangles] * OVERSAMPLING
     covered = nearest_triangles(placed, closed=len(placed))[0] >= 0
@@ -97,7 +102,7 @@ def _coverage(camera: Camera, region: Shape) -> FloatArray:
 
 
 def draw_marks(canvas: "Axes", marks: Marks, left: float, top: float) -> None:
-    """Draw the marks of a panel whose corner lies at `left` and `top` of a canvas of pixels."""
+    """Draw marks on a canvas of pixels, on which the panel begins at `left` and `top`."""
     corner = np.array([left, top])
     boxes: list[tuple[float, float, float, float]] = [(x - 6, y - 6, x + 6, y + 6) for x, y in marks.dots + corner]
     _draw_detectors(canvas, marks, corner, boxes)
@@ -142,7 +147,7 @@ def _write_name(
     gap: float,
     sides: Sequence[tuple[int, int]] = SIDES,
 ) -> None:
-    """Write a name beside a place where nothing else stands, or leave it out where there is no room."""
+    """Write a name beside a place without overlapping other marks; leave it out if there is no room."""
     from matplotlib.patheffects import withStroke  # noqa: PLC0415
 
     width, (x, y) = LETTER * len(name), place

@@ -1,4 +1,4 @@
-"""What both drawers of a picture are given: a camera, triangles with normals, and numbers to colour by."""
+"""`Stage`: the input of both renderers, a camera and triangles with normals and colours."""
 
 import math
 from dataclasses import dataclass
@@ -10,50 +10,50 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
-# Each pixel is the mean of 2 x 2 drawn ones, in both drawers: smooth edges without multisampling.
+# Both renderers draw 2 x 2 pixels for each of the picture, whose mean smooths edges.
 OVERSAMPLING = 2
-# Darker than this share of the maximum is drawn as dark as can be.
+# The colour map spans at most this many decades below the maximum.
 DECADES = 6.0
-# A range narrower than this factor would show rounding errors as a pattern.
+# The colour map spans at least this factor, since a narrower range would show rounding errors as a pattern.
 NARROWEST = 2.0
-# The darkest colours of the map are left out: on black no shape can be seen.
+# The darkest colours of the map are left out, in which no shape could be seen.
 COLOR_MAP, DARKEST = "inferno", 0.2
 BACKGROUND: Vector = (0.953, 0.957, 0.965)
-# Behind a body in colours of its own, most of which are darker than white.
+# Background of a body with colours of its own.
 DARK: Vector = (0.11, 0.12, 0.14)
 LIGHT: Vector = (0.0, 0.62, 0.72)
-# Brightness of a face turned away from the lamp and of one that faces it; between them it follows the
-# cosine. Near enough to 1 that colours can be read off the bar.
+# Brightness of a face that faces away from the lamp, and of one that faces it; between them it follows the cosine.
+# Both are near enough to 1 for colours to be compared with the bar.
 SHADED, FULL = 0.66, 1.0
-# Neighbours that meet at a sharper angle than this are shaded as two faces.
+# Neighbours that meet at a larger angle than this are shaded as separate faces.
 SHARP = math.cos(math.radians(40.0))
-# The mean normal at the hub of a fan of more triangles than this would cost the square of their number.
+# Normals are not smoothed at vertices of more triangles than this, since the cost grows with the square.
 MOST_NEIGHBOURS = 100
-# Lengths of a drawn arrow, as shares of the body's diagonal.
+# Shortest and longest arrow, as shares of the body's diagonal.
 SHORTEST_ARROW, LONGEST_ARROW = 0.1, 0.18
-# Of its shaft, as a share of the body's diagonal.
+# Radius of the shaft of an arrow, as a share of the body's diagonal.
 ARROW_RADIUS = 0.0042
-# How much of an arrow's colour is seen in front of the body, which it must not hide.
+# Opacity of arrows in front of the body.
 ARROW_OPACITY = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Triangles ready to be drawn; each has three corners of its own.
+    """Triangles ready to be rendered, which share no corners.
 
     Parameters
     ----------
     camera : Camera
     corners, normals : (m, 3, 3) ndarray
-        Places and unit normals of the corners of the body.
+        Positions and unit normals of the corners of the body.
     shares : (m, 3) ndarray
-        Where the corners lie on the colour map, 0 to 1.
+        Positions of the corners on the colour map, 0 to 1.
     arrows, arrow_normals : (k, 3, 3) ndarray
         Corners and normals of the lights' arrows.
     table : (256, 3) ndarray
         The colour map, red, green and blue from 0 to 1.
     colours : (m, 3, 3) ndarray or None
-        Colours of the corners themselves, from 0 to 1, in place of the colour map.
+        Colours of the corners, from 0 to 1, if they replace the colour map.
     """
 
     camera: Camera
@@ -67,26 +67,26 @@ class Stage:
 
     @property
     def background(self) -> Vector:
-        """Red, green and blue behind the body."""
+        """Background colour, red, green and blue from 0 to 1."""
         return BACKGROUND if self.colours is None else DARK
 
 
 def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
-    """What the ends of the colour map stand for, or None where no light leaves.
+    """The exitance at the ends of the colour map; None if no light leaves.
 
-    The range ends at the largest value; it begins at the smallest positive one, yet no further than
-    `DECADES` below the largest, and spans a factor of `NARROWEST` at least.
+    The range ends at the largest value. It begins at the smallest positive one, but at most `DECADES` below the
+    largest, and spans at least a factor of `NARROWEST`.
     """
-    seen = exitance[np.isfinite(exitance) & (exitance > 0)]
-    if len(seen) == 0:
+    positive = exitance[np.isfinite(exitance) & (exitance > 0)]
+    if len(positive) == 0:
         return None
-    top = float(seen.max())
-    bottom = max(float(seen.min()), top * 10.0**-DECADES)
+    top = float(positive.max())
+    bottom = max(float(positive.min()), top * 10.0**-DECADES)
     return min(bottom, top / NARROWEST), top
 
 
 def map_shares(exitance: FloatArray, ends: tuple[float, float] | None) -> FloatArray:
-    """Where each value lies on the colour map, 0 to 1, by its logarithm; what is not positive lies at 0."""
+    """Positions on the colour map, 0 to 1, by the logarithm of the exitance; values that are not positive are at 0."""
     if ends is None:
         return np.zeros(len(exitance))
     bottom, top = ends
@@ -95,7 +95,7 @@ def map_shares(exitance: FloatArray, ends: tuple[float, float] | None) -> FloatA
 
 
 def color_table() -> FloatArray:
-    """Red, green and blue, 0 to 1, at 256 steps of the colour map."""
+    """The colour map at 256 steps, red, green and blue from 0 to 1, (256, 3)."""
     from matplotlib import colormaps  # noqa: PLC0415
 
     return np.asarray(colormaps[COLOR_MAP](np.linspace(DARKEST, 1.0, 256))[:, :3])
@@ -111,7 +111,7 @@ def build_stage(
     up: Vector = UPRIGHT,
     toward: FloatArray | None = None,
 ) -> Stage:
-    """Choose the camera, unless the direction to the eye is given, and make arrows, normals and colours for it."""
+    """Make the camera, arrows, normals and colours of a picture; `toward`, if given, sets the direction to the eye."""
     shares = map_shares(exitance, exitance_range(exitance))
     corners = points[triangles]
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -119,7 +119,7 @@ def build_stage(
     arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     marked = [np.array(ray.end) for ray in lights] + [tail for tail, _ in shafts]
-    # A lamp far away must not shrink the body to a speck.
+    # A light far away must not shrink the body to a speck.
     near = [place[None] for place in marked if np.linalg.norm(place - middle) < diagonal]
     if toward is None:
         toward = choose_view(corners, exitance[triangles].mean(axis=1), lights, diagonal, up)
@@ -136,7 +136,7 @@ def build_stage(
 
 
 def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:
-    """Tail and tip of a light's arrow, of a length that suits a body of this diagonal."""
+    """Tail and tip of a light's arrow, with its length clipped to shares of the body's diagonal."""
     tip, back = np.asarray(ray.end, dtype=float), np.subtract(ray.start, ray.end)
     length = float(np.linalg.norm(back))
     drawn = min(max(length, SHORTEST_ARROW * diagonal), LONGEST_ARROW * diagonal)
@@ -144,13 +144,18 @@ def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:
 
 
 def see_through(image: Image, under: Image, background: Vector) -> Image:
-    """A picture with arrows over one without them, through which the body is seen; in front of nothing they are solid.
+    """Blend a picture with arrows and one without, so that arrows are translucent where the body is behind them.
 
     Parameters
     ----------
     image, under : (h, w, 3) ndarray of uint8
-        With and without arrows.
+        The picture with and without arrows.
     background : (3,) floats
+        Red, green and blue from 0 to 1.
+
+    Returns
+    -------
+    (h, w, 3) ndarray of uint8
     """
     ground = np.round(255 * np.asarray(background)).astype(np.uint8)
     over = (image != under).any(axis=2) & (under != ground).any(axis=2)
@@ -160,10 +165,10 @@ def see_through(image: Image, under: Image, background: Vector) -> Image:
 
 
 def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
-    """Unit normals (m, 3, 3) of the corners of triangles, smooth over the body yet broken at sharp edges.
+    """Unit normals (m, 3, 3) at the corners of triangles, smooth except across sharp edges.
 
-    A corner's normal is the mean, weighted by area, of the triangles round its vertex that face nearly
-    the way its own triangle does.
+    The normal at a corner is the mean, weighted by area, over those triangles at its vertex whose normals are within
+    40 degrees of that of its own triangle.
     """
     from scipy.sparse import csr_array  # noqa: PLC0415
 
@@ -174,16 +179,16 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     vertex = triangles.ravel()
     calm = np.flatnonzero(np.bincount(vertex)[vertex] <= MOST_NEIGHBOURS)
     at_vertex = csr_array((np.ones(len(calm)), (calm, vertex[calm])), shape=(count, int(vertex.max()) + 1))
-    one, other = (at_vertex @ at_vertex.T).tocoo().coords
-    alike = np.einsum("ij,ij->i", flat[owner[one]], flat[owner[other]]) > SHARP
-    one, other = one[alike], other[alike]
-    summed = csr_array((np.ones(len(one)), (one, owner[other])), shape=(count, len(triangles))) @ weighted
+    corner, other = (at_vertex @ at_vertex.T).tocoo().coords
+    alike = np.einsum("ij,ij->i", flat[owner[corner]], flat[owner[other]]) > SHARP
+    corner, other = corner[alike], other[alike]
+    summed = csr_array((np.ones(len(corner)), (corner, owner[other])), shape=(count, len(triangles))) @ weighted
     normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
     return np.asarray(unit(normals).reshape(-1, 3, 3))
 
 
 def _arrow(tail: FloatArray, tip: FloatArray, radius: float, sides: int = 24) -> tuple[FloatArray, FloatArray]:
-    """Corners and normals (k, 3, 3) of an arrow: a shaft, and a head that ends at `tip`."""
+    """Corners and normals (k, 3, 3) of an arrow with a shaft and a head that ends at `tip`."""
     axis = unit(tip - tail)
     across = unit(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]))
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)

@@ -1,4 +1,4 @@
-"""From where a picture shows a body: a parallel projection, chosen by the light or by the case file."""
+"""The camera of a picture: a parallel projection, chosen by the light or given by the case file."""
 
 import math
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from tetlux.meshing.surface.surface import Surface
 
 # Pixels of the panel that shows the body.
 PANEL = (1150, 880)
-# Where the lamp stands, along the camera's axes: above the viewer's left shoulder.
+# Direction to the lamp in the camera's axes: above the viewer's left shoulder.
 LAMP = (-0.35, 0.5, 0.8)
-# Degrees about the vertical from the lit side to the eye, the best first.
+# Angles about the vertical between lit side and eye, degrees, the best first.
 TURNS = (50.0, -50.0, 25.0, -25.0, 80.0, -80.0, 0.0)
-# So many entry points are looked for; each costs a test of all triangles.
+# This many entry points are tested for visibility; each costs a test of all triangles.
 MOST_ENTRIES = 12
-# The margin round the body, as a share of the panel.
+# Margin around the body, as a share of the panel.
 MARGIN = 0.05
-# Of the body's diagonal: what lies nearer in front of a point of the surface is that surface itself.
+# An intersection nearer to a point of the surface than this share of the diagonal is that surface itself.
 SKIN = 2e-3
-# Degrees above the horizon of a camera that is given by its azimuth alone.
+# Elevation of a camera that is given by its azimuth alone, degrees.
 DEFAULT_ELEVATION = 20.0
 UPRIGHT: Vector = (0.0, 0.0, 1.0)
 
@@ -37,7 +37,7 @@ class Ray:
 
     @property
     def is_point(self) -> bool:
-        """Whether this light has no direction."""
+        """Whether the light is drawn as a point."""
         return self.start == self.end
 
 
@@ -50,7 +50,7 @@ class Camera:
     right, up, toward : (3,) ndarray
         Unit vectors: along the picture's rows, up its columns, and from the body to the eye.
     center : (3,) ndarray
-        The point in the middle of the panel.
+        The point at the centre of the panel.
     pixel : float
         Size of a pixel of the panel, unit of length.
     """
@@ -67,23 +67,23 @@ class Camera:
         return unit(np.column_stack([self.right, self.up, self.toward]) @ LAMP)
 
     def project(self, points: FloatArray) -> FloatArray:
-        """Pixels right of the panel's left edge and below its top edge, and nearness in pixels, (n, 3)."""
+        """Column and row in the panel, from its left and top edges, and nearness to the eye, pixels, (n, 3)."""
         offset = np.asarray(points) - self.center
         across, above, near = (offset @ axis / self.pixel for axis in (self.right, self.up, self.toward))
         return np.column_stack([0.5 * PANEL[0] + across, 0.5 * PANEL[1] - above, near])
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """Vectors (..., 3) of length 1; zeros stay zeros."""
+    """Normalize vectors (..., 3); zeros stay zeros."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.where(length > 0, length, 1.0))
 
 
 def upright_axes(up: Vector) -> FloatArray:
-    """Three unit vectors (3, 3): the x axis laid level, the one 90 degrees anticlockwise of it seen from above, up.
+    """Three unit vectors (3, 3): the x axis made horizontal, that turned by 90 degrees about `up`, and `up`.
 
-    Where x itself is up the y axis takes its place. With y up, -90 degrees is z: the front of a model, as with z up
-    it is -y.
+    If x itself is up, the y axis takes its place. An azimuth of -90 degrees, the front of most models, is then -y if
+    z is up and z if y is up.
     """
     above = unit(np.asarray(up, dtype=float))
     first = np.eye(3)[1 if abs(above[0]) > 0.9 else 0]
@@ -92,19 +92,19 @@ def upright_axes(up: Vector) -> FloatArray:
 
 
 def direction_of(azimuth: float, elevation: float, up: Vector) -> FloatArray:
-    """Unit vector at so many degrees anticlockwise of the first of `upright_axes`, and so many above the horizon."""
+    """Unit vector at an azimuth, anticlockwise from the first of `upright_axes`, and an elevation, both degrees."""
     around, above = math.radians(azimuth), math.radians(elevation)
     level = math.cos(above)
     return np.array([level * math.cos(around), level * math.sin(around), math.sin(above)]) @ upright_axes(up)
 
 
 def toward_camera(camera: CameraSpec, surface: Surface, up: Vector) -> FloatArray | None:
-    """Unit vector from the body to the eye, or None where that is at the body's very middle, as in a ring's hole.
+    """Unit vector from the body to the eye; None if the camera is at the centre of the bounding box, as in a ring.
 
     Raises
     ------
     InputError
-        If it is inside the body.
+        If the camera is inside the body.
     """
     if camera.position is None:
         assert camera.azimuth is not None
@@ -112,7 +112,7 @@ def toward_camera(camera: CameraSpec, surface: Surface, up: Vector) -> FloatArra
         return direction_of(camera.azimuth, elevation, up)
     place = np.array(camera.position)
     if surface.contains(place[None])[0]:
-        raise InputError("the camera is inside the body, where no light of its surface goes; move it outside.")
+        raise InputError("the camera is inside the body; move it outside.")
     away = place - 0.5 * (surface.points.min(axis=0) + surface.points.max(axis=0))
     return unit(away) if np.linalg.norm(away) > 1e-6 * surface.diagonal else None
 
@@ -120,33 +120,38 @@ def toward_camera(camera: CameraSpec, surface: Surface, up: Vector) -> FloatArra
 def choose_view(
     corners: FloatArray, brightness: FloatArray, lights: tuple[Ray, ...], diagonal: float, up: Vector
 ) -> FloatArray:
-    """Unit vector to the eye: towards the lit side, turned aside and a bit up, entry points in view.
+    """Choose the unit vector to the eye: from the lit side, turned aside and raised, with most entry points visible.
 
     Parameters
     ----------
     corners : (m, 3, 3) ndarray
-        Of the body's triangles.
+        Corners of the body's triangles.
     brightness : (m,) ndarray
+        Exitance of the triangles, W/unit².
     lights : tuple of Ray
     diagonal : float
-        Of the body, unit.
+        Diagonal of the body, unit.
     up : (3,) floats
+
+    Returns
+    -------
+    (3,) ndarray
     """
     lit = _lit_side(corners, brightness, lights)
     entries = np.array([ray.end for ray in lights if not ray.is_point][:MOST_ENTRIES]).reshape(-1, 3)
     best, most = _oblique(lit, TURNS[0], up), -1
     for turn in TURNS:
         view = _oblique(lit, turn, up)
-        seen = int(in_view(corners, entries, view, diagonal).sum())
-        if seen > most:
-            best, most = view, seen
-        if seen == len(entries):
+        visible = int(in_view(corners, entries, view, diagonal).sum())
+        if visible > most:
+            best, most = view, visible
+        if visible == len(entries):
             break
     return best
 
 
 def _lit_side(corners: FloatArray, brightness: FloatArray, lights: tuple[Ray, ...]) -> FloatArray:
-    """Where the light comes from: against the arrows, or else where most of it leaves; may be zero."""
+    """Direction that the light comes from: against the arrows, else where most of it leaves; zero if there is none."""
     back = sum((unit(np.subtract(ray.start, ray.end)) for ray in lights), np.zeros(3))
     if np.linalg.norm(back) > 0.1:
         return unit(back)
@@ -154,12 +159,12 @@ def _lit_side(corners: FloatArray, brightness: FloatArray, lights: tuple[Ray, ..
         corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     )
     mean = power.sum(axis=0) / max(float(np.linalg.norm(power, axis=1).sum()), np.finfo(float).tiny)
-    # A body that glows nearly evenly has no lit side.
+    # A body with nearly uniform exitance has no lit side.
     return unit(mean) if np.linalg.norm(mean) > 0.05 else np.zeros(3)
 
 
 def _oblique(lit: FloatArray, turn: float, up: Vector) -> FloatArray:
-    """A view `turn` degrees about the vertical from the lit side, and from above or, if it must be, below."""
+    """Direction to the eye at `turn` degrees about the vertical from the lit side, raised unless that is far below."""
     x, y, z = upright_axes(up) @ lit
     level = math.hypot(x, y)
     height = math.degrees(math.atan2(z, level))
@@ -168,7 +173,7 @@ def _oblique(lit: FloatArray, turn: float, up: Vector) -> FloatArray:
 
 
 def in_view(corners: FloatArray, places: FloatArray, toward: FloatArray, diagonal: float) -> BoolArray:
-    """Whether nothing of a body of triangles (m, 3, 3) hides places of its surface (n, 3) from the eye, (n,)."""
+    """Whether places (n, 3) on a body of triangles (m, 3, 3) are visible from the direction `toward`, (n,)."""
     count = len(corners)
     free = np.empty(len(places), dtype=bool)
     for i, place in enumerate(places):
@@ -180,10 +185,10 @@ def in_view(corners: FloatArray, places: FloatArray, toward: FloatArray, diagona
 
 
 def camera_at(points: FloatArray, toward: FloatArray, up: Vector) -> Camera:
-    """The camera that looks against `toward`, with `up` upright and all points (n, 3) within the panel."""
+    """The camera that looks from the direction `toward`, with all points (n, 3) within its panel."""
     first, _, above = upright_axes(up)
     right = np.cross(above, toward)
-    # From right above or below nothing is upright: the first axis runs to the right.
+    # Seen from straight above or below, the first axis runs to the right.
     right = unit(right) if np.linalg.norm(right) > 1e-6 else first
     upward = np.cross(toward, right)
     axes = np.column_stack([right, upward, toward])

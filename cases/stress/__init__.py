@@ -1,1 +1,1 @@
-"""`tetlux stress`: the solver driven to its edges, and a map of what breaks there."""
+"""`tetlux stress`: runs at extreme values, and a map of where the solver fails."""

@@ -1,4 +1,4 @@
-"""Bodies that are hard on a mesher: needles, thin plates, touching bodies, cavities, necks and spikes."""
+"""Bodies that are hard to mesh: needles, thin plates, touching bodies, cavities, necks and spikes."""
 
 from collections.abc import Callable
 
@@ -14,15 +14,19 @@ SEGMENTS = 32
 
 
 def revolve(heights: npt.ArrayLike, radii: npt.ArrayLike, name: str) -> Surface:
-    """Revolve a profile about z.
+    """Make a surface of revolution about z.
 
     Parameters
     ----------
     heights : (k + 2,) array_like
-        Ascending; the first and the last are those of the tips.
+        Ascending; the first and the last are the heights of the tips.
     radii : (k,) array_like
-        At the heights between.
+        Radii at the heights between.
     name : str
+
+    Returns
+    -------
+    Surface
     """
     z, r = np.asarray(heights, dtype=float), np.asarray(radii, dtype=float)
     angle = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
@@ -32,7 +36,7 @@ def revolve(heights: npt.ArrayLike, radii: npt.ArrayLike, name: str) -> Surface:
 
 
 def _faces_of_revolution(rings: int) -> IntArray:
-    """Triangles between rings of points and to the tips, which follow the rings: the lower one, then the upper."""
+    """Triangles between rings of points, and to the lower and upper tip, whose points follow those of the rings."""
     here = np.arange(SEGMENTS)
     after = (here + 1) % SEGMENTS
     faces = []
@@ -47,13 +51,13 @@ def _faces_of_revolution(rings: int) -> IntArray:
 
 
 def merge(first: Surface, second: Surface, name: str) -> Surface:
-    """One surface of the triangles of two."""
+    """Combine the triangles of two surfaces in one."""
     points = np.vstack([first.points, second.points])
     return surface_from_arrays(points, np.vstack([first.faces, second.faces + len(first.points)]), name=name)
 
 
 def hollow(outside: float, inside: float, name: str) -> Surface:
-    """A ball with a ball-shaped hole in it."""
+    """A ball with a concentric spherical cavity."""
     hole = shapes.sphere(inside, subdivisions=3)
     return merge(shapes.sphere(outside, subdivisions=3), Surface(hole.points, hole.faces[:, ::-1]), name)
 
@@ -89,7 +93,7 @@ def _touching_boxes() -> Surface:
     return merge(first, second, "touching boxes")
 
 
-# Each with a point inside it, in mean free paths.
+# Each body with a point inside it; lengths in mean free paths.
 BODIES: dict[str, tuple[Callable[[], Surface], Vector]] = {
     "needle": (_needle, (0.1, 0.0, 5.0)),
     "thin plate": (lambda: shapes.box((20.0, 20.0, 0.4)), (1.0, 2.0, 0.1)),

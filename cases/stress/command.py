@@ -1,4 +1,4 @@
-"""`tetlux stress`: scenarios to the edges and beyond, and a map of what breaks there."""
+"""`tetlux stress`: run scenarios at extreme values, and map where the solver fails."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from tetlux.cases.stress.rules import violations
 from tetlux.cases.stress.trials import TIME_LIMIT, Trial, run_trials
 from tetlux.cases.write.publish import check_writable
 
-# Trials between two lines that say how far it is.
+# Trials between two progress lines.
 PROGRESS = 50
 
 
@@ -31,17 +31,17 @@ def stress(
     out : Path
         Folder of the three files.
     quick : bool
-        Few values on each axis.
+        Whether to run a few values on each axis only.
     panels : sequence of Panel
     time_limit : float
         Seconds after which a trial counts as hung.
     report : callable
-        Called with lines of text on the way, and with the map in words.
+        Called with progress lines, and with the map as text.
 
     Returns
     -------
     int
-        0 if no rule is broken by a variant that may not, else 1.
+        1 if a variant that counts breaks a rule, else 0.
 
     Raises
     ------
@@ -55,16 +55,16 @@ def stress(
     total = sum(len(panel.places()) * len(panel.variants) for panel in panels)
     report(f"{total} runs on {len(panels)} pairs of axes")
     trials: list[Trial] = []
-    # An empty folder, so that no mesh is that of an earlier version of the mesher.
+    # An empty cache, so that no mesh was made by an earlier version of the mesher.
     with tempfile.TemporaryDirectory(prefix="tetlux-stress-") as meshes:
         for trial in run_trials(panels, meshes=Path(meshes), time_limit=time_limit):
             trials.append(trial)
             if len(trials) % PROGRESS == 0:
-                report(f"{len(trials)} of {total}, {sum(map(bool, map(violations, trials)))} of them violations")
+                report(f"{len(trials)} of {total} done, {sum(map(bool, map(violations, trials)))} violations")
     trials = _sort(trials, panels)
-    words = as_markdown(trials)
-    write_map(trials, words, out)
-    report(words)
+    text = as_markdown(trials)
+    write_map(trials, text, out)
+    report(text)
     report(f"written to {out}: {', '.join(FILES)}")
     return 1 if any(map(violations, trials)) else 0
 

@@ -1,4 +1,4 @@
-"""What the stress map writes: a table, the map in words, and a picture."""
+"""The files of the stress map: a table, the map as text, and a picture."""
 
 import csv
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from tetlux.cases.stress.picture import draw_map
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
-from tetlux.cases.write.publish import cannot_write, claimed, publish
+from tetlux.cases.write.publish import replace_files
 
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (
@@ -20,25 +20,21 @@ COLUMNS = (
 )
 
 
-def write_map(trials: Sequence[Trial], words: str, out: Path) -> None:
-    """Write the files, whole: into a folder beside them first.
+def write_map(trials: Sequence[Trial], text: str, out: Path) -> None:
+    """Write the three files, all or none.
 
     Raises
     ------
     RunError
         If they cannot be written.
     """
-    with claimed(out, ".") as folder:
-        try:
-            with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
-                writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
-                writer.writeheader()
-                writer.writerows(map(_as_row, trials))
-            (folder / "stress.md").write_text(words, encoding="utf-8")
-            draw_map(trials, folder / "stress.png")
-            publish(folder, out, FILES)
-        except OSError as error:
-            raise cannot_write(out, error) from error
+    with replace_files(out, FILES) as folder:
+        with (folder / "stress.csv").open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
+            writer.writeheader()
+            writer.writerows(map(_as_row, trials))
+        (folder / "stress.md").write_text(text, encoding="utf-8")
+        draw_map(trials, folder / "stress.png")
 
 
 def _as_row(trial: Trial) -> dict[str, Any]:

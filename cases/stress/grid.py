@@ -5,13 +5,13 @@ from dataclasses import replace
 from tetlux.cases.stress import scenarios
 from tetlux.cases.stress.bodies import BODIES
 from tetlux.cases.stress.panels import Axis, Panel
-from tetlux.cases.stress.variants import DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, OF_SIGN
+from tetlux.cases.stress.variants import DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, SIGN_VARIANTS
 
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
-BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
+ALBEDO_BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
 DECAY = Axis("σ_tr h", (0.01, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0, 1000.0), (0.01, 1.0, 10.0, 1000.0))
 INDEX = Axis("refractive index n", (0.5, 0.75, 1.0, 1.4, 2.0, 3.0, 4.0), (0.5, 1.0, 4.0))
-PEAK = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.99))
+G = Axis("g", (-0.9, -0.5, 0.0, 0.5, 0.8, 0.95, 0.99), (-0.9, 0.0, 0.99))
 DEPTH = Axis("depth (mean free paths)", (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0), (0.01, 1.0, 10.0))
 RADIUS = Axis("radius (mean free paths)", (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0), (0.1, 0.3, 1.0, 100.0))
 THICKNESS = replace(RADIUS, name="thickness (mean free paths)", few=(0.1, 1.0, 100.0))
@@ -24,48 +24,48 @@ PANELS = (
         "albedo and mesh, point",
         "a point in a ball, on a given mesh of edges h",
         DECAY,
-        BELOW_ONE,
+        ALBEDO_BELOW_ONE,
         scenarios.point_by_decay_and_albedo,
-        (*OF_SIGN, FREE_SPACE, NOTHING),
+        (*SIGN_VARIANTS, FREE_SPACE, NOTHING),
     ),
     Panel(
         "albedo and mesh, diffuse light",
         "a ball in diffuse light, on a given mesh of edges h",
         DECAY,
-        BELOW_ONE,
+        ALBEDO_BELOW_ONE,
         scenarios.diffuse_by_decay_and_albedo,
-        OF_SIGN,
+        SIGN_VARIANTS,
     ),
     Panel(
         "albedo and mesh, glow",
         "a ball that glows throughout, on a given mesh of edges h",
         DECAY,
-        BELOW_ONE,
+        ALBEDO_BELOW_ONE,
         scenarios.glow_by_decay_and_albedo,
-        OF_SIGN,
+        SIGN_VARIANTS,
     ),
     Panel(
         "bad tetrahedra",
         "a point in a ball on a given mesh of edges h, slivers and needles among its tetrahedra",
         DECAY,
         QUALITY,
-        scenarios.by_decay_and_quality,
-        (*OF_SIGN, NOTHING),
+        scenarios.point_by_decay_and_quality,
+        (*SIGN_VARIANTS, NOTHING),
     ),
     Panel(
         "contrast and mesh",
         "concentric balls in diffuse light, on a given mesh; σ_tr h of the shell",
         CONTRAST,
         DECAY,
-        scenarios.by_contrast_and_decay,
-        OF_SIGN,
+        scenarios.diffuse_by_contrast_and_decay,
+        SIGN_VARIANTS,
     ),
     Panel(
         "contrasts",
         "concentric balls of radius 10 and 6 mean free paths, the core glows",
         replace(CONTRAST, name="contrast of σ_s'"),
         replace(CONTRAST, name="contrast of σ_a"),
-        scenarios.by_contrasts,
+        scenarios.glow_by_contrasts,
         (DEFAULT, NOT_REFINED),
     ),
     Panel(
@@ -75,7 +75,7 @@ PANELS = (
             CONTRAST, name="σ_a of the core by σ_s'", values=(1e-4, 0.01, 1.0, 10.0, 100.0, 1e3), few=(0.01, 1.0, 100.0)
         ),
         Axis("core radius", (2.0, 4.0, 6.0, 8.0), (2.0, 6.0)),
-        scenarios.diffuse_by_core,
+        scenarios.diffuse_by_core_absorption_and_radius,
         (DEFAULT, NOT_REFINED),
     ),
     Panel(
@@ -91,15 +91,15 @@ PANELS = (
         "a point 1 mean free path deep in a ball of radius 10",
         INDEX,
         ALBEDO,
-        scenarios.by_index_and_albedo,
-        (*OF_SIGN, NOT_REFINED, NOTHING),
+        scenarios.point_by_index_and_albedo,
+        (*SIGN_VARIANTS, NOT_REFINED, NOTHING),
     ),
     Panel(
         "depth and curvature",
         "a point in a ball, reduced albedo 0.99",
         RADIUS,
         DEPTH,
-        scenarios.by_radius_and_depth,
+        scenarios.point_by_radius_and_depth,
         (DEFAULT, NOT_REFINED, FREE_SPACE, NOTHING),
         lambda radius, depth: depth <= radius,
     ),
@@ -108,15 +108,15 @@ PANELS = (
         "a point 1 mean free path below the face of a slab, or half-way through it",
         THICKNESS,
         ALBEDO,
-        scenarios.by_thickness_and_albedo,
+        scenarios.point_by_thickness_and_albedo,
         (DEFAULT, NOT_REFINED, NOTHING),
     ),
     Panel(
         "forward peak and index",
         "a beam through a ball of radius 5, compared 1 mean free path off",
-        PEAK,
+        G,
         INDEX,
-        scenarios.by_peak_and_index,
+        scenarios.beam_by_g_and_index,
         (DEFAULT, NOT_REFINED),
     ),
     Panel(
@@ -124,7 +124,7 @@ PANELS = (
         "balls of radius 10 mean free paths, all lengths scaled",
         LENGTH,
         Axis("", scenarios.LENGTH_KINDS),
-        scenarios.by_length,
+        scenarios.ball_by_length_and_light,
         (DEFAULT, NOTHING),
     ),
     Panel(
@@ -132,7 +132,7 @@ PANELS = (
         "bodies some mean free paths large",
         Axis("", tuple(BODIES)),
         Axis("", scenarios.SHAPE_LIGHTS, (scenarios.SHAPE_LIGHTS[0], scenarios.SHAPE_LIGHTS[3])),
-        scenarios.by_shape_and_light,
+        scenarios.body_by_shape_and_light,
         (DEFAULT, NOT_REFINED),
     ),
 )

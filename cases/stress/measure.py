@@ -1,4 +1,4 @@
-"""What is measured of one scenario and one variant of the solver."""
+"""`measure`: solve a scenario with a variant of the solver, and compute what it is judged by."""
 
 import time
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import tetrahedralize
 
-# Where the adaptive runs stop: the map shows what breaks, not how fine a mesh can get.
+# Limit of the adaptive runs, low since the map shows failures and not how fine a mesh can get.
 MOST_TETRAHEDRA = 30_000
 
 
@@ -24,25 +24,25 @@ class Diagnostics:
     Attributes
     ----------
     lowest : float
-        Least fluence at a node, as a share of the largest.
+        Smallest fluence at a node, as a share of the largest.
     overshoot : float or None
-        Largest fluence at a node over the bound of the maximum principle, less 1.
+        Largest fluence at a node divided by the bound of the maximum principle, minus 1.
     ledger : float
         Missing power, as a share of the incident power.
     residual : float
-        Largest relative residual of the linear systems on the last mesh, computed anew from their solutions.
+        Largest relative residual of the linear systems on the last mesh, recomputed from their solutions.
     iterations : int
-        Most iterations that one of them took.
+        Most iterations of one of these systems.
     estimate : float
         Estimated relative L2 error of the exitance.
     error : float or None
-        The true one, where there is a closed form.
+        The true relative L2 error, if there is a closed form.
     scaling : float or None
         Largest difference from the exitance of the same scenario at unit scale, as a share of the largest exitance.
     finite : bool
-        Whether fluence and exitance are numbers throughout.
+        Whether fluence and exitance are finite everywhere.
     may_be_negative : bool
-        Whether the equation itself may have a fluence below zero.
+        Whether the exact solution itself may be negative.
     nodes : int
     seconds : float
     warnings : tuple of str
@@ -104,7 +104,7 @@ def _solve(scenario: Scenario, variant: Variant) -> Solution:
 
 def _true_error(solution: Solution, truth: Truth) -> float:
     samples, exitance = truth
-    # Scaled to its largest value: in an opaque body the square of what leaves would underflow.
+    # Scaled by the largest value: in an opaque body the square of the exitance would underflow.
     largest = float(exitance.max())
     values = solution.exitance_at(samples.points)
     with np.errstate(over="ignore"):
@@ -117,5 +117,5 @@ def _scaling_error(solution: Solution, unit_scale: Solution) -> float:
 
 
 def _dimensionless_exitance(solution: Solution) -> FloatArray:
-    """Exitance at the nodes over its mean if all power left."""
+    """Exitance at the nodes divided by the mean exitance if all power left."""
     return np.asarray(solution.exitance * (solution.mesh.area / solution.power.incident))

@@ -1,4 +1,4 @@
-"""Meshes of a ball that are the same on every machine: layers of tetrahedra, good ones or with bad ones among them."""
+"""Reproducible meshes of a ball, made of layers of tetrahedra, and a way to degrade some of these."""
 
 import numpy as np
 
@@ -7,24 +7,24 @@ from tetlux.meshing.shapes import sphere
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Nodes that are moved, at most. None is next to another, so that each makes a bad tetrahedron of its own.
+# The most nodes that are moved. No two of them are neighbours, so that each makes a bad tetrahedron of its own.
 MOST_DEGRADED = 60
 HALVINGS = 40
 
 
-def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0) -> TetMesh:
-    """A ball of nested icospheres, the prisms between which are cut into three tetrahedra each.
+def layered_ball(radius: float, subdivisions: int, layers: int, core: int = 0) -> TetMesh:
+    """Mesh a ball by nested icospheres; each prism between two of them is cut into three tetrahedra.
 
     Parameters
     ----------
     radius : float
         Unit.
     subdivisions : int
-        Of the icospheres: 2 gives 320 triangles.
+        Subdivisions of the icospheres; 2 gives 320 triangles.
     layers : int
-        How many, evenly spaced; inside the last one all tetrahedra meet at the centre.
+        Number of layers, evenly spaced; in the innermost all tetrahedra meet at the centre.
     core : int
-        So many of them, the inner ones, are region 1.
+        Number of inner layers that are region 1.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0)
     outward = shell.points / np.linalg.norm(shell.points, axis=1)[:, None]
     shares = np.arange(layers, 0, -1) / layers
     points = np.vstack([*(radius * share * outward for share in shares), np.zeros(3)])
-    # Prisms are cut by the order of their nodes, so that neighbours agree on the diagonals between them.
+    # Prisms are cut by the order of their nodes, so that neighbours share the diagonals of their common face.
     a, b, c = np.sort(shell.faces, axis=1).T
     prism = np.concatenate(
         [
@@ -51,24 +51,24 @@ def ball_of_layers(radius: float, subdivisions: int, layers: int, core: int = 0)
 
 
 def orient(points: FloatArray, tetrahedra: IntArray) -> IntArray:
-    """Reorder corners so that all volumes are positive."""
-    turned = tetrahedra.copy()
+    """Swap corners of inverted tetrahedra, so that all volumes are positive."""
+    oriented = tetrahedra.copy()
     inverted = tetrahedron_volumes(points, tetrahedra) < 0
-    turned[inverted, :2] = tetrahedra[inverted][:, [1, 0]]
-    return turned
+    oriented[inverted, :2] = tetrahedra[inverted][:, [1, 0]]
+    return oriented
 
 
 def degrade(mesh: TetMesh, quality: float) -> TetMesh:
-    """Make some tetrahedra of a mesh bad: slivers and needles, in turn.
+    """Degrade some tetrahedra of a mesh to slivers and needles, in turn.
 
     An inner node is moved towards the opposite face of one of its tetrahedra (a sliver), or along one of its edges (a
-    needle), as far as it takes to make that tetrahedron as bad as is asked for and leave no other worse.
+    needle), until that tetrahedron has the quality that is asked for and no other is worse.
 
     Parameters
     ----------
     mesh : TetMesh
     quality : float
-        That of the worst tetrahedra, see `TetMesh.quality`.
+        Quality of the worst tetrahedra, see `TetMesh.quality`.
 
     Returns
     -------
@@ -107,17 +107,17 @@ def _fixed_nodes(mesh: TetMesh) -> BoolArray:
 
 
 def _bad_place(points: FloatArray, near: IntArray, node: int, quality: float, *, sliver: bool) -> FloatArray | None:
-    """Where to move a node of tetrahedra `near` it for one of them to be a sliver, or a needle; None if nowhere."""
+    """Where to move a node so that one of its tetrahedra `near` becomes a sliver or a needle; None if nowhere."""
     for cell in near:
         others = points[cell[cell != node]]
-        place = _place(points, near, node, others.mean(axis=0) if sliver else others[0], quality)
+        place = _approach(points, near, node, others.mean(axis=0) if sliver else others[0], quality)
         if place is not None:
             return place
     return None
 
 
-def _place(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quality: float) -> FloatArray | None:
-    """Move a node towards `aim` until the worst tetrahedron has the quality wanted; None if that is never so."""
+def _approach(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quality: float) -> FloatArray | None:
+    """Where a node, moved towards `aim`, gives the worst tetrahedron a quality, by bisection; None if nowhere."""
     local = np.unique(near)
     cells = np.searchsorted(local, near)
     own = int(np.searchsorted(local, node))
@@ -131,5 +131,5 @@ def _place(points: FloatArray, near: IntArray, node: int, aim: FloatArray, quali
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if worst(middle) > quality else (low, middle)
-    # A tetrahedron may be turned inside out before any is bad.
+    # A tetrahedron may become inverted before any has the quality.
     return np.asarray(points[node] + low * (aim - points[node])) if worst(low) < 2.0 * quality else None

@@ -1,4 +1,4 @@
-"""What a panel of the stress map is: a pair of axes, the scenarios over them, and the variants of the solver."""
+"""`Panel` of the stress map: a pair of axes, the scenarios over them, and the variants of the solver."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -11,7 +11,7 @@ Value = float | str
 
 @dataclass(frozen=True)
 class Axis:
-    """What is varied, and how.
+    """An axis of a panel: the quantity that is varied, and its values.
 
     Attributes
     ----------
@@ -19,7 +19,7 @@ class Axis:
         With its unit, if it has one.
     values : tuple of float or str
     few : tuple of float or str
-        Those of a quick map; the same if it is not given.
+        The values of a quick map; by default `values`.
     """
 
     name: str
@@ -29,19 +29,19 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """A pair of axes, with the variants that are compared on it.
+    """A pair of axes, and the variants that are compared over it.
 
     Attributes
     ----------
     name : str
     description : str
-        What is solved for.
+        What the scenarios are.
     x, y : Axis
     make : callable
-        The scenario at a pair of values; a function of a module, as it is called in other processes.
+        Makes the scenario at a pair of values; defined at module level, since other processes call it.
     variants : tuple of Variant
     fits : callable
-        Whether there is a scenario at a pair of values.
+        Whether a pair of values has a scenario.
     """
 
     name: str
@@ -53,10 +53,10 @@ class Panel:
     fits: Callable[..., bool] = lambda *_: True
 
     def quick(self) -> "Panel":
-        """The same with few values."""
+        """The same panel with few values."""
         x, y = (replace(axis, values=axis.few or axis.values) for axis in (self.x, self.y))
         return replace(self, x=x, y=y)
 
     def places(self) -> list[tuple[Value, Value]]:
-        """The pairs of values that there are scenarios at, row by row."""
+        """The pairs of values that have scenarios, row by row."""
         return [(x, y) for y in self.y.values for x in self.x.values if self.fits(x, y)]

@@ -1,4 +1,4 @@
-"""The stress map as a picture: for each panel a map of each variant, coloured by error; broken rules are marked."""
+"""The picture of the stress map: for each panel a map of each variant, coloured by error, with broken rules marked."""
 
 import math
 import re
@@ -19,18 +19,18 @@ from tetlux.cases.stress.rules import broken_rules, is_warned, violations
 from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 
-# Inches: width of the picture, size of a map, gap between maps, margins of a panel (left, right, above, below), more of
-# them where the values of an axis are words, height of the legend.
+# Inches: width of the picture, size of a map, gap between maps, margins of a panel (left, right, above, below); then,
+# for axes whose values are words, extra margins and the width of a map; height of the legend.
 WIDTH, MAP, GAP, LEFT, RIGHT, ABOVE, BELOW = 17.0, (2.2, 1.75), 0.12, 0.85, 0.25, 0.85, 0.75
 WORDS_LEFT, WORDS_BELOW, WORDS_MAP, LEGEND = 0.75, 0.45, 3.8, 1.8
-# The colours change at the tolerance, and span as many decades on either side.
+# The colour map is centred at the tolerance and spans this many decades on either side.
 DECADES = 1.5
 COLOURS = colormaps["BrBG_r"]
 Colour = str | tuple[float, float, float, float]
 INK, REFUSED, FAILED, VIOLATION = "#30343f", "#d5d7db", "#22252c", "#e6004c"
 NOTE = (
-    "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted where there is none: "
-    "the solver's own estimate. All axes step by factors, evenly in the picture. A cross: fluence below -1e-12 of its "
+    "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted cells have none and "
+    "show the solver's own estimate. Values of all axes are drawn evenly spaced. A cross: fluence below -1e-12 of its "
     "maximum where the source has no first moment or above the maximum principle, a ledger off by 1e-9, a residual "
     "above 1e-8, figures that change with the unit of length, or an error above the tolerance without a warning."
 )
@@ -43,7 +43,7 @@ def draw_map(trials: Sequence[Trial], path: Path) -> None:
     ----------
     trials : sequence of Trial
     path : Path
-        Where the PNG goes.
+        The PNG to write.
     """
     panels = list({trial.panel.name: trial.panel for trial in trials}.values())
     rows = _rows(panels)
@@ -80,7 +80,7 @@ def _height(panel: Panel) -> float:
 
 
 def _rows(panels: Sequence[Panel]) -> list[list[Panel]]:
-    """Panels side by side: each in the first row that has room for it."""
+    """Arrange panels in rows: each goes into the first row that has room for it."""
     rows: list[list[Panel]] = []
     for panel in panels:
         for row in rows:
@@ -130,7 +130,7 @@ def _symbols(name: str) -> str:
 
 
 def _text(value: Value) -> str:
-    """A value as an axis shows it."""
+    """Format a value for the labels of an axis."""
     if isinstance(value, str):
         return value
     power = round(math.log10(abs(value))) if value else 0
@@ -179,7 +179,7 @@ def _norm() -> LogNorm:
 
 
 def _draw_legend(figure: Figure, height: float) -> None:
-    """The colours and the marks, with words."""
+    """Draw the colour bar, the key of the marks, and the note."""
     from matplotlib.cm import ScalarMappable  # noqa: PLC0415
 
     bar = figure.add_axes((0.8 / WIDTH, 1.28 / height, 4.2 / WIDTH, 0.22 / height))
@@ -194,15 +194,15 @@ def _draw_legend(figure: Figure, height: float) -> None:
 
 
 def _draw_marks(marks: Axes) -> None:
-    """The marks of cells, with words."""
+    """Draw the key of the marks."""
     marks.set(xlim=(0, 22), ylim=(0, 1))
     marks.axis("off")
     cell = COLOURS(0.3)
     for x, face, hatch, text in (
         (0.0, cell, "", "violation"),
-        (4.0, cell, "", "breaks, not counted"),
+        (4.0, cell, "", "broken, not counted"),
         (9.2, cell, "", "warns of its error"),
-        (14.0, REFUSED, "/////", "refused in a sentence"),
+        (14.0, REFUSED, "/////", "refused as bad input"),
         (19.3, FAILED, "", "failed"),
     ):
         _fill(marks, x, 0.0, face, hatch, "#a4a8b0")

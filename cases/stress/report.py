@@ -1,4 +1,4 @@
-"""The stress map in words: the worst figures by panel and variant, what breaks where, and what is refused."""
+"""The stress map as text: the worst figures by panel and variant, broken rules, and refused scenarios."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -27,19 +27,19 @@ HEADS = (
 
 
 NOTE = (
-    "Lowest fluence is by the largest, where the source has no first moment; overshoot is over the bound of the "
-    "maximum principle; the ledger is by the incident power; largest error is the relative L2 error of the exitance "
-    "against a closed form; iterations of 0 are direct solutions."
+    "Lowest fluence is relative to the largest, for sources without a first moment; overshoot is relative to the bound "
+    "of the maximum principle, ledger to the incident power; largest error is the relative L2 error of the exitance "
+    "against a closed form; 0 iterations mean a direct solver."
 )
 
 
 def as_markdown(trials: Sequence[Trial]) -> str:
-    """The table and what is to be read with it, as Markdown."""
+    """Write the whole report as Markdown."""
     groups = list(_groups(trials))
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|" + "---:|" * (len(HEADS) - 2)]
     lines += [f"| {' | '.join(_row(group))} |" for group in groups]
     lines += ["", NOTE, "", "## Violations", ""]
-    found = [f"* {_place(one)}: {rule}, {figure}." for one in trials for rule, figure in violations(one).items()]
+    found = [f"* {_place(trial)}: {rule}, {figure}." for trial in trials for rule, figure in violations(trial).items()]
     lines += found or ["None."]
     lines += ["", "## What breaks where", ""]
     breaking = [line for group in groups for line in _ranges(group)]
@@ -55,7 +55,7 @@ def _times(count: int) -> str:
 
 
 def _groups(trials: Sequence[Trial]) -> Iterator[list[Trial]]:
-    """Trials of one panel and one variant."""
+    """Group trials by panel and variant."""
     for name in dict.fromkeys(trial.panel.name for trial in trials):
         here = [trial for trial in trials if trial.panel.name == name]
         for variant in dict.fromkeys(trial.variant.name for trial in here):
@@ -67,29 +67,29 @@ def _row(group: list[Trial]) -> list[str]:
     found = [trial.diagnostics for trial in group if trial.diagnostics is not None]
 
     def most(value: Callable[[Diagnostics], float | None], form: str = ".1e") -> str:
-        values = [each for one in found if (each := value(one)) is not None]
+        values = [each for diagnostics in found if (each := value(diagnostics)) is not None]
         return format(max(values), form) if values else ""
 
-    lowest = [one.lowest for one in found if not one.may_be_negative]
-    errors = [one.error for one in found if one.error is not None]
+    lowest = [diagnostics.lowest for diagnostics in found if not diagnostics.may_be_negative]
+    errors = [diagnostics.error for diagnostics in found if diagnostics.error is not None]
     return [
         group[0].panel.name,
         group[0].variant.name,
         *(str(outcomes[outcome]) for outcome in ("ran", "refused", "failed")),
         str(sum(map(is_warned, found))),
         f"{min(lowest):.1e}" if lowest else "",
-        most(lambda one: one.overshoot),
-        most(lambda one: abs(one.ledger)),
-        most(lambda one: one.residual),
-        most(lambda one: one.iterations, "d"),
+        most(lambda d: d.overshoot),
+        most(lambda d: abs(d.ledger)),
+        most(lambda d: d.residual),
+        most(lambda d: d.iterations, "d"),
         f"{max(errors):.2g}" if errors else "",
-        most(lambda one: one.seconds, ".1f"),
+        most(lambda d: d.seconds, ".1f"),
         str(sum(bool(violations(trial)) for trial in group)) if group[0].variant.counts else "not counted",
     ]
 
 
 def _ranges(group: list[Trial]) -> Iterator[str]:
-    """By rule: how many trials break it, and between which values of the axes."""
+    """Report for each rule how many trials break it, and the range of their axis values."""
     rules = dict.fromkeys(rule for trial in group for rule in broken_rules(trial))
     for rule in rules:
         here = [trial for trial in group if rule in broken_rules(trial)]
@@ -110,7 +110,7 @@ def _range(axis: Axis, values: list[Value]) -> str:
 
 
 def _place(trial: Trial) -> str:
-    """The place of a trial on the map."""
+    """Describe the position of a trial on the map."""
     values = ((trial.panel.x, trial.x), (trial.panel.y, trial.y))
     where = ", ".join(_range(axis, [value]) for axis, value in values)
     return f"{trial.panel.name}, {trial.variant.name}, at {where}"

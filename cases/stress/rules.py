@@ -1,4 +1,4 @@
-"""What must hold of every trial on the stress map."""
+"""The rules that every trial of the stress map must obey."""
 
 import math
 from collections.abc import Iterator
@@ -8,10 +8,10 @@ from tetlux.cases.stress.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 from tetlux.meshing.notes import codes_of
 
-# As shares: of the largest fluence; of the incident power; of a linear system's load; of the bound; of the largest
-# exitance.
+# Tolerances relative to: the largest fluence; the incident power; the load of a linear system; the bound of the maximum
+# principle; the largest exitance.
 DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8
-# Codes of warnings that name a reason for an error of the discretisation, not of the model or the surface.
+# Codes of warnings that explain an error of the discretisation; others explain errors of the model or the surface.
 REASONS = {
     "tolerance-missed",
     "fluence-negative",
@@ -24,7 +24,7 @@ REASONS = {
 
 
 def broken_rules(trial: Trial) -> dict[str, str]:
-    """The rules that a trial breaks, and by how much."""
+    """The rules that a trial breaks, each with a phrase that says by how much."""
     if trial.diagnostics is None:
         return {"failure": trial.message} if trial.outcome == "failed" else {}
     found = trial.diagnostics
@@ -49,10 +49,10 @@ def _broken_by(found: Diagnostics) -> Iterator[tuple[str, str]]:
 
 
 def violations(trial: Trial) -> dict[str, str]:
-    """The rules that a trial breaks, if it is of a variant that may not."""
+    """The rules that a trial breaks, if its variant counts."""
     return broken_rules(trial) if trial.variant.counts else {}
 
 
 def is_warned(found: Diagnostics) -> bool:
-    """Whether a warning names a reason for an error of the solution."""
+    """Whether a warning explains an error of the discretisation."""
     return not REASONS.isdisjoint(codes_of(found.warnings))

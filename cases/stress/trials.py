@@ -1,4 +1,4 @@
-"""Trials, each in a process of its own, so that a crash or a hang of one ends none of the others."""
+"""Trials, run in worker processes, so that a crash or a hang of one does not affect the others."""
 
 import contextlib
 import os
@@ -16,27 +16,27 @@ from tetlux.cases.stress.variants import Variant
 from tetlux.meshing.errors import TetluxError
 from tetlux.meshing.host.blocks import THREADS
 
-# Seconds that a trial may take.
+# A trial is stopped after this many seconds.
 TIME_LIMIT = 120.0
 _spawning = get_context("spawn")
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A scenario solved with a variant of the solver, and the outcome.
+    """The outcome of one scenario with one variant of the solver.
 
     Attributes
     ----------
     panel : Panel
     x, y : float or str
-        Where on its axes.
+        Values on its axes.
     variant : Variant
     outcome : {"ran", "refused", "failed"}
-        "refused" is an error of one plain sentence.
+        "refused" if the solver raised an error with a sentence for the user.
     message : str
-        That sentence, or what failed.
+        That sentence, or a description of the failure.
     diagnostics : Diagnostics or None
-        Of what ran.
+        None unless it ran.
     """
 
     panel: Panel
@@ -61,17 +61,21 @@ _Answer = tuple[str, str, Diagnostics | None]
 
 
 def run_trials(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIME_LIMIT) -> Iterator[Trial]:
-    """Run all variants on all scenarios, one a core, and yield the trials as they end.
+    """Run all variants on all scenarios, one per core, and yield the trials as they end.
 
     Parameters
     ----------
     panels : sequence of Panel
     meshes : Path
-        Folder where the mesher's meshes are kept: variants are compared on the same ones.
+        Folder of cached meshes, so that variants are compared on the same ones.
     time_limit : float
-        Seconds that a trial may take.
+        A trial is stopped after this many seconds.
+
+    Yields
+    ------
+    Trial
     """
-    # One variant after the other: two trials of the same body at the same time would both have it meshed.
+    # One variant after the other, since two simultaneous trials of one body would both mesh it.
     jobs = deque(
         _Job(panel, x, y, variant) for panel in panels for variant in panel.variants for x, y in panel.places()
     )
@@ -98,7 +102,7 @@ def run_trials(panels: Sequence[Panel], *, meshes: Path, time_limit: float = TIM
 
 
 class _Worker:
-    """A process that runs one trial after the other; a new one takes the place of one that died."""
+    """A process that runs one trial after the other, and is replaced when it dies."""
 
     def __init__(self, meshes: Path) -> None:
         self._meshes = meshes
@@ -114,8 +118,8 @@ class _Worker:
         self._ready = False
 
     def start(self, job: _Job, time_limit: float) -> None:
-        """Send a job to the process; the time that it takes to start does not count."""
-        # If the process has died meanwhile, `answer` reports it.
+        """Send a job to the process; the start-up of the process does not count in the time limit."""
+        # A process that has died meanwhile is reported by `answer`.
         with contextlib.suppress(OSError, EOFError):
             if not self._ready:
                 self._ready = self.connection.recv()
@@ -123,7 +127,7 @@ class _Worker:
         self.job, self.deadline = job, time.monotonic() + time_limit
 
     def answer(self, time_limit: float) -> _Answer | None:
-        """The outcome of its job; None while that runs."""
+        """The outcome of the job; None while it runs."""
         if self.connection.poll():
             try:
                 answer: _Answer = self.connection.recv()
@@ -150,7 +154,7 @@ class _Worker:
 
 
 def _work(connection: Connection, meshes: Path) -> None:
-    """Run what comes in, until the connection is closed."""
+    """Run jobs from the connection until it is closed."""
     os.environ["TETLUX_CACHE_DIR"] = str(meshes)
     with contextlib.suppress(EOFError, KeyboardInterrupt, BrokenPipeError):
         connection.send(True)
@@ -164,5 +168,5 @@ def _run_trial(make: Callable[..., object], x: Value, y: Value, variant: Variant
         return "ran", "", measure(scenario, variant)  # type: ignore[arg-type]
     except TetluxError as error:
         return "refused", str(error), None
-    except Exception as error:  # any error is a row of the table
+    except Exception as error:  # every error becomes a row of the table
         return "failed", f"{type(error).__name__}: {error}", None

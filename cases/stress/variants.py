@@ -1,4 +1,4 @@
-"""Variants of the solver that the stress map compares."""
+"""`Variant`s: settings of the solver that the stress map compares."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,11 +13,11 @@ class Variant:
     ----------
     name : str
     options : dict
-        Keywords of `tetlux.fem.solve`.
+        Keyword arguments of `tetlux.fem.solve`.
     adaptive : bool
-        Whether the mesh is refined until the estimated error is within the tolerance, where no mesh is given.
+        Whether the mesh is refined until the estimated error is within the tolerance; no effect on a given mesh.
     counts : bool
-        Whether a rule that it breaks is a violation; else it is there to be compared with.
+        Whether breaking a rule is a violation; other variants are there for comparison only.
     """
 
     name: str
@@ -32,5 +32,5 @@ NO_LIMITER = Variant("no limiter", {"limit": False})
 CONSISTENT = Variant("consistent mass, no limiter", {"mass": "consistent", "limit": False})
 FREE_SPACE = Variant("free space subtracted", {"subtract": "free-space"})
 NOTHING = Variant("nothing subtracted", {"subtract": "nothing"})
-# What bears on the sign of the fluence.
-OF_SIGN = (DEFAULT, NO_LIMITER, CONSISTENT)
+# Variants that differ in how they keep the fluence nonnegative.
+SIGN_VARIANTS = (DEFAULT, NO_LIMITER, CONSISTENT)

@@ -1,4 +1,4 @@
-"""Coefficients of each medium of a run, for its summary."""
+"""Coefficients of each medium of a run, as rows of its summary."""
 
 import math
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.lighting import BODY
+from tetlux.cases.file.light_names import BODY
 from tetlux.fem.media.coefficients import (
     AnyMedium,
     Coefficients,
@@ -17,24 +17,25 @@ from tetlux.fem.media.coefficients import (
     coefficients_on,
 )
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.scene import media_of
+from tetlux.fem.scenes import media_by_scene
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 
 
 def media_rows(case: Case, mesh: TetMesh | None) -> list[list[dict[str, Any]]]:
-    """Coefficients of the body outside of its regions and of each region, or of each label, for each channel.
+    """List the coefficients of the body and of each region, or of each label, for each channel.
 
     Parameters
     ----------
     case : Case
     mesh : TetMesh or None
-        That the case was solved on; none where media are even.
+        The mesh that the case was solved on; None by charges, where media are uniform.
 
     Returns
     -------
     list of list of dict
-        Coefficients in 1/unit, lengths in unit; means over the volume where they vary.
+        For each channel a row for each medium: coefficients in 1/unit, lengths in unit; where they vary, means over
+        the volume.
     """
     names = dict(enumerate((BODY, *(region.surface.name for region in case.regions))))
     if case.mesh is not None:
@@ -54,11 +55,11 @@ def _media_by_label(case: Case) -> list[MediaByLabel]:
     if case.mesh is not None:
         return [channel.media for channel in case.channels if not isinstance(channel.media, AnyMedium)]
     media = [channel.medium for channel in case.channels]
-    return [by_label(each) for each in media_of(media, case.regions, len(media))]
+    return [by_label(each) for each in media_by_scene(media, case.regions, len(media))]
 
 
 def _means(mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, float]:
-    """Coefficients of a region whose medium varies, as means over its volume."""
+    """Mean coefficients over the volume of a region whose medium varies."""
     cells: IntArray = np.flatnonzero(mesh.regions == region)
     sigma_a, total = (
         _mean(at_cells(each, cells), mesh.volumes[cells]) for each in (on_mesh.sigma_a, on_mesh.sigma_t_prime)
@@ -73,7 +74,7 @@ def _means(mesh: TetMesh, on_mesh: Coefficients, region: int) -> dict[str, float
 
 
 def coefficients(medium: AnyMedium) -> dict[str, Any]:
-    """What is known of a medium, those of the base of one that varies."""
+    """The coefficients of a medium; of one that varies, those of its base."""
     base = base_of(medium)
     figures: dict[str, Any] = {
         "sigma_a": base.sigma_a,
@@ -92,5 +93,5 @@ def coefficients(medium: AnyMedium) -> dict[str, Any]:
 
 
 def _mean(values: FloatArray, weights: FloatArray) -> float:
-    """Weighted mean, without rounding where all values are alike."""
+    """Weighted mean, exact where all values are equal."""
     return float(values[0] if np.ptp(values) == 0 else weights @ values / weights.sum())

@@ -1,4 +1,4 @@
-"""Surfaces with values at their vertices as PLY, which viewers of 3D models read."""
+"""Surfaces with values at their vertices as PLY, which mesh tools and viewers of 3D models read."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from tetlux.meshing.surface.surface import Surface
 
-# What PLY calls the types that values may have.
+# PLY's names of the types of values.
 TYPES = {"f8": "double", "u1": "uchar"}
 
 
@@ -22,9 +22,9 @@ def write_ply(
     surface : Surface
     path : Path
     values : mapping of str to (v,) ndarray
-        At the vertices, by names without spaces: floating-point numbers, or bytes.
+        Values at the vertices, floating-point numbers or bytes, by names without spaces.
     comments : sequence of str
-        Lines for people who open the file.
+        Lines of text for the header.
     """
     columns = {**dict(zip("xyz", surface.points.T, strict=True)), **values}
     kinds = {name: "u1" if column.dtype == np.uint8 else "f8" for name, column in columns.items()}
@@ -44,7 +44,7 @@ def write_ply(
         "end_header",
     ]
     with path.open("wb") as file:
-        # The header is ASCII; a unit's square is not.
+        # The header must be ASCII, which ² is not.
         file.write(("\n".join(head) + "\n").replace("²", "^2").encode("ascii", "replace"))
         file.write(vertices.tobytes())
         file.write(faces.tobytes())

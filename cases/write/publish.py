@@ -1,4 +1,4 @@
-"""Results appear whole or not at all: they are made in a folder beside, which one process has to itself."""
+"""Atomic results: a run writes into a locked folder beside its target, and moves the files when all are complete."""
 
 import errno
 import os
@@ -11,36 +11,37 @@ from pathlib import Path
 
 from tetlux.meshing.errors import InputError, RunError
 
-# How file systems say that they have no locks.
+# Errors of file systems that do not support locks.
 WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
 
 
 @contextmanager
-def claimed(out: Path, name: str) -> Iterator[Path]:
-    """A new folder for the results of that name, gone afterwards.
+def claim_folder(out: Path, name: str) -> Iterator[Path]:
+    """Create and lock a temporary folder for the results of a run, and remove it afterwards.
 
-    While the block runs no other process is given the same one, and what a killed process left of it is removed. A
-    lock tells the two apart, since it ends with its process, however that ends; on Windows, and where a file system
-    has no locks, runs at the same time are not kept apart.
+    A second process that asks for the same name is refused while the lock is held. Since a lock ends with its
+    process, what a killed process left is recognized and removed. On Windows, and on file systems without locks,
+    simultaneous runs are not kept apart.
 
     Parameters
     ----------
     out : Path
         Folder of all results.
     name : str
-        Where in it they are to go.
+        The final folder of this run, relative to `out`.
 
     Yields
     ------
     Path
+        The temporary folder.
 
     Raises
     ------
     RunError
-        If another process is at work on the same, or nothing can be written there.
+        If another process holds the lock, or the folder cannot be written to.
     """
     target = out / name
-    # Names may be too long for a prefix, and lie in subfolders.
+    # A hash, since names may have subfolders and be too long for a prefix.
     place = out / f".partial-{blake2b(os.fsencode(name), digest_size=6).hexdigest()}"
     folder = place / "results"
     try:
@@ -50,28 +51,28 @@ def claimed(out: Path, name: str) -> Iterator[Path]:
             f"another run is at work on {target}; wait for its end, or choose another folder with --out."
         ) from error
     except OSError as error:
-        raise cannot_write(target, error) from error
+        raise write_error(target, error) from error
     try:
         try:
             if folder.exists():
                 shutil.rmtree(folder)
             folder.mkdir()
-            # Now, and not after an hour's work: a file may be in the way, or a folder that is read only.
+            # Fail now, not after an hour of work, if a file or a read-only folder is in the way.
             if target.exists():
                 next(target.iterdir(), None)
                 if not os.access(target, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         except OSError as error:
-            raise cannot_write(target, error) from error
+            raise write_error(target, error) from error
         yield folder
     finally:
         shutil.rmtree(place, ignore_errors=True)
-        # Not before: another process would take what is there for a killed one's.
+        # Unlock last: otherwise another process would take the folder for that of a killed one.
         os.close(lock)
 
 
 def _lock(folder: Path) -> int:
-    """A descriptor that holds the lock on a folder, which is made if need be; BlockingIOError if another one does."""
+    """Create and lock a folder, and return the descriptor that holds the lock; BlockingIOError if it is locked."""
     while True:
         folder.mkdir(parents=True, exist_ok=True)
         if sys.platform == "win32":
@@ -84,7 +85,7 @@ def _lock(folder: Path) -> int:
             continue
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # Whoever had it before may have removed the folder.
+            # The process that held the lock before may have removed the folder.
             if folder.stat().st_ino == os.fstat(lock).st_ino:
                 return lock
         except FileNotFoundError:
@@ -98,27 +99,27 @@ def _lock(folder: Path) -> int:
 
 
 def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
-    """Put files in place of those of an earlier run, which are removed first: a killed run leaves no mixture.
+    """Replace the files of an earlier run by new ones, so that files of two runs are never mixed.
 
     Parameters
     ----------
     folder : Path
-        What `claimed` gave.
+        The folder of the new files, from `claim_folder`.
     target : Path
-        Whatever else is there stays.
+        The final folder; other files in it stay.
     names : sequence of str
-        All files that a run may write. The last one is what makes a run a finished one: it is the first to go and the
-        last to come.
+        All files that a run may write. The last one marks a finished run: it is removed first and moved last.
 
     Raises
     ------
     OSError
+        If a file cannot be removed or moved.
     """
     for name in reversed(names):
         (target / name).unlink(missing_ok=True)
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        # All at once, unless something else is there.
+        # In one step, unless the target exists and is not empty.
         folder.rename(target)
     except OSError:
         for name in names:
@@ -126,24 +127,54 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
                 (folder / name).replace(target / name)
 
 
+@contextmanager
+def replace_files(out: Path, names: Sequence[str]) -> Iterator[Path]:
+    """Replace files of a folder, all or none, by those that the block writes into a temporary folder.
+
+    Parameters
+    ----------
+    out : Path
+        Folder of the files.
+    names : sequence of str
+        All files that the block writes.
+
+    Yields
+    ------
+    Path
+        The temporary folder.
+
+    Raises
+    ------
+    RunError
+        If they cannot be written.
+    """
+    with claim_folder(out, ".") as folder:
+        try:
+            yield folder
+            publish(folder, out, names)
+        except OSError as error:
+            raise write_error(out, error) from error
+
+
 def check_writable(out: Path) -> None:
-    """Refuse a folder that results cannot be written to, before anything is solved for it.
+    """Refuse a folder that results cannot be written to, before anything is solved.
 
     Raises
     ------
     InputError
+        If it cannot be written to.
     """
     try:
-        with claimed(out, "."):
+        with claim_folder(out, "."):
             pass
     except RunError as error:
-        # Another run that is looking at the same time finds the same.
+        # If another run holds the lock, that run can write here.
         if not isinstance(error.__cause__, BlockingIOError):
             raise InputError(str(error)) from error
 
 
-def cannot_write(target: Path, error: OSError) -> RunError:
-    """What to say of an error of the file system."""
+def write_error(target: Path, error: OSError) -> RunError:
+    """The error to raise when results cannot be written."""
     return RunError(
         f"results cannot be written to {target}: {error.strerror or error}; choose another folder with --out."
     )

@@ -1,4 +1,4 @@
-"""What a run found: the solutions of its channels, and their exitance on one set of vertices."""
+"""`Results`: the solutions of all channels of a run, and their exitance at the vertices of one surface."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ import numpy.typing as npt
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
-from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
@@ -24,8 +24,8 @@ AnySolution = Solution | ChargeSolution
 
 
 @dataclass(frozen=True, eq=False)
-class _Together:
-    """Solutions of several channels, whose exitances are added: their media may differ."""
+class _ChannelSum:
+    """The exitance summed over channels, as a `ResolvedField`; media may differ between channels."""
 
     channels: tuple[AnySolution, ...]
 
@@ -39,7 +39,7 @@ class _Together:
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
-        # The place nearest to a point is mostly one of the channel that is finest there.
+        # The nearest of these points to any place belongs mostly to the channel that is resolved finest there.
         places, sizes = zip(*(channel.resolution for channel in self.channels), strict=True)
         return np.vstack(places), np.concatenate(sizes)
 
@@ -57,7 +57,7 @@ class Results:
     solutions : tuple of Solution or ChargeSolution
         One for each channel.
     surface : Surface
-        That of the case, with vertices added where its triangles are too large to show the exitance.
+        The case's surface, with vertices added where its triangles are too large to show the exitance.
     parts : dict of (v,) ndarray
         Exitance at the surface's vertices by channel and light, W/unit².
     """
@@ -68,13 +68,13 @@ class Results:
     parts: dict[tuple[str, str], FloatArray]
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
-        """Exitance (v,) of a channel and a light, or the sum over all of them, W/unit²."""
-        of = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
-        return reduce(np.add, of, np.zeros(len(self.surface.points)))
+        """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit²."""
+        chosen = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
+        return reduce(np.add, chosen, np.zeros(len(self.surface.points)))
 
     @property
-    def with_mesh(self) -> tuple[Solution, ...]:
-        """The solutions, if they have a mesh; else none."""
+    def mesh_solutions(self) -> tuple[Solution, ...]:
+        """The solutions that have a mesh: all, or none by charges."""
         return tuple(solution for solution in self.solutions if isinstance(solution, Solution))
 
     @property
@@ -84,39 +84,39 @@ class Results:
 
     @cached_property
     def preview(self) -> tuple[Bytes, float]:
-        """Colours (v, 3) of the surface, and what white stands for, W/unit²: see `cases.file.colours.preview`."""
+        """Colours (v, 3) of the surface, and the luminance of white, W/unit²; see `cases.file.colours.preview`."""
         return preview(self.surface, np.column_stack([self.exitance(channel) for channel in RGB]))
 
-    def by_light(self) -> list[tuple[str, str, AnySolution]]:
-        """All solutions with the names of channel and light: the sum, and each light if the case has several."""
+    def by_channel_and_light(self) -> list[tuple[str, str, AnySolution]]:
+        """All solutions with names of channel and light: the sum of lights and, if there are several, each light."""
         found: list[tuple[str, str, AnySolution]] = []
         for channel, solution in zip(self.case.channels, self.solutions, strict=True):
             found.append((channel.name, ALL, solution))
             if len(self.case.light_names) > 1:
-                found += [(channel.name, *one) for one in lights_in(list(channel.lights), solution)]
+                found += [(channel.name, *part) for part in solutions_by_light(list(channel.lights), solution)]
         return found
 
     __repr__ = one_line
 
 
-def lights_in(names: list[str], solution: AnySolution) -> list[tuple[str, AnySolution]]:
-    """What each light adds to a solution, by name."""
+def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[str, AnySolution]]:
+    """The part of each light in a solution, with the name of the light."""
     return list(zip(names, solution.of_lights or (solution,), strict=True))
 
 
-def results_of(case: Case, solutions: Sequence[AnySolution]) -> Results:
-    """Choose vertices that show the exitance of all channels together, and take that of each at them."""
-    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _Together(tuple(solutions))
+def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
+    """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
+    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
     surface, total = surface_exitance(whole)
     parts = {}
     for channel, solution in zip(case.channels, solutions, strict=True):
-        for name, part in lights_in(list(channel.lights), solution):
+        for name, part in solutions_by_light(list(channel.lights), solution):
             parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
     return Results(case, tuple(solutions), surface, parts)
 
 
 def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
-    """What `surface.ply` holds at each vertex."""
+    """The arrays of ``surface.ply`` and ``surface.vtp`` at the vertices."""
     case = results.case
     channels, lights = case.channel_names, case.light_names
     values: dict[str, npt.NDArray[np.generic]] = {"exitance": results.exitance()}
@@ -126,24 +126,26 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
         values |= {f"exitance_{light}": results.exitance(light=light) for light in lights}
     if len(channels) > 1 and len(lights) > 1:
         values |= {
-            f"exitance_{one}_{channel}": results.exitance(channel, one) for one in lights for channel in channels
+            f"exitance_{light}_{channel}": results.exitance(channel, light) for light in lights for channel in channels
         }
-    if results.with_mesh:
-        # What is to be trusted in every channel; it is known by the facets of a mesh.
-        values["valid"] = np.min([solution.valid_on(results.surface.points) for solution in results.with_mesh], axis=0)
+    if results.mesh_solutions:
+        # The least over channels. It is computed on the facets of a mesh.
+        values["valid"] = np.min(
+            [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
+        )
     if case.camera is not None:
-        seen = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
-        values["radiance"] = np.sum(seen, axis=0)
+        radiances = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        values["radiance"] = np.sum(radiances, axis=0)
         if len(channels) > 1:
-            values |= {f"radiance_{channel}": one for channel, one in zip(channels, seen, strict=True)}
+            values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}
     if results.has_colours:
         values |= dict(zip(RGB, results.preview[0].T, strict=True))
     return values
 
 
 def volume_values(results: Results) -> dict[str, FloatArray]:
-    """What `volume.vtu` holds at each node."""
+    """The arrays of ``volume.vtu`` at the nodes."""
     names = results.case.channel_names
     if len(names) == 1:
-        return {"fluence": results.with_mesh[0].fluence}
-    return {f"fluence_{name}": one.fluence for name, one in zip(names, results.with_mesh, strict=True)}
+        return {"fluence": results.mesh_solutions[0].fluence}
+    return {f"fluence_{name}": solution.fluence for name, solution in zip(names, results.mesh_solutions, strict=True)}

@@ -1,4 +1,4 @@
-"""`summary.json`: what a run found, in figures."""
+"""``summary.json``: the figures of a run."""
 
 import math
 import platform
@@ -8,8 +8,8 @@ import numpy as np
 
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.write.media_rows import media_rows
-from tetlux.cases.write.ran import as_ran
-from tetlux.cases.write.results import AnySolution, Results, lights_in
+from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
+from tetlux.cases.write.run_record import describe_run
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Power
 from tetlux.fem.validity.local import Validity
@@ -25,9 +25,24 @@ LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "em
 def summarize(
     results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
 ) -> dict[str, Any]:
-    """The summary of a run as plain data; lengths in the case's unit, power in W; exitance as it is written."""
+    """Summarize a run as plain data.
+
+    Parameters
+    ----------
+    results : Results
+    readings : list of dict
+        Rows of the detectors.
+    seconds : dict of str to float
+        By stage.
+    warnings : list of str
+
+    Returns
+    -------
+    dict
+        Lengths in the case's unit, power in W, exitance in W/unit² at the vertices that are written.
+    """
     case = results.case
-    mesh = results.with_mesh[0].mesh if results.with_mesh else None
+    mesh = results.mesh_solutions[0].mesh if results.mesh_solutions else None
     several = len(case.light_names) > 1
     channels = [
         _channel(
@@ -44,7 +59,7 @@ def summarize(
         "unit": case.surface.unit,
         "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
-        "as_ran": as_ran(case),
+        "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
@@ -74,7 +89,7 @@ def _channel(
     area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
     figures: dict[str, Any] = {
         "name": channel.name,
-        # Those of the body outside of its regions.
+        # The first medium is that of the body outside of its regions.
         "sigma_tr": media[0]["sigma_tr"],
         "albedo": media[0]["albedo"],
         "media": media,
@@ -85,18 +100,18 @@ def _channel(
             "mean": solution.power.exited / area,
         },
         "error_estimate": _finite(solution.error_estimate),
-        **_of_model(solution),
+        **_figures_of_model(solution),
     }
     if several:
-        lights = lights_in(list(channel.lights), solution)
-        figures["lights"] = [{"name": name, "power": _power(one.power)} for name, one in lights]
+        lights = solutions_by_light(list(channel.lights), solution)
+        figures["lights"] = [{"name": name, "power": _power(part.power)} for name, part in lights]
     return figures
 
 
-def _of_model(solution: AnySolution) -> dict[str, Any]:
-    """Figures that only one of the models has."""
+def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
+    """The figures that only one of the two models has."""
     if isinstance(solution, ChargeSolution):
-        # Fluence has a pole at each source, and no largest value.
+        # The fluence has a pole at each source, so there is no largest value.
         return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
     return {
         "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
@@ -109,7 +124,7 @@ def _finite(value: float) -> float | None:
 
 
 def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
-    """Labels of a mesh that was given, their names if they have any, and their volumes."""
+    """The labels of a mesh that the case gives, with their names and volumes."""
     volumes = mesh.region_volumes.items()
     return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
 
@@ -126,8 +141,8 @@ def _power(power: Power) -> dict[str, float]:
 
 
 def _validity(validity: Validity) -> dict[str, float]:
-    """How far diffusion itself is to be trusted; means and shares are of the surface's area."""
-    valid = np.maximum(1.0 - validity.of_facets, 0.0)
+    """The validity of the diffusion approximation; means and shares are by surface area."""
+    valid = np.maximum(1.0 - validity.facet_errors, 0.0)
     return {
         "albedo": validity.albedo,
         "least_thickness_in_mean_free_paths": float(validity.thickness.min()),

@@ -1,4 +1,4 @@
-"""Surfaces with values at their vertices as VTP, which VTK, PyVista and ParaView read with all values."""
+"""Surfaces with values at their vertices as VTP, whose values VTK, PyVista and ParaView show."""
 
 import sys
 from collections.abc import Mapping
@@ -10,29 +10,29 @@ import numpy.typing as npt
 
 from tetlux.meshing.surface.surface import Surface
 
-# What VTK calls the types that values may have.
+# VTK's names of the types of values.
 TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
 def write_vtp(
     surface: Surface, path: Path, values: Mapping[str, npt.NDArray[np.generic]], notes: Mapping[str, str]
 ) -> None:
-    """Write a triangle mesh as VTK's PolyData, XML with the numbers appended as they are in memory.
+    """Write a triangle mesh as VTK PolyData: XML with raw appended binary data.
 
     Parameters
     ----------
     surface : Surface
     path : Path
     values : mapping of str to (v,) or (v, k) ndarray
-        At the vertices: floating-point numbers, integers or bytes; the first is what viewers colour by.
+        Values at the vertices: floating-point numbers, integers or bytes. Viewers colour by the first.
     notes : mapping of str to str
-        Text that stands with the mesh as field data.
+        Text that is stored as field data.
     """
     triangles = surface.faces.astype(np.int64)
     arrays: list[npt.NDArray[np.generic]] = []
 
     def array(name: str, numbers: npt.NDArray[np.generic]) -> str:
-        """The head of an array whose numbers are appended."""
+        """Append the numbers of an array, and return the XML element that refers to them."""
         offset = sum(8 + kept.nbytes for kept in arrays)
         arrays.append(np.ascontiguousarray(numbers))
         kind = TYPES[numbers.dtype.str[1:]]
@@ -72,6 +72,6 @@ _BYTE_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
 
 
 def _text(name: str, text: str) -> str:
-    """Text as VTK has it: the numbers of its bytes, with a zero at the end."""
+    """A text as VTK stores it: the codes of its bytes, ending in zero."""
     codes = " ".join(map(str, (*text.encode(), 0)))
     return f'<DataArray type="String" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{codes}</DataArray>'

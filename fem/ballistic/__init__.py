@@ -1,1 +1,1 @@
-"""Light before it is scattered: rays refracted, followed, deposited."""
+"""Light before it is scattered: rays are refracted, followed through a mesh, and leave segments."""

@@ -1,1 +1,1 @@
-"""`Body`: which medium is where, and what light meets on its way."""
+"""The body that light falls on: its surface, the media of its regions, and optical depths along paths through it."""

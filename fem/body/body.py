@@ -1,4 +1,4 @@
-"""`Body`: what light falls on. It knows which medium is where, and what light meets on its way through."""
+"""`Body`: a surface and the media inside it, as lights need them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -7,30 +7,39 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.body.optical_paths import OpticalPaths, paths_of
-from tetlux.fem.body.partition import Partition, SurfacePartition
+from tetlux.fem.body.partition import Partition, Pieces, SurfacePartition
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of, by_label
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.surface import Surface
 
-# What is just inside the surface is looked at this share of the body's diagonal below it.
-BELOW = 1e-6
+# Depth of a place just inside the surface, as a share of the body's diagonal.
+JUST_INSIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A surface, and the media of what it holds.
+    """A surface, and the media of the regions inside it.
 
-    Which region is called the body and which a region of it makes no difference: whoever asks, asks for a place.
+    Lights ask for the medium at a place, so that it does not matter which part is called the body and which a region.
 
     Parameters
     ----------
     surface : Surface
-        Where the body ends.
+        The outer surface.
     media : sequence of Medium or VaryingMedium, or mapping of int to these
-        That of the body outside of its regions, and of each region; or that of each label, the outermost first.
+        Of the body outside of its regions, and of each region; or of each label, the outermost first.
     partition : Partition
         Where the regions are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tetlux.fem import Medium
+    >>> from tetlux.meshing import sphere
+    >>> body = Body(sphere(10.0), [Medium(sigma_a=0.01, sigma_s_prime=0.99, eta=1.4)])
+    >>> body.mean_free_paths(np.zeros((1, 3))).tolist()
+    [1.0]
     """
 
     surface: Surface
@@ -48,42 +57,78 @@ class Body:
 
     @property
     def outer(self) -> Medium:
-        """A medium of the index and the boundary that all media share; nothing else of it holds everywhere."""
+        """A medium with the refractive index and boundary of all media; its coefficients do not hold everywhere."""
         return base_of(self._first)
 
     @property
     def only_medium(self) -> Medium | None:
-        """The medium that the whole body is of, if there is one."""
+        """The medium of the whole body, if there is only one and it does not vary."""
         return self._first if len(self.media) == 1 and isinstance(self._first, Medium) else None
 
     def region_at(self, points: FloatArray) -> IntArray:
-        """The region that each of the points (q, 3) lies in, (q,)."""
+        """Find the regions that points lie in.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            unit.
+
+        Returns
+        -------
+        (q,) ndarray
+            Numbers or labels of the regions.
+        """
         if len(self.media) == 1:
             return np.full(len(points), next(iter(self.by_label)), dtype=np.int64)
         return self.partition.region_at(points)
 
     def just_inside(self, points: FloatArray) -> FloatArray:
-        """Places just below the points of the surface that are nearest to given points, (q, 3)."""
+        """Find places just below the surface.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            unit.
+
+        Returns
+        -------
+        (q, 3) ndarray
+            `JUST_INSIDE` of the diagonal below the point of the surface nearest to each, unit.
+        """
         nearest, faces = self.surface.closest(points)
-        return np.asarray(nearest - BELOW * self.surface.diagonal * self.surface.normals[faces])
+        return np.asarray(nearest - JUST_INSIDE * self.surface.diagonal * self.surface.normals[faces])
 
     def mean_free_paths(self, points: FloatArray) -> FloatArray:
-        """Transport mean free path 1/sigma_t' at points (q, 3) inside, (q,), unit."""
+        """Compute transport mean free paths 1/sigma_t'.
+
+        Parameters
+        ----------
+        points : (q, 3) ndarray
+            Inside the body, unit.
+
+        Returns
+        -------
+        (q,) ndarray
+            unit.
+        """
         regions, found = self.region_at(points), np.empty(len(points))
         for region in np.unique(regions).tolist():
-            mine = regions == region
-            sigma_a, reduced, _ = self._local(region, points[mine])
-            found[mine] = 1.0 / (sigma_a + reduced)
+            inside = regions == region
+            sigma_a, reduced, _ = self._local(region, points[inside])
+            found[inside] = 1.0 / (sigma_a + reduced)
         return found
 
     @cached_property
     def shortest_mean_free_path(self) -> float:
-        """Of all its media; of those that vary, on the body's surface, unit."""
+        """The least of all media, unit; see `ranges_of_mean_free_path`."""
         return min(least for least, _ in self.ranges_of_mean_free_path)
 
     @cached_property
     def ranges_of_mean_free_path(self) -> list[tuple[float, float]]:
-        """The least and the greatest of each medium, unit; of one that varies, on the surface where it is."""
+        """Least and greatest transport mean free path of each medium, unit.
+
+        A medium that varies is sampled at the surface of its region, or at the nodes of a mesh.
+        """
         found = []
         for region, medium in self.by_label.items():
             if isinstance(medium, Medium):
@@ -97,24 +142,29 @@ class Body:
             found.append((float(lengths.min()), float(lengths.max())))
         return found
 
-    def ways_out(self, starts: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far from places on the surface, along unit vectors (r, 3), the body begins and ends.
+    def extents_along(self, starts: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Distances from places on the surface at which the body begins and ends.
+
+        Parameters
+        ----------
+        starts, directions : (r, 3) ndarray
+            Unit vectors inwards.
 
         Returns
         -------
         begins : (r,) ndarray
-            0 but where a beam starts on a curved surface, above the triangle that it enters, unit.
+            0, but where a ray starts on a curved surface above the triangle that it enters, unit.
         ends : (r,) ndarray
-            0 where nothing is met, unit.
+            Distance at which the ray leaves, unit; 0 where it meets no triangle.
         """
         surface = self.surface
         ends, faces = surface.rays.first(starts, directions)
         begins = np.zeros(len(starts))
-        again = np.flatnonzero(np.einsum("ij,ij->i", directions, surface.normals[faces]) < 0)
-        again = again[faces[again] >= 0]
-        begins[again] = ends[again]
-        places = starts[again] + begins[again, None] * directions[again]
-        ends[again] += surface.rays.first(places, directions[again])[0]
+        above = np.flatnonzero(np.einsum("ij,ij->i", directions, surface.normals[faces]) < 0)
+        above = above[faces[above] >= 0]
+        begins[above] = ends[above]
+        places = starts[above] + begins[above, None] * directions[above]
+        ends[above] += surface.rays.first(places, directions[above])[0]
         missed = ~np.isfinite(ends)
         begins[missed], ends[missed] = 0.0, 0.0
         return begins, ends
@@ -122,37 +172,42 @@ class Body:
     def paths(
         self, starts: FloatArray, directions: FloatArray, lengths: FloatArray, begins: FloatArray | None = None
     ) -> OpticalPaths:
-        """What light meets on straight paths.
+        """Compute the coefficients along straight paths.
 
         Parameters
         ----------
         starts, directions : (r, 3) ndarray
             Directions are unit vectors.
         lengths : (r,) ndarray
-            Unit.
+            unit.
         begins : (r,) ndarray, optional
-            See `ways_out`.
+            See `extents_along`; 0 if not given.
+
+        Returns
+        -------
+        OpticalPaths
         """
-        medium, none = self.only_medium, np.zeros(len(starts))
+        medium, zeros = self.only_medium, np.zeros(len(starts))
         if medium is not None:
-            sigma_a, reduced, scattering = (np.full(len(starts), value) for value in _constants(medium))
-            return OpticalPaths(np.arange(len(starts)), none, lengths, sigma_a, reduced, scattering)
+            sigma_a, reduced, scattering = (np.full(len(starts), value) for value in _coefficients_of(medium))
+            every = np.arange(len(starts))
+            return OpticalPaths(Pieces(every, zeros, lengths, 0 * every), sigma_a, reduced, scattering)
         varying = [region for region, medium in self.by_label.items() if not isinstance(medium, Medium)]
         partition = self.partition
         if len(self.media) == 1:
-            # One medium is that of the whole body, whatever regions its mesh has.
+            # One medium fills the whole body, whatever regions its mesh has.
             partition, varying = SurfacePartition(), [0]
-        pieces = partition.pieces(starts, directions, none if begins is None else begins, lengths)
+        pieces = partition.pieces(starts, directions, zeros if begins is None else begins, lengths)
         return paths_of(pieces, starts, directions, varying, self._local)
 
     def _local(self, region: int, points: FloatArray) -> FloatArray:
-        """Coefficients (3, q) of a region's medium at points (q, 3), see `optical_paths.Local`."""
+        """Coefficients (3, q) of a region at points (q, 3), see `optical_paths.LocalCoefficients`."""
         medium = self.by_label[region] if len(self.media) > 1 else self._first
         if isinstance(medium, Medium):
-            return np.repeat(np.array(_constants(medium))[:, None], len(points), axis=1)
+            return np.repeat(np.array(_coefficients_of(medium))[:, None], len(points), axis=1)
         sigma_a, reduced = medium.at(points)
         return np.stack([sigma_a, reduced, medium.delta_eddington(reduced)[0]])
 
 
-def _constants(medium: Medium) -> tuple[float, float, float]:
+def _coefficients_of(medium: Medium) -> tuple[float, float, float]:
     return medium.sigma_a, medium.reduced_scattering, medium.delta_eddington[0]

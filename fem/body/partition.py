@@ -1,4 +1,4 @@
-"""Which region of a body is where: at points, and along straight paths."""
+"""`Partition`: which region of a body is where, at points and along straight paths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,28 +11,28 @@ from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import by_volume, region_at
+from tetlux.meshing.tets.regions import region_at, sort_by_volume
 
-# A path crosses the surface of one region no more often than this.
+# Crossings of a path with the surface of one region, at most.
 MOST_CROSSINGS = 200
-# A path that runs along the border of two regions lies in one of them, and in the same one whichever of the two has
-# the surface: crossings are looked for this share of the surface's diagonal beside it, always on the same side.
-ASIDE = 1e-5
-_SIDE = np.array([0.41, 0.53, 0.74])
+# Crossings are computed for a path moved aside by this share of the surface's diagonal, always in this direction: a
+# path along the border of two regions then lies in the same one whichever of the two has the surface.
+OFFSET_ASIDE = 1e-5
+_ASIDE = np.array([0.41, 0.53, 0.74])
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Straight paths cut where they pass from region to region: in the order of the paths, and along each of them.
+    """Straight paths divided where they pass from region to region, sorted by path and along each path.
 
     Parameters
     ----------
     rays : (p,) ndarray
-        The path of each piece; each path has one at least.
+        The path of each piece; every path has at least one.
     enter, leave : (p,) ndarray
-        Where it begins and ends, along the path, unit.
+        Ends of each piece, as distances along its path, unit.
     regions : (p,) ndarray
-        The region that it lies in.
+        The region that each piece lies in.
     """
 
     rays: IntArray
@@ -40,37 +40,50 @@ class Pieces:
     leave: FloatArray
     regions: IntArray
 
+    @property
+    def lengths(self) -> FloatArray:
+        """Length of each piece, (p,), unit."""
+        return self.leave - self.enter
+
+    def select(self, numbers: IntArray) -> "Pieces":
+        """Copies of the pieces with given numbers."""
+        return Pieces(self.rays[numbers], self.enter[numbers], self.leave[numbers], self.regions[numbers])
+
 
 class Partition(Protocol):
-    """Anything that knows where the regions of a body are."""
+    """Where the regions of a body are."""
 
     def region_at(self, points: FloatArray) -> IntArray:
-        """The region that each of the points (q, 3) of the body lies in, (q,)."""
+        """Regions that points (q, 3) inside the body lie in, (q,)."""
         ...
 
     def samples(self, region: int) -> FloatArray | None:
-        """Points (p, 3) at which the coefficients of a region show their range; None stands for the body's surface."""
+        """Points (p, 3) of a region at which to sample the range of its coefficients; None for the body's surface."""
         ...
 
     def pieces(self, starts: FloatArray, directions: FloatArray, begins: FloatArray, lengths: FloatArray) -> Pieces:
-        """Cut paths at the borders of regions.
+        """Divide paths at the borders of regions.
 
         Parameters
         ----------
         starts, directions : (r, 3) ndarray
             Directions are unit vectors.
         begins : (r,) ndarray
-            How far along them the body's triangles begin, which on a curved surface may be below the start, unit.
-            Before that the path is in the region where it enters the triangles.
+            Distance at which each path enters the body's triangles, which may lie below a start on the curved surface,
+            unit. Before that the path is in the region in which it enters.
         lengths : (r,) ndarray
-            How long they are, unit.
+            unit.
+
+        Returns
+        -------
+        Pieces
         """
         ...
 
 
 @dataclass(frozen=True)
 class SurfacePartition:
-    """Regions by their closed surfaces, in their order; none for a body that has no regions."""
+    """Regions 1, 2, ... by their closed surfaces; region 0 is the rest of the body."""
 
     surfaces: Sequence[Surface] = ()
 
@@ -86,12 +99,12 @@ class SurfacePartition:
         """See `Partition`."""
         crossings = [_crossings(surface, starts, directions) for surface in self.surfaces]
         edges = [np.zeros((len(starts), 1)), lengths[:, None], *(distances for distances, _ in crossings)]
-        rays, enter, leave = _between(np.hstack(edges), begins, lengths)
+        rays, enter, leave = _pieces_between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         regions = np.zeros(len(rays), dtype=np.int64)
-        for region in by_volume(self.surfaces):
+        for region in sort_by_volume(self.surfaces):
             distances, signs = crossings[region - 1]
-            # Inside is what the path has yet to leave.
+            # A point is inside if the path leaves the region once more than it enters it from there on.
             inside = (signs[rays] * (distances[rays] > middles[:, None])).sum(axis=1) > 0
             regions[inside] = region
         return Pieces(rays, enter, leave, regions)
@@ -99,7 +112,7 @@ class SurfacePartition:
 
 @dataclass(frozen=True)
 class MeshPartition:
-    """Regions by the tetrahedra of a mesh; outside of them the nearest one's."""
+    """Regions by the tetrahedra of a mesh; a place outside the mesh has the region of the nearest tetrahedron."""
 
     mesh: TetMesh
 
@@ -119,32 +132,33 @@ class MeshPartition:
             paths, cells, enter = part.paths[order], part.cells[order], part.enter[order]
             regions = np.where(cells >= 0, self.mesh.regions[cells], -1)
             changes = np.flatnonzero((np.diff(regions) != 0) & (np.diff(paths) == 0)) + 1
-            edges.append(_padded(paths[changes], enter[changes], len(starts)))
-        rays, enter, leave = _between(np.hstack(edges), begins, lengths)
+            edges.append(_pad_rows(paths[changes], enter[changes], len(starts)))
+        rays, enter, leave = _pieces_between(np.hstack(edges), begins, lengths)
         middles = 0.5 * (np.maximum(enter, begins[rays]) + np.maximum(leave, begins[rays]))
         return Pieces(rays, enter, leave, self.region_at(starts[rays] + middles[:, None] * directions[rays]))
 
 
 def _crossings(surface: Surface, starts: FloatArray, directions: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Where each path crosses a surface, (r, c), inf for none, and whether outwards (1) or inwards (-1) there."""
+    """Distances at which each path crosses a surface, (r, c), inf for none, and 1 if outwards, -1 if inwards there."""
     distances, signs = [], []
-    aside = ASIDE * surface.diagonal * (_SIDE - (directions @ _SIDE)[:, None] * directions)
-    beside = starts + aside
-    left, travelled = np.arange(len(starts)), np.zeros(len(starts))
+    aside = OFFSET_ASIDE * surface.diagonal * (_ASIDE - (directions @ _ASIDE)[:, None] * directions)
+    moved = starts + aside
+    active, travelled = np.arange(len(starts)), np.zeros(len(starts))
     step = OFFSET * surface.diagonal
     for _ in range(MOST_CROSSINGS):
-        way, faces = surface.rays.first(beside[left] + travelled[left, None] * directions[left], directions[left])
+        origins = moved[active] + travelled[active, None] * directions[active]
+        steps, faces = surface.rays.first(origins, directions[active])
         hit = faces >= 0
-        left, faces = left[hit], faces[hit]
-        if len(left) == 0:
+        active, faces = active[hit], faces[hit]
+        if len(active) == 0:
             break
-        travelled[left] += np.maximum(way[hit], step)
+        travelled[active] += np.maximum(steps[hit], step)
         distance, sign = np.full(len(starts), np.inf), np.zeros(len(starts), dtype=np.int64)
-        slope = np.einsum("ij,ij->i", directions[left], surface.normals[faces])
-        sign[left] = np.sign(slope)
-        # Back from beside the path to the path itself, in the plane of the triangle.
-        back = np.einsum("ij,ij->i", aside[left], surface.normals[faces]) / np.where(slope == 0, np.inf, slope)
-        distance[left] = travelled[left] + np.clip(back, -step, step)
+        slope = np.einsum("ij,ij->i", directions[active], surface.normals[faces])
+        sign[active] = np.sign(slope)
+        # From the crossing of the moved path, in the plane of the triangle, to that of the path itself.
+        back = np.einsum("ij,ij->i", aside[active], surface.normals[faces]) / np.where(slope == 0, np.inf, slope)
+        distance[active] = travelled[active] + np.clip(back, -step, step)
         distances.append(distance)
         signs.append(sign)
     if not distances:
@@ -152,8 +166,10 @@ def _crossings(surface: Surface, starts: FloatArray, directions: FloatArray) -> 
     return np.column_stack(distances), np.column_stack(signs)
 
 
-def _between(edges: FloatArray, begins: FloatArray, lengths: FloatArray) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Paths and ends of the pieces between edges (r, e), of which the first two are the path's own ends."""
+def _pieces_between(
+    edges: FloatArray, begins: FloatArray, lengths: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Paths (p,) and ends (p,) of the pieces between edges (r, e); the first two edges of a path are its own ends."""
     within = (edges > begins[:, None]) & (edges < lengths[:, None])
     edges = np.sort(np.where(within, edges, lengths[:, None]), axis=1)
     edges = np.column_stack([np.zeros(len(edges)), edges])
@@ -164,8 +180,8 @@ def _between(edges: FloatArray, begins: FloatArray, lengths: FloatArray) -> tupl
     return rays, enter[some], leave[some]
 
 
-def _padded(rays: IntArray, values: FloatArray, count: int) -> FloatArray:
-    """Values of each ray in a row of its own, (count, most), inf where there are fewer; rays ascend."""
+def _pad_rows(rays: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """Values of each ray in a row of its own, (count, most), padded with inf; `rays` ascends."""
     first = np.searchsorted(rays, rays)
     place = np.arange(len(rays)) - first
     table = np.full((count, int(place.max(initial=-1)) + 1), np.inf)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.host.blocks import in_blocks
+from tetlux.meshing.host.blocks import run_in_blocks
 
 # Pairs of a point and a charge worked on at once, so that they stay in the processor's cache.
 PAIRS = 50_000
@@ -56,7 +56,7 @@ class Equation:
         def work(rows: slice) -> None:
             table[rows] = self._unit_fluence(_distances(points[rows], positions))
 
-        in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), _rows(positions))
         return table
 
     def traces_of_each(
@@ -69,7 +69,7 @@ class Equation:
         def work(rows: slice) -> None:
             fluence[rows], flux[rows] = self._unit_traces(points[rows], normals[rows], positions)
 
-        in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), _rows(positions))
         return fluence, flux
 
     def residual_of_each(self, points: FloatArray, normals: FloatArray, positions: FloatArray) -> NumberArray:
@@ -82,7 +82,7 @@ class Equation:
             flux += fluence
             table[rows] = flux
 
-        in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), _rows(positions))
         return table
 
     def fluence(self, points: FloatArray, positions: FloatArray, strengths: NumberArray) -> NumberArray:
@@ -92,7 +92,7 @@ class Equation:
         def work(rows: slice) -> None:
             sums[rows] = self._unit_fluence(_distances(points[rows], positions)) @ strengths
 
-        in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), _rows(positions))
         return sums
 
     def traces(
@@ -106,7 +106,7 @@ class Equation:
             value, slope = self._unit_traces(points[rows], normals[rows], positions)
             fluence[rows], flux[rows] = value @ strengths, slope @ strengths
 
-        in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), _rows(positions))
         return fluence, flux
 
     def _unit_fluence(self, distance: FloatArray) -> NumberArray:

@@ -4,7 +4,8 @@ import numpy as np
 
 from tetlux.fem.charges.samples import Cells, Samples, Spacing, cells_of
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Cells longer than this share of the spacing have three points, the middles of their sides (exact for quadratics).
 COARSE = 0.5

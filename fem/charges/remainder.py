@@ -31,7 +31,7 @@ from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.operators.assembly import Assembly
-from tetlux.meshing.arrays import FloatArray, summed
+from tetlux.meshing.arrays import FloatArray, sum_by_index
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -88,6 +88,6 @@ def solve_remainder(mesh: TetMesh, surface: Surface, medium: Medium, fitted: Fit
     _, residual = fitted.field.exitance_and_residual(points.points, points.normals)
     missing = points.areas * (fitted.drive.inflow.sum() - residual.sum(axis=1))
     _, face, weights = mesh.closest_boundary(points.points)
-    load = summed(mesh.boundary_faces[face], missing[:, None] * weights, len(mesh.points))
+    load = sum_by_index(mesh.boundary_faces[face], missing[:, None] * weights, len(mesh.points))
     solver = Assembly(mesh).solver(coefficients_of(medium), "consistent", 1)
     return Remainder(mesh, medium, fitted, solver.solve(load[:, None]).x[:, 0])

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 
 # Candidates to each square of the spacing.
 CANDIDATES = 4.0
@@ -97,7 +98,7 @@ class Cells:
             done.append((faces[small], corners[small], wanted[small]))
             if small.all():
                 break
-            faces, corners = np.repeat(faces[~small], 4), quartered(corners[~small])
+            faces, corners = np.repeat(faces[~small], 4), quarter_triangles(corners[~small])
             wanted = spacing(corners.mean(axis=1))
         faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
         # Parts of one triangle side by side, so that drawing in order spreads points evenly.
@@ -159,4 +160,4 @@ def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Sa
     kept = thin(drawn, APART * drawn.spacing)
     chosen = drawn[kept]
     nearest = np.asarray(cKDTree(chosen.points).query(drawn.points)[1])
-    return replace(chosen, areas=summed(nearest, drawn.areas, len(chosen))), drawn[~kept]
+    return replace(chosen, areas=sum_by_index(nearest, drawn.areas, len(chosen))), drawn[~kept]

@@ -33,9 +33,9 @@ def estimate_by_operator(
     estimates = []
     for operator in dict.fromkeys(load.operator for load in loads):
         own = [light for light, load in enumerate(loads) if load.operator is operator]
-        emission = sum((loads[light].deposit.emission for light in own), 0.0)
+        emission = sum((loads[light].deposit.terms.emission for light in own), 0.0)
         # Only uneven deposits make the exitance ripple, and emission is even.
-        uneven = [loads[light].at_nodes for light in own if not loads[light].deposit.even]
+        uneven = [loads[light].at_nodes for light in own if not loads[light].deposit.terms.is_distributed]
         estimates.append(
             estimate_error(
                 sum_solutions([of_lights[light] for light in own]),

@@ -7,8 +7,8 @@ weight of a local error in the total power that leaves. For either of them these
 * the residual within tetrahedra (`tetlux.fem.error.residual`),
 * layers thinner than their tetrahedra (`tetlux.fem.error.layers`),
 * flat facets in place of curved surfaces (`tetlux.fem.error.facets`),
-* ripples of what fitted charges violate at the boundary that are finer than its facets (`tetlux.fem.known.fitted_patch`);
-  these add to the exitance and hardly to the total.
+* ripples of what fitted charges violate at the boundary that are finer than facets (`tetlux.fem.known.fitted_patch`),
+  which hardly change the total.
 
 All terms are moduli, so that errors that cancel are counted.
 """
@@ -28,7 +28,7 @@ from tetlux.fem.operators.fitting import Fitting
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.blocks import at_once
+from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -104,7 +104,7 @@ def estimate_error(
     mean = averaging(mesh)
     smooth, rough = without_patches(solution, mean)
     slope_error = root_mean_square(rough)
-    beyond, leaving = _beyond_fitted(solution, coefficients)
+    beyond, leaving = _beyond_fitted(solution)
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
@@ -121,7 +121,7 @@ def estimate_error(
         shares += interface_layers(mesh, coefficients, smooth, at_corners)
         return shares + FACETS * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
 
-    shares, power_shares = at_once(shares_by, list(duals.T))
+    shares, power_shares = map_in_threads(shares_by, list(duals.T))
     shares += ripple(mesh, coefficients, load, norm) + _unseen(solution, norm)
     return Estimate(shares, power_shares)
 
@@ -137,7 +137,7 @@ def _dual_loads(
     return loads
 
 
-def _beyond_fitted(solution: Solution, coefficients: Coefficients) -> tuple[FloatArray, FloatArray]:
+def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """What the mesh adds to fitted charges: its fluence, and the net flux of that which leaves, at the nodes (n,)."""
     mesh, beyond = solution.mesh, solution.fluence
     leaving = np.zeros(len(mesh.points))
@@ -145,8 +145,8 @@ def _beyond_fitted(solution: Solution, coefficients: Coefficients) -> tuple[Floa
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
             beyond = beyond - patch.at_nodes
-            fluence = patch.at_nodes[mesh.boundary_nodes]
-            leaving[mesh.boundary_nodes] -= mesh.to_boundary_nodes(coefficients.escape * mesh.boundary_areas) * fluence / mesh.boundary_node_areas
+            robin = 0.5 / patch.charges.medium.boundary_factor
+            leaving[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
             leaving += patch.residual_at_nodes
     return beyond, leaving
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.surface import Surface, longest_sides, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import owners
 

@@ -16,7 +16,7 @@ import numpy as np
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.operators.fitting import Fitting
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Under diffuse light, on balls of 3 to 100 mean free paths, reduced albedos .09 to .99 and indices 1 and 1.4, the

@@ -1,4 +1,4 @@
-"""Sources of diffuse light along a collimated beam in a medium."""
+"""Source densities of diffuse light along a collimated beam in a medium."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -13,8 +13,8 @@ Source = Literal["delta-eddington", "similarity"]
 class BeamSource:
     """Source densities along a collimated beam of unit power, at depth s along the beam.
 
-    ``Q0 = isotropic e^{-extinction s}`` and ``Q1/sigma_t' = forward e^{-extinction s}`` along the beam. A
-    field f that a unit point source at depth s causes somewhere becomes, for the beam,
+    ``Q0 = isotropic e^{-extinction s}`` and ``Q1/sigma_t' = forward e^{-extinction s}`` along the beam. If f(s) is the
+    field of a unit point source at depth s, the field of the beam is
     ``∫ e^{-extinction s} (isotropic f + forward df/ds) ds``.
 
     Attributes
@@ -24,7 +24,7 @@ class BeamSource:
     isotropic : float
         1/unit.
     forward : float
-        Without a unit.
+        Dimensionless.
     """
 
     extinction: float
@@ -33,21 +33,25 @@ class BeamSource:
 
     @property
     def volume(self) -> float:
-        """Density of point sources after integrating df/ds by parts; two sources at the ends remain, 1/unit."""
+        """Density of point sources if df/ds is integrated by parts, besides two sources at the ends, 1/unit."""
         return self.isotropic + self.forward * self.extinction
 
 
 def beam_source(medium: Medium, source: Source) -> BeamSource:
-    """Describe the densities along a beam in `medium`.
+    """Source densities along a beam in a medium.
 
     Parameters
     ----------
     medium : Medium
-        Where the beam runs.
+        The medium around the beam.
     source : {"delta-eddington", "similarity"}
         ``"delta-eddington"`` (Joseph 1976): ``sigma_s* = sigma_s (1 - g²)``, ``g* = g/(1 + g)``, with the first
         moment ``Q1 = g* sigma_s* E``. ``"similarity"``: ``sigma_s' e^{-sigma_t' s}`` and no first moment. Both are
-        the same in a medium that scatters isotropically.
+        equal in a medium that scatters isotropically.
+
+    Returns
+    -------
+    BeamSource
 
     Raises
     ------

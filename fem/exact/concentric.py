@@ -1,7 +1,7 @@
-"""A ball with a core of another medium around its centre: in diffuse light, or with a core that glows.
+"""A ball with a concentric core of another medium: in diffuse light, or with a core that emits.
 
-In both parts the fluence depends on r alone, so that ``f = r phi`` obeys ``f'' = k² f``; phi and ``D dphi/dr`` are
-continuous at the core, and ``phi + zb dphi/dr`` is given at the surface. Each solution is integrated in the
+In core and shell the fluence depends only on r, so that ``f = r phi`` satisfies ``f'' = k² f``; phi and ``D dphi/dr``
+are continuous at the core, and ``phi + zb dphi/dr`` is given at the surface. Each solution is integrated in the
 direction in which it grows, so that no digits are lost at any contrast.
 """
 
@@ -13,7 +13,7 @@ from tetlux.fem.media.medium import Medium
 
 
 def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius: float) -> float:
-    """Flux that leaves the ball in unit diffuse irradiance (transmitted), ``M = 1 - D dphi/dr``.
+    """Flux that leaves the ball in uniform diffuse light of unit transmitted irradiance, ``M = 1 - D dphi/dr``.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius:
     Returns
     -------
     float
-        W/unit² for 1 W/unit² that passes into the ball.
+        W/unit² for 1 W/unit² that enters the ball.
 
     Raises
     ------
@@ -40,9 +40,8 @@ def diffuse_exitance(core: Medium, shell: Medium, *, core_radius: float, radius:
     >>> round(diffuse_exitance(core, medium, core_radius=5.0, radius=10.0), 6)
     0.748327
     """
-    b = checks.positive("radius", radius)
-    a = checks.within("core_radius", core_radius, 0.0, b, "ball")
-    # At the core f = a, for a fluence of 1 there.
+    a, b = checks.core_in_ball(core_radius, radius)
+    # At the surface of the core f = a, for a fluence of 1.
     growth = core.diffusion / shell.diffusion * _growth(core.sigma_tr, a)
     value, slope = _integrate(shell.sigma_tr, b - a, a, 1.0 + a * growth)
     growth = slope / value - 1.0 / b
@@ -70,18 +69,16 @@ def glow_exitance(core: Medium, shell: Medium, *, core_radius: float, radius: fl
     InputError
         If a radius is not positive, or the core not inside.
     """
-    b = checks.positive("radius", radius)
-    a = checks.within("core_radius", core_radius, 0.0, b, "ball")
-    # From the surface, where the fluence is 1, inward: f = b, and -f' = b/zb - 1.
+    a, b = checks.core_in_ball(core_radius, radius)
+    # Inward from the surface, for a fluence of 1: f = b, and -f' = b/zb - 1.
     k, zb = shell.sigma_tr, shell.extrapolation_length
     value, slope = _integrate(k, b - a, b, b / zb - 1.0)
     decay = slope / value + 1.0 / a
-    # What the core emits less what it absorbs passes its surface: phi = Q0/sigma_a (1 - c i_0(k r)).
-    x = core.sigma_tr
-    emitted = a / 3.0 if x == 0 else _growth(x, a) / x**2
-    conducted = core.diffusion * _growth(x, a) + shell.diffusion * decay
-    at_core = emitted / conducted
-    # The same solution, as phi at the surface over phi at the core; `value` is scaled by e^{-k (b - a)}.
+    # The flux out of the core is emission minus absorption, with phi = Q0/sigma_a (1 - c i_0(k r)).
+    k_core = core.sigma_tr
+    emission = a / 3.0 if k_core == 0 else _growth(k_core, a) / k_core**2
+    at_core = emission / (core.diffusion * _growth(k_core, a) + shell.diffusion * decay)
+    # The fluence at the surface is a/f(a) times that at the core; `value` is f(a) e^{-k (b - a)}.
     return at_core * a / value * math.exp(-k * (b - a)) / (2.0 * shell.boundary_factor)
 
 
@@ -94,7 +91,7 @@ def _growth(k: float, r: float) -> float:
 
 
 def _integrate(k: float, length: float, value: float, slope: float) -> tuple[float, float]:
-    """Integrate f and f' over a length from their values at its start; both times ``e^{-k length}``."""
+    """Integrate ``f'' = k² f`` over a length, from f and f' at its start to both at its end times ``e^{-k length}``."""
     x = k * length
     fall = math.exp(-2.0 * x)
     cosh, sinh = 0.5 * (1.0 + fall), 0.5 * (1.0 - fall)

@@ -1,8 +1,8 @@
 """The half-space z >= 0 with the extrapolated boundary: a source and its mirror image, the dipole.
 
-Fluence vanishes on the plane z = -zb instead of meeting the boundary condition at z = 0. That is another
-model than `half_space`: the two differ by a quarter near the source and meet far away. Which factor A goes
-into ``zb = 2 A D`` is the medium's: ``Medium(..., boundary="classic")`` gives the published curves.
+Fluence vanishes on the plane z = -zb instead of satisfying the Robin boundary condition at z = 0. This model differs
+from `half_space` by a quarter near the source, and agrees with it far away. The factor A in ``zb = 2 A D`` is that of
+the medium: ``Medium(..., boundary="classic")`` gives the published curves.
 """
 
 import math
@@ -39,11 +39,9 @@ def fluence(medium: Medium, *, depth: float, points: npt.ArrayLike) -> FloatArra
     InputError
         If the source is outside, or a point beyond the extrapolated plane.
     """
-    z0 = checks.positive("depth", depth)
-    x = checks.points(points)
+    z0 = checks.positive_number("depth", depth)
     zb, k = medium.extrapolation_length, medium.sigma_tr
-    z = checks.numbers("the z of points", x[:, 2], low=-zb)
-    rho = np.hypot(x[:, 0], x[:, 1])
+    rho, z = checks.points_in_slab(points, low=-zb)
     r1 = np.hypot(rho, z - z0)
     r2 = np.hypot(rho, z + z0 + 2.0 * zb)
     with np.errstate(divide="ignore"):
@@ -55,7 +53,7 @@ def flux(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> FloatArray:
     """Flux ``D dphi/dz`` through the real surface z = 0, above a point source of unit power.
 
     ``1/(4 pi) sum_i z_i (1 + k d_i) e^{-k d_i}/d_i³`` over the depth ``z_1 = depth`` and the height
-    ``z_2 = depth + 2 zb`` (Farrell 1992, eq. 14). It is not phi/(2A), which is another number here.
+    ``z_2 = depth + 2 zb`` (Farrell 1992, eq. 14). With this boundary it differs from phi/(2A).
 
     Parameters
     ----------
@@ -76,7 +74,7 @@ def flux(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> FloatArray:
     InputError
         If the source is outside, or a distance negative.
     """
-    z0 = checks.positive("depth", depth)
+    z0 = checks.positive_number("depth", depth)
     distance = checks.numbers("rho", rho, low=0.0)
     k = medium.sigma_tr
     total = np.zeros(distance.shape)
@@ -89,7 +87,7 @@ def flux(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> FloatArray:
 def reflectance(medium: Medium, *, rho: npt.ArrayLike) -> FloatArray:
     """Diffuse reflectance ``R_d`` around a pencil beam (Farrell 1992; Jensen 2001, eq. 4).
 
-    `flux` of one point source of strength alpha' at the depth 1/sigma_t'.
+    The `flux` of one point source of power alpha' at the depth 1/sigma_t'.
 
     Parameters
     ----------
@@ -101,7 +99,7 @@ def reflectance(medium: Medium, *, rho: npt.ArrayLike) -> FloatArray:
     Returns
     -------
     (...) ndarray
-        For unit power that has entered, 1/unit². Meant for an albedo near 1 and rho beyond a mean free path.
+        For unit power that enters, 1/unit². It holds for an albedo near 1 and rho above a mean free path.
 
     Raises
     ------
@@ -119,7 +117,7 @@ def reflectance(medium: Medium, *, rho: npt.ArrayLike) -> FloatArray:
 
 
 def total_reflectance(medium: Medium) -> float:
-    """`reflectance` over the whole surface: ``alpha'/2 (e^{-k z_1} + e^{-k z_2})`` (Farrell 1992).
+    """Integral of `reflectance` over the surface: ``alpha'/2 (e^{-k z_1} + e^{-k z_2})`` (Farrell 1992).
 
     Parameters
     ----------
@@ -129,7 +127,7 @@ def total_reflectance(medium: Medium) -> float:
     Returns
     -------
     float
-        Share of the power that has entered, between 0 and 1.
+        Share of the power that enters, between 0 and 1.
     """
     k, z1 = medium.sigma_tr, medium.mean_free_path
     z2 = z1 + 2.0 * medium.extrapolation_length

@@ -1,6 +1,6 @@
 """The half-space z >= 0 in the diffusion approximation, with the exact (Robin) boundary.
 
-The medium fills z >= 0, so z is depth and the surface's outward normal is -z. All functions return values for
+The medium fills z >= 0, so z is depth, and the outward normal of the surface is -z. All functions return values for
 unit power, or unit irradiance. Exitance is ``M = phi/(2A)`` in W/unit².
 """
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
 from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks, two_decays
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, compute_in_chunks, convolve_decays, graded_rule
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 
@@ -24,8 +24,8 @@ def point_fluence(medium: Medium, *, depth: float, points: npt.ArrayLike) -> Flo
 
         4 pi D phi = e^{-k r1}/r1 - e^{-k r2}/r2 + 2 ∫0..inf e^{-l/zb} w (1 + k R) e^{-k R}/R³ dl
 
-    with ``w = z + depth + l`` and ``R² = rho² + w²``: the classic mirror source and sink line (Bryan 1890;
-    Carslaw and Jaeger 1959, section 14.9), after one integration by parts, which leaves no cancellation.
+    with ``w = z + depth + l`` and ``R² = rho² + w²``: the mirror source and sink line (Bryan 1890; Carslaw and Jaeger
+    1959, section 14.9), after an integration by parts that removes cancellation.
 
     Parameters
     ----------
@@ -46,10 +46,8 @@ def point_fluence(medium: Medium, *, depth: float, points: npt.ArrayLike) -> Flo
     InputError
         If the source or a point is outside.
     """
-    z0 = checks.positive("depth", depth)
-    x = checks.points(points)
-    rho = np.hypot(x[:, 0], x[:, 1])
-    z = checks.numbers("the z of points", x[:, 2], low=0.0)
+    z0 = checks.positive_number("depth", depth)
+    rho, z = checks.points_in_slab(points, low=0.0)
     k = medium.sigma_tr
     r1 = np.hypot(rho, z - z0)
     r2 = np.hypot(rho, z + z0)
@@ -62,9 +60,7 @@ def point_fluence(medium: Medium, *, depth: float, points: npt.ArrayLike) -> Flo
 
 
 def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> FloatArray:
-    """Give the exitance above an isotropic point source of unit power.
-
-    `point_fluence` at z = 0, over 2A.
+    """Exitance above an isotropic point source of unit power: `point_fluence` at z = 0 over 2A.
 
     Parameters
     ----------
@@ -92,7 +88,7 @@ def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> Float
     >>> point_exitance(medium, depth=1.0, rho=[0.0, 5.0]).round(6).tolist()
     [0.041846, 0.001425]
     """
-    z0 = checks.positive("depth", depth)
+    z0 = checks.positive_number("depth", depth)
     distance = checks.numbers("rho", rho, low=0.0)
     line = sink_line(medium.sigma_tr, medium.extrapolation_length, distance.ravel(), np.full(distance.size, z0))
     return (line / (2.0 * math.pi * medium.extrapolation_length)).reshape(distance.shape)
@@ -118,17 +114,17 @@ def point_total(medium: Medium, *, depth: float) -> float:
     InputError
         If the source is outside.
     """
-    z0 = checks.positive("depth", depth)
+    z0 = checks.positive_number("depth", depth)
     k = medium.sigma_tr
     return float(np.exp(-k * z0) / (1.0 + k * medium.extrapolation_length))
 
 
 def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "delta-eddington") -> FloatArray:
-    """Give the exitance around a pencil beam without width that enters at the origin along z.
+    """Exitance around a pencil beam of no width that enters at the origin along z.
 
-    `point_exitance` integrated along the beam; both integrals, along the beam and along the sink line, meet
-    in one over their common height ``w``. Near the entry M grows like log(1/rho), and falls below zero like
-    -1/rho where the source has a first moment: a beam without width is singular there.
+    It is `point_exitance` integrated along the beam; the integrals along the beam and along the sink line combine to
+    one over their height ``w``. A beam of no width is singular at its entry: M grows like log(1/rho), or decreases like
+    -1/rho, to values below zero, if the source has a first moment.
 
     Parameters
     ----------
@@ -142,7 +138,7 @@ def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "del
     Returns
     -------
     (...) ndarray
-        ``M = phi/(2A)`` for unit power that has entered, W/unit², to about 1e-12 of its singular part.
+        ``M = phi/(2A)`` for unit power that enters, W/unit², to about 1e-12 of its singular part.
 
     Raises
     ------
@@ -162,16 +158,16 @@ def pencil_exitance(medium: Medium, *, rho: npt.ArrayLike, source: Source = "del
     reach = CUTOFF / min(beam.extinction, sink)
     nodes, weights = graded_rule()
     w = reach * nodes[:, None]
-    density = beam.volume * two_decays(w, beam.extinction, sink) - beam.forward * np.exp(-sink * w)
+    density = beam.volume * convolve_decays(w, beam.extinction, sink) - beam.forward * np.exp(-sink * w)
 
     def integral(part: FloatArray) -> FloatArray:
         return np.asarray((reach * weights) @ (density * mirror_flux(medium.sigma_tr, part, w)))
 
-    return (sink / (2.0 * math.pi) * in_chunks(integral, distance.ravel())).reshape(distance.shape)
+    return (sink / (2.0 * math.pi) * compute_in_chunks(integral, distance.ravel())).reshape(distance.shape)
 
 
 def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float:
-    """Power that comes back from a pencil beam; also the diffuse reflectance of a wide beam.
+    """Power that leaves by the surface, of a pencil beam; also the diffuse reflectance of a wide beam.
 
     ``(q0 - k q1)/[(sigma + k)(1 + k zb)]`` with the densities of `beam.BeamSource`. For ``"similarity"`` it is
     ``alpha'/[(1 + q)(1 + 2 A q/3)]``, ``q = sqrt(3 (1 - alpha'))``.
@@ -186,7 +182,7 @@ def pencil_total(medium: Medium, *, source: Source = "delta-eddington") -> float
     Returns
     -------
     float
-        Share of the power that has entered, between 0 and 1.
+        Share of the power that enters, between 0 and 1.
     """
     beam = beam_source(medium, source)
     k = medium.sigma_tr

@@ -133,7 +133,7 @@ def sphere(
         If the radius is not positive, the point not inside, the bins or `photons` make no sense, or numba is
         not installed.
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     bounds = _edges(np.linspace(0.0, math.pi, 19) if edges is None else edges, high=math.pi)
     depth_of_point = _depth(light, depth, 2.0 * a, "ball")
     shares = Batches(medium, True, a, light, depth_of_point, bounds, photons, seed).run()
@@ -185,7 +185,7 @@ def slab(
         If the thickness is not positive, the point not inside, the rings or `photons` make no sense, or numba
         is not installed.
     """
-    length = checks.positive("thickness", thickness)
+    length = checks.positive_number("thickness", thickness)
     if light == "beam":
         if edges is not None:
             raise InputError("edges are given with a wide beam, which lights a slab evenly; leave them out.")
@@ -214,7 +214,7 @@ def _depth(light: Light, depth: float | None, high: float, body: str) -> float:
         raise InputError(f'light is "{light}"; it is "pencil", "beam" or "point".')
     if (light == "point") != (depth is not None):
         raise InputError(f'light is "{light}" and depth is {depth}; a point needs its depth, a beam has none.')
-    return 0.0 if depth is None else checks.within("depth", depth, 0.0, high, body)
+    return 0.0 if depth is None else checks.number_within("depth", depth, 0.0, high, body)
 
 
 def _edges(values: npt.ArrayLike, high: float) -> FloatArray:

@@ -83,12 +83,15 @@ class IdealSources:
 
 def ideal_sources(deposits: Sequence[Deposit]) -> IdealSources | None:
     """Describe deposits as ideal sources; None if a part of them is neither a point nor uniform."""
-    uniform = [(d.transmitted_irradiance, d.emission) for d in deposits]
-    if any(len(d.starts) or d.on_mesh is not None for d in deposits) or any(np.ndim(v) for row in uniform for v in row):
+    terms = [deposit.terms for deposit in deposits]
+    uniform = [(each.transmitted_irradiance, each.emission) for each in terms]
+    if any(deposit.on_mesh is not None for deposit in deposits) or any(len(each.segments) for each in terms):
+        return None
+    if any(np.ndim(value) for row in uniform for value in row):
         return None
     return IdealSources(
-        np.vstack([np.zeros((0, 3)), *(d.points for d in deposits)]),
-        np.concatenate([np.zeros(0), *(d.powers for d in deposits)]),
+        np.vstack([np.zeros((0, 3)), *(each.points for each in terms)]),
+        np.concatenate([np.zeros(0), *(each.powers for each in terms)]),
         sum(float(transmitted) for transmitted, _ in uniform),
         sum(float(emission) for _, emission in uniform),
     )

@@ -1,24 +1,21 @@
 """The slab 0 <= z <= L in the diffusion approximation, with a point source.
 
-Two boundaries: the exact (Robin) one, and the extrapolated one, where fluence vanishes on the planes
-``z = -zb`` and ``z = L + zb``. They are different models, as `half_space` and `dipole` are. All functions return
-values for unit power; the source is at (0, 0, depth). A wide beam is in `slab_plane`.
+The boundary is either exact (Robin) or extrapolated: fluence vanishes on the planes ``z = -zb`` and ``z = L + zb``.
+These models differ as `half_space` and `dipole` do. All functions return values for unit power of a source at
+(0, 0, depth). For a wide beam see `slab_plane`.
 """
 
 import math
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
+from tetlux.fem.exact.checks import Face
 from tetlux.fem.exact.numerics.layer import Layer
 from tetlux.fem.exact.slab_plane import escape_front
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.errors import InputError
-
-Face = Literal["front", "back"]
 
 
 def point_fluence(medium: Medium, *, thickness: float, depth: float, points: npt.ArrayLike) -> FloatArray:
@@ -45,10 +42,8 @@ def point_fluence(medium: Medium, *, thickness: float, depth: float, points: npt
     InputError
         If the thickness is not positive, or the source or a point outside.
     """
-    length, z0 = _source(thickness, depth)
-    x = checks.points(points)
-    z = checks.numbers("the z of points", x[:, 2], low=0.0, high=length)
-    rho = np.hypot(x[:, 0], x[:, 1])
+    length, z0 = checks.source_in_slab(thickness, depth)
+    rho, z = checks.points_in_slab(points, low=0.0, high=length)
     field = Layer(medium.sigma_tr, medium.extrapolation_length, length).field(z, z0, rho)
     return field / (4.0 * math.pi * medium.diffusion)
 
@@ -56,7 +51,7 @@ def point_fluence(medium: Medium, *, thickness: float, depth: float, points: npt
 def point_exitance(
     medium: Medium, *, thickness: float, depth: float, rho: npt.ArrayLike, face: Face = "front"
 ) -> FloatArray:
-    """Give the exitance at a face, of an isotropic point source of unit power, both faces Robin.
+    """Exitance at a face for an isotropic point source of unit power, both faces Robin.
 
     Parameters
     ----------
@@ -86,9 +81,9 @@ def point_exitance(
     >>> point_exitance(medium, thickness=10.0, depth=1.0, rho=[0.0, 5.0]).round(6).tolist()
     [0.041833, 0.001413]
     """
-    length, z0 = _source(thickness, depth)
+    length, z0 = checks.source_in_slab(thickness, depth)
     distance = checks.numbers("rho", rho, low=0.0)
-    z = np.full(distance.size, length if _is_back(face) else 0.0)
+    z = np.full(distance.size, length if checks.is_back(face) else 0.0)
     zb = medium.extrapolation_length
     field = Layer(medium.sigma_tr, zb, length).field(z, z0, distance.ravel())
     return (field / (4.0 * math.pi * zb)).reshape(distance.shape)
@@ -109,7 +104,7 @@ def point_total(medium: Medium, *, thickness: float, depth: float, face: Face = 
     Returns
     -------
     float
-        W for unit power, between 0 and 1; what leaves through neither face is absorbed.
+        W, between 0 and 1; what leaves through neither face is absorbed.
 
     Raises
     ------
@@ -123,15 +118,15 @@ def point_total(medium: Medium, *, thickness: float, depth: float, face: Face = 
     >>> round(point_total(medium, thickness=10.0, depth=1.0, face="back"), 6)
     0.102323
     """
-    length, z0 = _source(thickness, depth)
-    return float(escape_front(medium, length, np.array(length - z0 if _is_back(face) else z0)))
+    length, z0 = checks.source_in_slab(thickness, depth)
+    return float(escape_front(medium, length, np.array(length - z0 if checks.is_back(face) else z0)))
 
 
 def extrapolated_fluence(medium: Medium, *, thickness: float, depth: float, points: npt.ArrayLike) -> FloatArray:
     """Fluence of an isotropic point source of unit power, zero on z = -zb and z = L + zb.
 
-    The sum over all images of the source, sources at ``2m(L + 2zb) + z0`` and sinks at
-    ``2m(L + 2zb) - 2zb - z0`` (Contini 1997): the nearest three one by one, the others in closed form.
+    It is the sum over all images, sources at ``2m(L + 2zb) + z0`` and sinks at ``2m(L + 2zb) - 2zb - z0`` (Contini
+    1997): the nearest three one by one, the others in closed form.
 
     Parameters
     ----------
@@ -152,11 +147,9 @@ def extrapolated_fluence(medium: Medium, *, thickness: float, depth: float, poin
     InputError
         If the thickness is not positive, or the source or a point outside.
     """
-    length, z0 = _source(thickness, depth)
-    x = checks.points(points)
+    length, z0 = checks.source_in_slab(thickness, depth)
     zb = medium.extrapolation_length
-    z = checks.numbers("the z of points", x[:, 2], low=-zb, high=length + zb)
-    rho = np.hypot(x[:, 0], x[:, 1])
+    rho, z = checks.points_in_slab(points, low=-zb, high=length + zb)
     field = Layer(medium.sigma_tr, 0.0, length + 2.0 * zb).field(z + zb, z0 + zb, rho)
     return field / (4.0 * math.pi * medium.diffusion)
 
@@ -166,8 +159,8 @@ def extrapolated_flux(
 ) -> FloatArray:
     """Outward flux ``-D dphi/dn`` through a real face, z = 0 or z = L, of `extrapolated_fluence`.
 
-    This is what Contini 1997 calls R(rho) and T(rho), and for a thick slab it is `dipole.flux`. It is not
-    phi/(2A), which is another number with this boundary.
+    It is R(rho) and T(rho) of Contini 1997, and `dipole.flux` for a thick slab. With this boundary it differs from
+    phi/(2A).
 
     Parameters
     ----------
@@ -190,21 +183,10 @@ def extrapolated_flux(
     InputError
         If the thickness is not positive, the source outside, a distance negative, or the face unknown.
     """
-    length, z0 = _source(thickness, depth)
+    length, z0 = checks.source_in_slab(thickness, depth)
     distance = checks.numbers("rho", rho, low=0.0)
     zb = medium.extrapolation_length
-    back = _is_back(face)
+    back = checks.is_back(face)
     z = np.full(distance.size, length + zb if back else zb)
     slope = Layer(medium.sigma_tr, 0.0, length + 2.0 * zb).slope(z, z0 + zb, distance.ravel())
     return np.asarray((-slope if back else slope) / (4.0 * math.pi)).reshape(distance.shape)
-
-
-def _source(thickness: float, depth: float) -> tuple[float, float]:
-    length = checks.positive("thickness", thickness)
-    return length, checks.within("depth", depth, 0.0, length, "slab")
-
-
-def _is_back(face: Face) -> bool:
-    if face not in ("front", "back"):
-        raise InputError(f'face is "{face}"; it is "front" or "back".')
-    return face == "back"

@@ -10,10 +10,10 @@ from tetlux.meshing.arrays import FloatArray
 
 
 def escape_front(medium: Medium, thickness: float, depth: FloatArray) -> FloatArray:
-    """Share of the power of a source at `depth` that leaves through z = 0, the other share not being lost.
+    """Share of the power of a source at `depth` that leaves through z = 0.
 
     ``[sinh k(L - z) + zb k cosh k(L - z)]/[(1 + zb² k²) sinh k L + 2 zb k cosh k L]``, the solution of
-    ``D phi'' = sigma_a phi - delta`` with Robin boundaries, written so that it neither overflows nor fails at k = 0.
+    ``D phi'' = sigma_a phi - delta`` with Robin boundaries, computed without overflow and also at k = 0.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ def escape_front(medium: Medium, thickness: float, depth: FloatArray) -> FloatAr
     (...) ndarray
     """
     k, zb = medium.sigma_tr, medium.extrapolation_length
-    rest = thickness - depth
-    above = _scaled_sinh(k, rest) + zb * _scaled_cosh(k, rest)
-    whole = (1.0 + (zb * k) ** 2) * _scaled_sinh(k, np.asarray(thickness)) + 2.0 * zb * _scaled_cosh(
+    below = thickness - depth
+    numerator = _scaled_sinh(k, below) + zb * _scaled_cosh(k, below)
+    denominator = (1.0 + (zb * k) ** 2) * _scaled_sinh(k, np.asarray(thickness)) + 2.0 * zb * _scaled_cosh(
         k, np.asarray(thickness)
     )
-    return np.asarray(np.exp(-k * depth) * above / whole)
+    return np.asarray(np.exp(-k * depth) * numerator / denominator)
 
 
 def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
@@ -52,7 +52,7 @@ def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delt
     Returns
     -------
     float
-        Share of the power that has entered. The part of the beam that reaches the far face leaves there, unreflected.
+        Share of the power that enters. The part of the beam that reaches the far face leaves there, unreflected.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delt
     >>> round(beam_reflectance(medium, thickness=5.0), 6), round(beam_transmittance(medium, thickness=5.0), 6)
     (0.577633, 0.249017)
     """
-    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=False)
+    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, far=False)
 
 
 def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
@@ -84,18 +84,18 @@ def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "de
     Returns
     -------
     float
-        Share of the power that has entered, without the ballistic share: see `ballistic_transmittance`.
+        Share of the power that enters, without `ballistic_transmittance`.
 
     Raises
     ------
     InputError
         If the thickness is not positive.
     """
-    return _beam_exit(medium, checks.positive("thickness", thickness), source, far=True)
+    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, far=True)
 
 
 def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
-    """Share of a beam that crosses the slab without scattering, in the sense of `source`: ``e^{-sigma L}``.
+    """Share of a beam that crosses a slab without scattering as `source` defines it: ``e^{-sigma L}``.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source 
     Returns
     -------
     float
-        Share of the power that has entered.
+        Share of the power that enters.
 
     Raises
     ------
@@ -117,11 +117,11 @@ def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source 
         If the thickness is not positive.
     """
     beam = beam_source(medium, source)
-    return float(np.exp(-beam.extinction * checks.positive("thickness", thickness)))
+    return float(np.exp(-beam.extinction * checks.positive_number("thickness", thickness)))
 
 
 def _beam_exit(medium: Medium, thickness: float, source: Source, *, far: bool) -> float:
-    """Integrate the escape over the beam: ``∫ e^{-sigma z}(q0 f + q1 f') dz``, f' by parts."""
+    """Integrate `escape_front` f over the beam: ``∫ e^{-sigma z}(q0 f + q1 f') dz``, the second term by parts."""
     beam = beam_source(medium, source)
     reach = min(thickness, CUTOFF / beam.extinction)
     z, weights = composite_rule(np.linspace(0.0, reach, 9), 16)

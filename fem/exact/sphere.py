@@ -15,20 +15,21 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.numerics.ball import CHUNK, HALF, chord, residual_weight
-from tetlux.fem.exact.numerics.bessel import inner_ratios, order_needed, wall_rates
+from tetlux.fem.exact.numerics.ball import chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, TABLE_SIZE, inner_ratios, order_needed, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.errors import InputError
 
+# Above this order, the singular part of the exitance is separated from the series.
 DIRECT_ORDERS = 20_000
+# Largest order of the series for the fluence.
 POINT_ORDERS = 400_000
 
 
 def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma: npt.ArrayLike) -> FloatArray:
-    """Give the exitance of a ball that holds an isotropic point source of unit power.
+    """Exitance of a ball with an isotropic point source of unit power.
 
     Parameters
     ----------
@@ -44,9 +45,8 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
     Returns
     -------
     (...) ndarray
-        ``M = phi/(2A)``, W/unit². The error is about 1e-13 of the largest value on the surface, so where M
-        is smaller than that it is rounding noise; for a source less than 1/500 of the radius below the
-        surface, the error grows to about 1e-9 of the largest value.
+        ``M = phi/(2A)``, W/unit². The error is about 1e-13 of the largest value on the surface, and about 1e-9 for a
+        source less than 1/500 of the radius below the surface; smaller values are rounding errors.
 
     Raises
     ------
@@ -60,19 +60,19 @@ def point_exitance(medium: Medium, *, radius: float, source_radius: float, gamma
     >>> point_exitance(medium, radius=10.0, source_radius=9.0, gamma=[0.0, 0.5]).round(6).tolist()
     [0.042908, 0.001929]
     """
-    a = checks.positive("radius", radius)
+    a, t = checks.source_in_body(radius, source_radius, "ball")
     angle = checks.numbers("gamma", gamma)
-    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
     flat = angle.ravel()
-    order = order_needed(medium.sigma_tr * a, t, HALF, CUTOFF)
-    sums = _direct(medium, a, t, flat, order) if order <= DIRECT_ORDERS else _split(medium, a, t, flat, order)
+    order = order_needed(medium.sigma_tr * a, t, SPHERICAL, CUTOFF)
+    sum_series = _sum_directly if order <= DIRECT_ORDERS else _sum_split
+    sums = sum_series(medium, a, t, flat, order)
     return np.asarray(sums / (4.0 * math.pi * a**2)).reshape(angle.shape)
 
 
 def point_fluence(medium: Medium, *, radius: float, source_radius: float, points: npt.ArrayLike) -> FloatArray:
-    """Fluence inside a ball of an isotropic point source of unit power at (0, 0, source_radius).
+    """Fluence in a ball with an isotropic point source of unit power at (0, 0, source_radius).
 
-    The free field of the source in closed form, and the reflection by the surface as a series,
+    It is the free field of the source plus the reflection by the surface as a series,
 
         4 pi D a phi = a e^{-k d}/d + sum_l (2l+1) P_l rho_l(r0) rho_l(r) (beta v_l - 1)/[(1 + beta u_l)(u_l + v_l)]
 
@@ -104,32 +104,28 @@ def point_fluence(medium: Medium, *, radius: float, source_radius: float, points
     >>> point_fluence(medium, radius=10.0, source_radius=9.0, points=[[0.0, 0.0, 5.0]]).round(6).tolist()
     [0.026082]
     """
-    a = checks.positive("radius", radius)
-    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
+    a, t = checks.source_in_body(radius, source_radius, "ball")
     where = checks.points(points) / a
-    # A point that was computed to lie on the surface may lie outside by rounding.
+    # A point on the surface may be outside by rounding.
     fraction = np.minimum(checks.numbers("|points|/radius", np.linalg.norm(where, axis=1), high=1 + 1e-12), 1.0)
     x = medium.sigma_tr * a
-    order = order_needed(x, t, HALF, CUTOFF)
+    order = order_needed(x, t, SPHERICAL, CUTOFF)
     if order > POINT_ORDERS:
-        raise InputError(
-            f"source_radius is {source_radius:g}, too close below the surface of the ball for its series; "
-            "use half_space for a source as close as that."
-        )
+        raise checks.too_close_source(t, "ball")
     distance = np.linalg.norm(where - [0.0, 0.0, t], axis=1)
     gamma = np.arctan2(np.hypot(where[:, 0], where[:, 1]), where[:, 2])
     with np.errstate(divide="ignore"):
-        free = np.exp(-x * distance) / distance
-    rates = wall_rates(order, np.array([x]), HALF)
+        field = np.exp(-x * distance) / distance
+    rates = wall_rates(order, np.array([x]), SPHERICAL)
     u, v = rates.growth, rates.decay
     beta = medium.extrapolation_length / a
     weight = (2.0 * np.arange(order + 1)[:, None] + 1.0) * (beta * v - 1.0) / ((1.0 + beta * u) * (u + v))
-    weight *= inner_ratios(order, x, np.array([t]), HALF)
-    chunk = max(1, CHUNK // order)
+    weight *= inner_ratios(order, x, np.array([t]), SPHERICAL)
+    chunk = max(1, TABLE_SIZE // order)
     for start in range(0, fraction.size, chunk):
         part = slice(start, start + chunk)
-        free[part] += legendre_sum(weight * inner_ratios(order, x, fraction[part], HALF), gamma[part])
-    return np.asarray(free / (4.0 * math.pi * medium.diffusion * a))
+        field[part] += legendre_sum(weight * inner_ratios(order, x, fraction[part], SPHERICAL), gamma[part])
+    return np.asarray(field / (4.0 * math.pi * medium.diffusion * a))
 
 
 def point_total(medium: Medium, *, radius: float, source_radius: float) -> float:
@@ -161,28 +157,27 @@ def point_total(medium: Medium, *, radius: float, source_radius: float) -> float
     >>> round(point_total(medium, radius=10.0, source_radius=9.0), 6)
     0.790333
     """
-    a = checks.positive("radius", radius)
-    t = checks.within("source_radius", source_radius, -1e-300, a, "ball") / a
+    a, t = checks.source_in_body(radius, source_radius, "ball")
     x = np.array([medium.sigma_tr * a])
-    ratio = inner_ratios(0, x, np.array([t]), HALF)[0, 0]
-    growth = wall_rates(0, x, HALF).growth[0, 0]
+    ratio = inner_ratios(0, x, np.array([t]), SPHERICAL)[0, 0]
+    growth = wall_rates(0, x, SPHERICAL).growth[0, 0]
     return float(ratio / (1.0 + medium.extrapolation_length / a * growth))
 
 
-def _direct(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
-    """``4 pi a² M`` by the series as it stands."""
+def _sum_directly(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
+    """``4 pi a² M`` by the series."""
     x = np.array([medium.sigma_tr * a])
-    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
-    growth = wall_rates(order, x, HALF).growth[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
+    growth = wall_rates(order, x, SPHERICAL).growth[:, 0]
     beta = medium.extrapolation_length / a
     return legendre_sum((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth), gamma)
 
 
-def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
-    """``4 pi a² M`` for a source close below the surface: singular part, and a series that converges.
+def _sum_split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
+    """``4 pi a² M`` for a source close below the surface, as a singular part plus a series.
 
-    The singular part is twice the free field of the source, and the sum of the series at k = 0 without that; the
-    remaining coefficients fall like l^-3.
+    The singular part is twice the free field of the source, plus the remainder of the series at k = 0 in closed form.
+    The coefficients of the series that remains fall like l^-3.
     """
     x = np.array([medium.sigma_tr * a])
     order = min(order, int(max(4000, 40.0 * x[0])))
@@ -190,14 +185,14 @@ def _split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) ->
     beta = medium.extrapolation_length / a
     distance = chord(np.asarray(1.0 - t), gamma)
     image = 2.0 / beta * np.exp(-x * distance) / distance
-    ratio = inner_ratios(order, x, np.array([t]), HALF)[:, 0]
+    ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
     residual = (2.0 * l + 1.0) * ratio * residual_weight(order, x, beta)
     residual -= (1.0 - 2.0 / beta) * t**l / (1.0 + beta * l)
     return image + (1.0 - 2.0 / beta) * _static_sum(t, beta, gamma) + legendre_sum(residual, gamma)
 
 
 def _static_sum(t: float, beta: float, gamma: FloatArray) -> FloatArray:
-    """``sum_l t^l P_l(cos gamma)/(1 + beta l)``: as images, with ``1/(1 + beta l) = ∫ e^{-s} e^{-beta l s} ds``."""
+    """``sum_l t^l P_l(cos gamma)/(1 + beta l)`` by ``1/(1 + beta l) = ∫ e^{-s} e^{-beta l s} ds``, a line of images."""
     nodes, weights = graded_rule()
     s = CUTOFF * nodes[:, None]
     missing = -np.expm1(-beta * s) * t + (1.0 - t)

@@ -1,6 +1,6 @@
-"""A ball in light from outside: a pencil beam, a wide beam, diffuse light.
+"""A ball in light from outside (a pencil beam, a wide beam, diffuse light), and a ball that emits.
 
-The notation is that of `sphere`. A beam is given by its densities along its path, `beam.BeamSource`.
+The notation is that of `sphere`. A beam is given by its source densities, `beam.BeamSource`.
 """
 
 import math
@@ -10,26 +10,27 @@ import numpy.typing as npt
 
 from tetlux.fem.exact import checks
 from tetlux.fem.exact.beam import Source, beam_source
-from tetlux.fem.exact.numerics.ball import HALF, along_diameter, beam_series, chord, residual_weight
-from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.ball import along_diameter, beam_series, chord, residual_weight
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, two_decays
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, convolve_decays, graded_rule
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
+# Orders of the series for a wide beam, see `beam_exitance` for the error.
 BEAM_ORDERS = 200
 
 
 def pencil_exitance(
     medium: Medium, *, radius: float, gamma: npt.ArrayLike, source: Source = "delta-eddington"
 ) -> FloatArray:
-    """Give the exitance of a ball that a pencil beam without width crosses through the centre.
+    """Exitance of a ball that a pencil beam of no width crosses through the centre.
 
-    `sphere.point_exitance` integrated along the diameter from the entry at gamma = 0. The derivative of the
-    first moment goes to the ends of the path, and the singular parts there are split off as for a point:
-    twice the free field, and the series at k = 0. The remaining coefficients fall like l^-3.
+    It is `sphere.point_exitance` integrated along the diameter from the entry at gamma = 0. The term of the first
+    moment is integrated by parts, and the singular parts at both ends are separated as for a point: twice the free
+    field, and the series at k = 0. The coefficients that remain fall like l^-3.
 
     Parameters
     ----------
@@ -38,16 +39,15 @@ def pencil_exitance(
     radius : float
         Radius of the ball, unit.
     gamma : (...) array_like
-        Angle at the centre from the entry, greater than 0 and less than pi, radians. M is singular at both
-        ends of the path: see `half_space.pencil_exitance`.
+        Angle at the centre from the entry, greater than 0 and less than pi, radians. M is singular at both ends of the
+        diameter, see `half_space.pencil_exitance`.
     source : {"delta-eddington", "similarity"}
         How the beam scatters, see `beam.beam_source`.
 
     Returns
     -------
     (...) ndarray
-        ``M = phi/(2A)`` for unit power that has entered, W/unit², to about 1e-8 of M at one mean free path
-        from the entry.
+        ``M = phi/(2A)`` for unit power that enters, W/unit², to about 1e-8 of M at one mean free path from the entry.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def pencil_exitance(
     >>> pencil_exitance(medium, radius=10.0, gamma=[0.1, 1.0]).round(6).tolist()
     [0.02648, 0.000308]
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     tiny = np.finfo(float).tiny
     angle = checks.numbers("gamma", gamma, low=tiny, high=float(np.nextafter(math.pi, 0.0)))
     flat = angle.ravel()
@@ -74,16 +74,16 @@ def pencil_exitance(
     weight = (2.0 * l + 1.0) * residual_weight(order, np.array([x]), beta)
 
     along, singular = along_diameter(x, extinction, flat, order)
-    # k = 0 and e^{-l s} for (1 - s)^l: ``sum_l P_l/[(1 + beta l)(l + extinction)]``
+    # At k = 0, with e^{-l s} for (1 - s)^l: ``sum_l P_l/[(1 + beta l)(l + extinction)]``.
     nodes, weights = graded_rule()
     reach = CUTOFF * max(beta, 1.0 / extinction)
     s = reach * nodes
     images = 1.0 / chord(-np.expm1(-s[:, None]), flat)
-    line = (reach * weights * two_decays(s, 1.0 / beta, extinction) / beta) @ images
+    line = (reach * weights * convolve_decays(s, 1.0 / beta, extinction) / beta) @ images
     residual = weight * along - static / ((1.0 + beta * l) * (l + extinction))
     total = beam.volume * a * (2.0 / beta * singular + static * line + legendre_sum(residual, flat))
 
-    # The two ends, as sources on the surface.
+    # The terms at both ends are sources on the surface.
     s = CUTOFF * beta * nodes
     residual = weight - static / (1.0 + beta * l)
     for end, share in ((flat, -1.0), (math.pi - flat, math.exp(-2.0 * extinction))):
@@ -96,9 +96,9 @@ def pencil_exitance(
 
 
 def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
-    """Power that leaves a ball which a pencil beam crosses, without the ballistic share ``e^{-2 sigma a}``.
+    """Power that leaves a ball in a pencil beam through its centre, without the ballistic share ``e^{-2 sigma a}``.
 
-    `pencil_exitance` integrated over the surface.
+    It is `pencil_exitance` integrated over the surface.
 
     Parameters
     ----------
@@ -112,19 +112,19 @@ def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddin
     Returns
     -------
     float
-        Share of the power that has entered, between 0 and 1.
+        Share of the power that enters, between 0 and 1.
 
     Raises
     ------
     InputError
         If the radius is not positive.
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     beam = beam_source(medium, source)
     x = medium.sigma_tr * a
     extinction = beam.extinction * a
     along, _ = along_diameter(x, extinction, np.empty(0), 0)
-    growth = wall_rates(0, np.array([x]), HALF).growth[0, 0]
+    growth = wall_rates(0, np.array([x]), SPHERICAL).growth[0, 0]
     ends = beam.forward * math.expm1(-2.0 * extinction)
     return float((beam.volume * a * along[0] + ends) / (1.0 + medium.extrapolation_length / a * growth))
 
@@ -132,27 +132,26 @@ def pencil_total(medium: Medium, *, radius: float, source: Source = "delta-eddin
 def beam_exitance(
     medium: Medium, *, radius: float, gamma: npt.ArrayLike, source: Source = "delta-eddington"
 ) -> FloatArray:
-    """Give the exitance of a ball in a uniform collimated beam of unit irradiance, at matched indices.
+    """Exitance of a ball in a uniform collimated beam of unit irradiance, at matched indices.
 
-    The series of `sphere` with its source integrated over all chords, each with the beam's densities.
+    It is the series of `sphere` integrated over the source densities along all chords.
 
     Parameters
     ----------
     medium : Medium
-        What the ball is made of; its index must be 1, as a beam that refracts at the ball's surface
-        converges.
+        What the ball is made of; its index must be 1, since refraction would focus the beam.
     radius : float
         Radius of the ball, unit.
     gamma : (...) array_like
-        Angle at the centre from the point that faces the light, radians.
+        Angle at the centre from the point that the beam meets first, radians.
     source : {"delta-eddington", "similarity"}
         How the beam scatters, see `beam.beam_source`.
 
     Returns
     -------
     (...) ndarray
-        ``M = phi/(2A)``, W/unit² for 1 W/unit². The series ends at order 200: the error is about 1e-6 for
-        a radius of ten mean free paths, 1e-5 with a first moment, 1e-3 for hundreds of mean free paths.
+        ``M = phi/(2A)``, W/unit² for 1 W/unit². The series ends at order 200, with a relative error of about 1e-6 for a
+        radius of ten mean free paths, 1e-5 with a first moment, and 1e-3 for hundreds of mean free paths.
 
     Raises
     ------
@@ -160,15 +159,15 @@ def beam_exitance(
         If the radius is not positive, an angle not finite, or the medium's index not 1.
     """
     angle = checks.numbers("gamma", gamma)
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     series = _beam_series(medium, a, source, BEAM_ORDERS)
     return np.asarray(legendre_sum(series, angle.ravel()) / (4.0 * math.pi * a**2)).reshape(angle.shape)
 
 
 def beam_total(medium: Medium, *, radius: float, source: Source = "delta-eddington") -> float:
-    """Power that leaves a ball in a beam, of the pi a² that meet it, without the ballistic share.
+    """Power that leaves a ball in a uniform beam, of the incident power pi a², without the ballistic share.
 
-    `beam_exitance` integrated over the surface.
+    It is `beam_exitance` integrated over the surface.
 
     Parameters
     ----------
@@ -189,15 +188,15 @@ def beam_total(medium: Medium, *, radius: float, source: Source = "delta-eddingt
     InputError
         If the radius is not positive, or the medium's index not 1.
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     return float(_beam_series(medium, a, source, 0)[0])
 
 
 def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -> FloatArray:
-    """Fluence in a ball that unit diffuse irradiance (transmitted) falls on from everywhere.
+    """Fluence in a ball in uniform diffuse light of unit transmitted irradiance.
 
-    ``phi = C i_0(k r)`` with ``phi + 2 A D dphi/dr = 4/(1 - 2 C1)`` at the surface; C1 is the first moment of the
-    internal reflectance, whatever fit the medium uses for A.
+    ``phi = C i_0(k r)`` with ``phi + 2 A D dphi/dr = 4/(1 - 2 C1)`` at the surface. C1 is the first moment of the
+    internal reflectance by Fresnel's law, also if the medium computes A by the classic fit.
 
     Parameters
     ----------
@@ -211,23 +210,23 @@ def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -
     Returns
     -------
     (...) ndarray
-        W/unit² for 1 W/unit² that passes into the ball.
+        W/unit² for 1 W/unit² that enters the ball.
 
     Raises
     ------
     InputError
         If the radius is not positive, or a distance outside the ball.
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     r = checks.numbers("distance", distance, low=0.0, high=a)
     x = np.array(medium.sigma_tr * a)
-    wall = 1.0 + medium.extrapolation_length / a * wall_rates(0, x, HALF).growth[0]
-    ratio = inner_ratios(0, x, r / a, HALF)[0]
-    return np.asarray(4.0 / (1.0 - 2.0 * moments(medium.eta)[0]) * ratio / wall)
+    denominator = 1.0 + medium.extrapolation_length / a * wall_rates(0, x, SPHERICAL).growth[0]
+    ratio = inner_ratios(0, x, r / a, SPHERICAL)[0]
+    return np.asarray(4.0 / (1.0 - 2.0 * moments(medium.eta)[0]) * ratio / denominator)
 
 
 def diffuse_exitance(medium: Medium, *, radius: float) -> float:
-    """Flux that leaves a ball in unit diffuse irradiance, ``M = 1 - D dphi/dr`` for each unit of surface.
+    """Flux that leaves a ball in uniform diffuse light of unit transmitted irradiance, ``M = 1 - D dphi/dr``.
 
     Parameters
     ----------
@@ -239,7 +238,7 @@ def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     Returns
     -------
     float
-        W/unit² for 1 W/unit² that passes into the ball; 1 without absorption.
+        W/unit² for 1 W/unit² that enters the ball; 1 without absorption.
 
     Raises
     ------
@@ -253,14 +252,14 @@ def diffuse_exitance(medium: Medium, *, radius: float) -> float:
     >>> round(diffuse_exitance(medium, radius=10.0), 6)
     0.795337
     """
-    a = checks.positive("radius", radius)
-    growth = wall_rates(0, np.array(medium.sigma_tr * a), HALF).growth[0]
+    a = checks.positive_number("radius", radius)
+    growth = wall_rates(0, np.array(medium.sigma_tr * a), SPHERICAL).growth[0]
     surface = diffuse_fluence(medium, radius=a, distance=a)
     return float(1.0 - medium.diffusion / a * growth * surface)
 
 
 def glow_exitance(medium: Medium, *, radius: float) -> float:
-    """Exitance ``M = phi/(2A)`` of a ball that emits 1 W/unit³ throughout.
+    """Exitance ``M = phi/(2A)`` of a ball that emits 1 W/unit³ uniformly.
 
     ``phi = (1 - C i_0(k r)/i_0(k a))/sigma_a`` with ``phi + zb dphi/dr = 0`` at the surface, so that
     ``2 A M = q/((1 + q) sigma_a)`` with ``q = zb (k coth(k a) - 1/a)``; without absorption ``M = a/3``.
@@ -282,7 +281,7 @@ def glow_exitance(medium: Medium, *, radius: float) -> float:
     InputError
         If the radius is not positive.
     """
-    a = checks.positive("radius", radius)
+    a = checks.positive_number("radius", radius)
     x = medium.sigma_tr * a
     if x < 1e-3:
         # k coth(k a) - 1/a = k² a/3 (1 - (k a)²/15 + ...).

@@ -24,6 +24,9 @@ import numpy as np
 
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.hints import MeshHints
+from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray
 
 # Length of the first panel in mean free paths, and Gauss points of each: exitance is 2e-4 off half a mean free path
@@ -62,56 +65,47 @@ def beam_as_charges(deposit: Deposit, medium: Medium) -> tuple[Deposit, Deposit]
         The rest of the segments and nothing else.
     """
     extinction = medium.sigma_a + medium.delta_eddington[0]
-    strongest = float(deposit.fluxes.max(initial=0.0))
-    reaches = np.clip(np.log(deposit.fluxes / (FADED * strongest)) / extinction, 0.0, deposit.lengths)
-    left = deposit.fluxes * np.exp(-extinction * reaches)
-    ends = deposit.starts + reaches[:, None] * deposit.directions
-    points, powers = _bright_points(deposit, medium, reaches, left, ends)
+    segments = deposit.terms.segments
+    strongest = float(segments.fluxes.max(initial=0.0))
+    reaches = np.clip(np.log(segments.fluxes / (FADED * strongest)) / extinction, 0.0, segments.lengths)
+    left = segments.fluxes * np.exp(-extinction * reaches)
+    ends = segments.starts + reaches[:, None] * segments.directions
+    points, powers = _bright_points(deposit.terms, medium, reaches, left, ends)
     bright = replace(
         deposit,
-        points=points,
-        powers=powers,
-        starts=deposit.starts[:0],
-        directions=deposit.directions[:0],
-        lengths=deposit.lengths[:0],
-        fluxes=deposit.fluxes[:0],
-        lit=deposit.lit[:0],  # the points mark the same places
-        resolution=medium.mean_free_path,
+        terms=replace(deposit.terms, points=points, powers=powers, point_cells=None, segments=Segments()),
+        hints=MeshHints(resolution=medium.mean_free_path),  # the points mark the same places
     )
-    faint_parts = reaches < deposit.lengths
+    beyond = reaches < segments.lengths
+    rest = Segments(ends[beyond], segments.directions[beyond], (segments.lengths - reaches)[beyond], left[beyond])
+    no_points = deposit.terms.select_points(np.zeros(len(deposit.terms.points), dtype=bool))
     faint = replace(
         deposit,
-        points=deposit.points[:0],
-        powers=deposit.powers[:0],
-        starts=ends[faint_parts],
-        directions=deposit.directions[faint_parts],
-        lengths=(deposit.lengths - reaches)[faint_parts],
-        fluxes=left[faint_parts],
-        lit=deposit.lit[:0],
-        cells=None,
+        terms=replace(no_points, segments=rest),
+        hints=MeshHints(resolution=deposit.hints.resolution),
     )
     return bright, faint
 
 
 def _bright_points(
-    deposit: Deposit, medium: Medium, reaches: FloatArray, left: FloatArray, ends: FloatArray
+    terms: SourceTerms, medium: Medium, reaches: FloatArray, left: FloatArray, ends: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Points (p, 3) of a deposit and in place of its segments, and their powers (p,), W.
+    """Points (p, 3) of source terms and in place of their segments, and their powers (p,), W.
 
     By the lengths of the segments' bright parts, the flux left at the ends of these, and the ends (s, 3) themselves.
     """
     scattering, cosine = medium.delta_eddington
     extinction = medium.sigma_a + scattering
     forward = cosine * scattering / medium.sigma_t_prime
-    points, powers = [deposit.points], [deposit.powers]
+    segments, points, powers = terms.segments, [terms.points], [terms.powers]
     for i in np.flatnonzero(reaches > 0):
         along, lost = _panels(float(reaches[i]), extinction, FIRST * medium.mean_free_path)
-        points.append(deposit.starts[i] + along[:, None] * deposit.directions[i])
-        powers.append((scattering / extinction + forward) * deposit.fluxes[i] * lost)
-        length, direction = float(deposit.lengths[i]), deposit.directions[i]
-        inside, weights = _end(deposit.starts[i], direction, length, medium)
+        points.append(segments.starts[i] + along[:, None] * segments.directions[i])
+        powers.append((scattering / extinction + forward) * segments.fluxes[i] * lost)
+        length, direction = float(segments.lengths[i]), segments.directions[i]
+        inside, weights = _end(segments.starts[i], direction, length, medium)
         points.append(inside)
-        powers.append(-forward * deposit.fluxes[i] * weights)
+        powers.append(-forward * segments.fluxes[i] * weights)
         inside, weights = ends[i][None], np.ones(1)
         if reaches[i] == length:
             inside, weights = _end(ends[i], -direction, length, medium)

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.blocks import in_blocks
+from tetlux.meshing.host.blocks import run_in_blocks
 
 # Pairs of a point and a charge in one block of work, few enough to stay in the processor's cache.
 PAIRS = 100_000
@@ -77,7 +77,7 @@ class Charges:
                 each *= (k + 1.0 / distance) / distance
                 gradient[block] = each @ charges - each.sum(axis=1)[:, None] * x
 
-        in_blocks(evaluate, len(points), max(1, PAIRS // len(charges)))
+        run_in_blocks(evaluate, len(points), max(1, PAIRS // len(charges)))
         return fluence
 
     __repr__ = one_line

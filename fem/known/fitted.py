@@ -99,7 +99,7 @@ def fit_light(
     """
     if not _is_fit(deposit, surface, medium):
         return None
-    drive = Drive(deposit.points, deposit.powers[:, None], np.zeros(1))
+    drive = Drive(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
     equation = equation_of(medium)
     if places is None:
         fitted = fit_within(surface, equation, drive, tolerance=tolerance)
@@ -112,12 +112,13 @@ def fit_light(
 
 def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     """Whether the light is a few points well inside a simple body."""
-    if not 0 < len(deposit.points) <= MOST_SOURCES or len(deposit.starts) > 0 or surface.overlaps:
+    terms = deposit.terms
+    if not 0 < len(terms.points) <= MOST_SOURCES or len(terms.segments) > 0 or surface.overlaps:
         return False
-    if np.any(deposit.irradiance) or np.any(deposit.emission) or deposit.on_mesh is not None:
+    if np.any(terms.irradiance) or np.any(terms.emission) or deposit.on_mesh is not None:
         return False
-    depths = np.linalg.norm(surface.project(deposit.points)[0] - deposit.points, axis=1)
-    return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(deposit.points).all())
+    depths = np.linalg.norm(surface.project(terms.points)[0] - terms.points, axis=1)
+    return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(terms.points).all())
 
 
 def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:

@@ -1,7 +1,6 @@
 """`FittedPatch`: fitted charges on one mesh, what they leave to it, and what of that it does not see."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,8 +10,8 @@ from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.fitted import FittedLight, Violation
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.known.patch_terms import PatchTerms
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
-from tetlux.meshing.surface.surface import longest_sides
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
@@ -66,7 +65,7 @@ class FittedPatch(Patch):
     def _at_nodes(self, values: FloatArray) -> FloatArray:
         """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
         corners = self.mesh.boundary_faces[self.facets]
-        return summed(corners, values[:, None] * self.weights, len(self.mesh.points))
+        return sum_by_index(corners, values[:, None] * self.weights, len(self.mesh.points))
 
 
 def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
@@ -88,8 +87,10 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
     """The boundary triangle of a refined mesh that each of the coarse mesh still is, -1 if it was split, (f,)."""
     count = len(fine.points)
-    before, after = ((faces[:, 0] * count + faces[:, 1]) * count + faces[:, 2] for faces in
-                     (coarse.boundary_faces.astype(np.int64), fine.boundary_faces.astype(np.int64)))
+    before, after = (
+        (faces[:, 0] * count + faces[:, 1]) * count + faces[:, 2]
+        for faces in (coarse.boundary_faces.astype(np.int64), fine.boundary_faces.astype(np.int64))
+    )
     order = np.argsort(after)
     found = order[np.minimum(np.searchsorted(after, before, sorter=order), len(order) - 1)]
     return np.where(after[found] == before, found, -1)

@@ -10,7 +10,7 @@ from tetlux.fem.known.charges import Charges
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.rays import OFFSET
-from tetlux.meshing.surface.surface import longest_sides
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import FACES

@@ -1,26 +1,25 @@
 """What a patch adds to the load vector and to the ledger: integrals over its faces, less those of the interpolant."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import cKDTree
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefTri
 
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.fem.sources.terms import SourceTerms
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.surface.subdivide import quartered
-from tetlux.meshing.surface.surface import longest_sides, triangle_areas
+from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 
-# Quadrature rules for the faces of a patch, by their longest edge over the distance to the nearest charge; a face for
-# which that is above the last limit is cut in four, at most _CUTS times.
-_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.15, 2), (0.5, 4), (2.0, 8)))
+# Degrees of the quadrature rules for the faces of a patch, by the largest ratio of the longest edge to the distance of
+# the nearest charge. A face above the last limit is cut in four, at most _CUTS times.
+_DEGREES = ((0.15, 2), (0.5, 4), (2.0, 8))
 _CUTS = 12
 
 
@@ -57,7 +56,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     PatchTerms
     """
     mesh, charges, medium = patch.mesh, patch.charges, patch.charges.medium
-    sources = Deposit(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
+    sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
     if not patch.cells.any():
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)
@@ -65,7 +64,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     out_of_faces, through = _integrals(mesh.points[faces], charges)
     robin = 1.0 / (2.0 * medium.boundary_factor)
     leaving = robin * out_of_faces * on_boundary[:, None]
-    load = -summed(faces, through + leaving, count)
+    load = -sum_by_index(faces, through + leaving, count)
     # a(I_h G, v): stiffness, absorption and boundary terms of the patch, times G at the nodes.
     inside = slice(None) if patch.cells.all() else np.flatnonzero(patch.cells)
     cells = mesh.tetrahedra[inside]
@@ -77,7 +76,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)
     _, areas = triangle_areas(mesh.points, faces)
     exited = robin * (areas * on_boundary)[:, None] * _mass(patch.at_nodes[faces], mass)
-    load += summed(cells, stiff + absorbed, count) + summed(faces, exited, count)
+    load += sum_by_index(cells, stiff + absorbed, count) + sum_by_index(faces, exited, count)
     return PatchTerms(
         load,
         exited=float(leaving.sum() - exited.sum()),
@@ -94,6 +93,16 @@ def _mass(values: FloatArray, mass: Mass) -> FloatArray:
     return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
 
 
+@lru_cache(maxsize=1)
+def _rules() -> list[tuple[float, FloatArray, FloatArray]]:
+    """The limit, nodes (2, q) and weights (q,) of each quadrature rule of the unit triangle."""
+    # Imported here, since scikit-fem takes a sixth of the time that tetlux.fem takes to import.
+    from skfem.quadrature import get_quadrature  # noqa: PLC0415
+    from skfem.refdom import RefTri  # noqa: PLC0415
+
+    return [(limit, *get_quadrature(RefTri, degree)) for limit, degree in _DEGREES]
+
+
 def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
     """Integrals over triangles (f, 3, 3) of G and of ``D dG/dn`` against their three hat functions, (f, 3) each."""
     value, flux = np.zeros((len(corners), 3)), np.zeros((len(corners), 3))
@@ -105,14 +114,14 @@ def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, Float
         size = longest_sides(part)
         near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
         done = np.zeros(len(part), dtype=bool)
-        for limit, nodes, weights in _RULES:
-            last = limit == _RULES[-1][0] and cut == _CUTS
+        for limit, nodes, weights in _rules():
+            last = limit == _DEGREES[-1][0] and cut == _CUTS
             now = ~done & ((near < limit) | last)
             done |= now
             _add_rule(value, flux, owner[now], place[now], part[now], nodes, weights, charges)
         if done.all():
             break
-        owner, place = np.repeat(owner[~done], 4), quartered(place[~done])
+        owner, place = np.repeat(owner[~done], 4), quarter_triangles(place[~done])
     return value, flux
 
 

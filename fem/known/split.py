@@ -13,7 +13,9 @@ from tetlux.fem.known.fitted import FittedLight, fit_light
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.known.kept import KeptPlaces
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.light import Light
+from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -37,15 +39,15 @@ class Sources:
         The light of each of these.
     fitted : mapping of int to FittedLight
         Lights from which charges are subtracted that were fitted to the surface.
-    on_mesh : tuple of Deposit
-        What of each light is left to be put on the nodes.
+    remaining : tuple of Deposit
+        What of each light is not subtracted: the right-hand side on the mesh.
     """
 
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
     fitted: Mapping[int, FittedLight]
-    on_mesh: tuple[Deposit, ...]
+    remaining: tuple[Deposit, ...]
 
     @property
     def warnings(self) -> list[str]:
@@ -53,7 +55,7 @@ class Sources:
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
     @property
-    def left(self) -> list[Deposit]:
+    def not_fitted(self) -> list[Deposit]:
         """Of the lights that are not fitted, which a mesh has to resolve."""
         return [deposit for light, deposit in enumerate(self.deposits) if light not in self.fitted]
 
@@ -99,7 +101,7 @@ def sources_of(
     deposits: list[Deposit] = []
     charges: list[Charges] = []
     owners: list[int] = []
-    on_mesh: list[Deposit] = []
+    remaining: list[Deposit] = []
     fitted: dict[int, FittedLight] = {}
     left = 0 if subtract == "nothing" else MOST_CHARGES
     images = subtract in ("fitted", "half-space")
@@ -110,7 +112,7 @@ def sources_of(
             if found_fit is not None:
                 fitted[number] = found_fit
                 deposits.append(deposit)
-                on_mesh.append(_without_points(deposit))
+                remaining.append(_without_points(deposit))
                 continue
         if body.only_medium is not None:
             known, rest, found = _charges_in_one_medium(
@@ -122,8 +124,8 @@ def sources_of(
         charges += found
         owners += [number] * len(found)
         deposits.append(known)
-        on_mesh.append(rest)
-    return Sources(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(on_mesh))
+        remaining.append(rest)
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(remaining))
 
 
 def _fitted(
@@ -131,16 +133,16 @@ def _fitted(
 ) -> FittedLight | None:
     """Charges fitted to a light, at places that are kept if there are any; None if they would not do."""
     medium = body.only_medium
-    if medium is None or len(deposit.points) == 0:
+    if medium is None or len(deposit.terms.points) == 0:
         return None
     if kept is None:
         return fit_light(deposit, body.surface, medium, tolerance=tolerance)
-    chosen, places = kept.find(repr(light), deposit.resolution)
+    chosen, places = kept.find(repr(light), deposit.hints.resolution)
     if chosen and places is None:
         return None
     found = fit_light(deposit, body.surface, medium, tolerance=tolerance, places=places)
     if not chosen:
-        kept.keep(repr(light), deposit.resolution, None if found is None else found.places)
+        kept.keep(repr(light), deposit.hints.resolution, None if found is None else found.places)
     return found
 
 
@@ -187,11 +189,12 @@ def _charges_in_one_medium(
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
     # Beams too and with images, or points alone, at least without.
     trials = [(deposit, _without_points(deposit), images), (deposit, _without_points(deposit), False)]
-    if len(deposit.starts):
+    if len(deposit.terms.segments):
         trials.insert(0, (*beam_as_charges(deposit, medium), images))
     for bright, faint, with_images in trials:
-        if 0 < len(bright.points) <= most:
-            some = charges_of(bright.points, bright.powers, surface, medium, images=with_images, most=most)
+        points, powers = bright.terms.points, bright.terms.powers
+        if 0 < len(points) <= most:
+            some = charges_of(points, powers, surface, medium, images=with_images, most=most)
             if some is not None:
                 return bright, faint, [some]
     return deposit, deposit, []
@@ -205,17 +208,18 @@ def _charges_in_several(
     What is subtracted solves the equation of the region's medium and no other, so it ends where the region does. Images
     serve where that region is also what bounds the body nearest to the source.
     """
-    if len(deposit.points) == 0:
+    points, powers = deposit.terms.points, deposit.terms.powers
+    if len(points) == 0:
         return deposit, deposit, []
-    places = body.region_at(deposit.points)
-    outermost = body.region_at(body.just_inside(deposit.points)) == places
+    places = body.region_at(points)
+    outermost = body.region_at(body.just_inside(points)) == places
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
         medium, inside = body.by_label[region], places == region
         if isinstance(medium, Medium) and most > 0:
             some = charges_of(
-                deposit.points[inside],
-                deposit.powers[inside],
+                points[inside],
+                powers[inside],
                 body.surface,
                 medium,
                 images=images & outermost[inside],
@@ -226,8 +230,12 @@ def _charges_in_several(
                 most -= len(some.positions)
                 rest &= ~inside
                 found.append(some)
-    return deposit, replace(deposit, points=deposit.points[rest], powers=deposit.powers[rest]), found
+    return deposit, _keep_points(deposit, rest), found
 
 
 def _without_points(deposit: Deposit) -> Deposit:
-    return replace(deposit, points=deposit.points[:0], powers=deposit.powers[:0])
+    return _keep_points(deposit, np.zeros(len(deposit.terms.points), dtype=bool))
+
+
+def _keep_points(deposit: Deposit, some: BoolArray) -> Deposit:
+    return replace(deposit, terms=deposit.terms.select_points(some))

@@ -15,11 +15,11 @@ class Arrows:
     Parameters
     ----------
     places : (p, 3) ndarray
-        Places where the light meets the body, or the points that it shines from, unit.
+        Where the light meets the body, or the points that it shines from, unit.
     direction : (3,) ndarray, optional
         Unit vector in which the light travels; without one the places are drawn as points.
     count : int
-        At how many of the places, at most, an arrow or a point is drawn.
+        Largest number of arrows or points to draw.
     """
 
     places: FloatArray
@@ -31,14 +31,17 @@ class Arrows:
 
 @runtime_checkable
 class HasArrows(Protocol):
-    """A light that is drawn. Light from everywhere and light of the volume have no such method."""
+    """A light that pictures show. Light from everywhere and light of the volume have no such method."""
 
     def arrows(self, surface: Surface) -> Arrows:
-        """Say where a picture of this body draws the light.
+        """Choose where a picture of a body with this surface shows the light.
 
         Parameters
         ----------
         surface : Surface
-            Of the body.
+
+        Returns
+        -------
+        Arrows
         """
         ...

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.host.blocks import THREADS, at_once
+from tetlux.meshing.host.blocks import THREADS, map_in_threads
 
 # Relative residual at which the iteration stops.
 AIM = 1e-11
@@ -88,7 +88,7 @@ def preconditioned(product: Product, precondition: Preconditioner) -> Method:
         count = rest.shape[1]
         size = TOGETHER if count >= TOGETHER * THREADS and not product.on_all_cores else 1
         groups = [np.ascontiguousarray(rest[:, start : start + size]) for start in range(0, count, size)]
-        found = [iterate(group) for group in groups] if product.on_all_cores else at_once(iterate, groups)
+        found = [iterate(group) for group in groups] if product.on_all_cores else map_in_threads(iterate, groups)
         return np.hstack([x for x, _ in found]), max(iterations for _, iterations in found)
 
     return iterate_on_groups

@@ -1,4 +1,4 @@
-"""Fresnel reflectance at a smooth dielectric boundary, and the boundary factor A that follows from it."""
+"""Fresnel reflectance at a smooth dielectric boundary, its angular moments, and the boundary factor A."""
 
 from functools import lru_cache
 
@@ -17,17 +17,21 @@ def reflectance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
     cosine : (...) array_like
         Cosine of the angle between the direction of light and the boundary's normal, on the incident side.
     eta : float
-        Refractive index of the incident side divided by that of the other side. Light that enters
-        a medium of index n from air sees ``eta = 1/n``.
+        Refractive index of the incident side over that of the other side: ``1/n`` for light that enters a medium of
+        index n from air.
 
     Returns
     -------
     (...) ndarray
         Reflected share of the power, 1 beyond the critical angle.
+
+    References
+    ----------
+    Born & Wolf, Principles of Optics, section 1.5.
     """
     mu = np.clip(np.asarray(cosine, dtype=float), 0.0, 1.0)
     if eta == 1.0:
-        # Nothing at all: of what rounding would reflect, each crumb would be a ray to follow.
+        # Exactly 0, since each reflected ray is followed, even one of a power of rounding errors.
         return np.zeros(mu.shape)
     sine_squared = eta**2 * (1.0 - mu**2)
     mu_other = np.sqrt(np.maximum(1.0 - sine_squared, 0.0))
@@ -43,10 +47,19 @@ def moments(eta: float) -> tuple[float, float]:
     """First and second angular moments of the internal reflectance.
 
     ``C1 = ∫0..1 F mu dmu`` and ``C2 = ∫0..1 F mu² dmu`` (d'Eon 2012; Haskell 1994), by Gauss-Legendre
-    quadrature on both sides of the critical angle, where F has a square-root kink.
+    quadrature on both sides of the critical angle, where F has a square-root singularity.
+
+    Parameters
+    ----------
+    eta : float
+        Refractive index of the medium relative to the outside.
+
+    Returns
+    -------
+    c1, c2 : float
     """
     nodes, weights = np.polynomial.legendre.leggauss(64)
-    # mu = mu_c + (1 - mu_c) t², and mu = mu_c for total reflection: the substitution removes the kink.
+    # The substitution mu = mu_c + (1 - mu_c) t² removes the singularity; below mu_c reflection is total.
     critical = np.sqrt(max(1.0 - 1.0 / eta**2, 0.0))
     t, w = 0.5 * (nodes + 1.0), 0.5 * weights
     mu = critical + (1.0 - critical) * t**2
@@ -57,20 +70,44 @@ def moments(eta: float) -> tuple[float, float]:
 
 
 def boundary_factor_exact(eta: float) -> float:
-    """A of the partial-current boundary ``E.n = phi/(2A)``: ``(1 + 3 C2)/(1 - 2 C1)`` (Haskell 1994)."""
+    """Boundary factor A of ``E.n = phi/(2A)`` by Fresnel's law: ``(1 + 3 C2)/(1 - 2 C1)`` (Haskell 1994).
+
+    Parameters
+    ----------
+    eta : float
+        Refractive index of the medium relative to the outside.
+
+    Returns
+    -------
+    float
+
+    Examples
+    --------
+    >>> round(boundary_factor_exact(1.0), 6), round(boundary_factor_exact(1.4), 4)
+    (1.0, 2.9485)
+    """
     c1, c2 = moments(eta)
     return (1.0 + 3.0 * c2) / (1.0 - 2.0 * c1)
 
 
 def boundary_factor_classic(eta: float) -> float:
-    """A as the published dipole has it: ``(1 + F_dr)/(1 - F_dr)`` with Egan's fit (Jensen 2001, sec. 2.1).
+    """Boundary factor A of the published dipole: ``(1 + F_dr)/(1 - F_dr)`` with Egan's fit (Jensen 2001, sec. 2.1).
 
-    11 % above `boundary_factor_exact` at an index of 1.3; it exists to match published figures.
+    It is 11 % above `boundary_factor_exact` at an index of 1.3, and serves to reproduce published figures.
+
+    Parameters
+    ----------
+    eta : float
+        Refractive index of the medium relative to the outside, at least 1.
+
+    Returns
+    -------
+    float
 
     Raises
     ------
     InputError
-        For an index below 1, where that fit does not hold.
+        If `eta` is below 1, where the fit does not hold.
     """
     if eta < 1.0:
         raise InputError(

@@ -8,7 +8,7 @@ from tetlux.meshing.surface.surface import MILLIMETRES
 
 Colours = tuple[float, float, float]
 
-# sigma_s' and sigma_a in 1/mm, each for red, green and blue (Jensen 2001, figure 5).
+# sigma_s' and sigma_a, 1/mm, each for red, green and blue (Jensen 2001, figure 5).
 MATERIALS: dict[str, tuple[Colours, Colours]] = {
     "apple": ((2.29, 2.39, 1.97), (0.0030, 0.0034, 0.046)),
     "chicken1": ((0.15, 0.21, 0.38), (0.015, 0.077, 0.19)),
@@ -27,14 +27,14 @@ ETA, ETA_OF_MARBLE = 1.3, 1.5
 
 
 def material(name: str, *, unit: str = "mm") -> tuple[Medium, Medium, Medium]:
-    """Media of a measured material for red, green and blue light.
+    """Look up the media of a measured material for red, green and blue light (Jensen et al. 2001, figure 5).
 
     Parameters
     ----------
     name : str
         One of `MATERIALS`.
     unit : str
-        The unit of length whose inverse the coefficients are to be in: nm, um, mm, cm, m or in.
+        Unit of length; coefficients are in 1/unit: nm, um, mm, cm, m or in.
 
     Returns
     -------
@@ -44,6 +44,12 @@ def material(name: str, *, unit: str = "mm") -> tuple[Medium, Medium, Medium]:
     ------
     InputError
         If the material or the unit is not known.
+
+    Examples
+    --------
+    >>> red, green, blue = material("marble")
+    >>> red
+    Medium(sigma_a=0.0021, eta=1.5, sigma_s_prime=2.19)
     """
     if name not in MATERIALS:
         close = difflib.get_close_matches(str(name).lower(), MATERIALS, n=1)

@@ -1,4 +1,4 @@
-"""A scattering medium: its coefficients, and the diffusion coefficients that follow from them."""
+"""A homogeneous scattering medium: its coefficients, and the parameters of diffusion that follow from them."""
 
 import math
 from dataclasses import dataclass
@@ -32,16 +32,23 @@ class Medium:
     g : float, optional
         Mean cosine of the scattering angle (CS667 notes, definition 1.9 iv), between -1 and 1.
     phase : PhaseFunction, optional
-        How scattering distributes light over angles, see `tetlux.fem.media.phase`; g alone stands for
-        Henyey-Greenstein's.
+        The phase function, see `tetlux.fem.media.phase`; Henyey-Greenstein's if only g is given.
     boundary : {"exact", "classic"}
-        How internal reflection enters the boundary factor A: by the Fresnel moments, or by the fit
-        that the published dipole uses.
+        How the boundary factor A is computed: from the angular moments of Fresnel's reflectance, or by the fit of the
+        published dipole.
 
     Raises
     ------
     InputError
         If a coefficient is negative, not finite, missing or given twice.
+
+    Examples
+    --------
+    >>> medium = Medium(sigma_a=0.01, sigma_s=10.0, g=0.9, eta=1.4)
+    >>> round(medium.reduced_scattering, 6), round(medium.mean_free_path, 6), round(medium.albedo, 6)
+    (1.0, 0.990099, 0.990099)
+    >>> round(medium.sigma_tr, 6), round(medium.extrapolation_length, 4)
+    (0.174069, 1.9462)
     """
 
     sigma_a: float
@@ -98,7 +105,7 @@ class Medium:
 
     @cached_property
     def mean_cosine(self) -> float:
-        """Mean cosine of the scattering angle; 0 for a medium given by sigma_s' alone, which counts as isotropic."""
+        """Mean cosine of the scattering angle; 0 if only sigma_s' is given, which is taken for isotropic scattering."""
         if self.phase is not None:
             return self.phase.mean_cosine
         return 0.0 if self.g is None else self.g
@@ -138,25 +145,25 @@ class Medium:
 
     @cached_property
     def boundary_factor(self) -> float:
-        """A of the boundary condition ``E.n = phi/(2A)``."""
+        """Boundary factor A of ``E.n = phi/(2A)``."""
         if self.boundary == "classic":
             return boundary_factor_classic(self.eta)
         return boundary_factor_exact(self.eta)
 
     @property
     def extrapolation_length(self) -> float:
-        """Zb = 2 A D, the depth outside at which the fluence extrapolates to zero, unit."""
+        """Zb = 2 A D, the distance outside the boundary at which the fluence extrapolates to zero, unit."""
         return 2.0 * self.boundary_factor * self.diffusion
 
     @property
     def delta_eddington(self) -> tuple[float, float]:
-        """Scattering coefficient and mean cosine with the forward peak taken out (Joseph 1976).
+        """Scattering coefficient, 1/unit, and mean cosine without the forward peak (Joseph 1976).
 
-        ``sigma_s* = sigma_s (1 - f)`` and ``g* = (g - f)/(1 - f)``, which keep sigma_s'. The share f of the peak is the
-        phase function's second Legendre moment: ``g²`` for Henyey-Greenstein's, so that ``g* = g/(1 + g)``. It is
-        never below 0, nor so large that what is left scatters backward: for g < 0 there is no forward peak, and both
-        stay as they are; and an f above g, of two lobes say, is backward scattering too, and f = g is taken. A medium
-        given by sigma_s' alone counts as isotropic.
+        ``sigma_s* = sigma_s (1 - f)`` and ``g* = (g - f)/(1 - f)``, which preserve sigma_s'. The share f of the forward
+        peak is the second Legendre moment of the phase function: ``g²`` for Henyey-Greenstein's, so that
+        ``g* = g/(1 + g)``. It is limited to 0 <= f <= max(g, 0), so that g* is negative only if g is: a second moment
+        above g, as of two lobes, is partly due to backward scattering. If only sigma_s' is given, scattering is taken
+        for isotropic: ``sigma_s* = sigma_s'`` and ``g* = 0``.
         """
         if self.sigma_s is None:
             return self.reduced_scattering, 0.0

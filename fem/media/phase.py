@@ -1,4 +1,4 @@
-"""Phase functions: how scattering distributes light over angles, by the moments that diffusion needs of them.
+"""Phase functions: the angular distribution of scattered light, and the moments of it that diffusion needs.
 
 A phase function p gives the power scattered per solid angle, 1/sr, as a function of the cosine mu of the scattering
 angle, with ``2 pi ∫-1..1 p dmu = 1``. Diffusion needs its first moment g, the mean cosine (CS667 notes, definition
@@ -15,12 +15,12 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
-# How far a table's integral over all directions may be off 1.
+# Largest difference of a table's integral over all directions from 1.
 NORMALISATION = 0.02
 
 
 class PhaseFunction(Protocol):
-    """Anything with two moments and a value at each angle.
+    """A phase function: its first two Legendre moments, and its value at each angle.
 
     Attributes
     ----------
@@ -43,14 +43,14 @@ class PhaseFunction(Protocol):
 
 @dataclass(frozen=True)
 class Lobes:
-    """A mix of Henyey-Greenstein lobes (Henyey & Greenstein 1941), whose l-th Legendre moment is ``g^l``.
+    """A weighted sum of Henyey-Greenstein lobes (Henyey & Greenstein 1941); the l-th Legendre moment of one is ``g^l``.
 
     Parameters
     ----------
     cosines : tuple of float
         Mean cosine g of each lobe.
     shares : tuple of float
-        Share of each in the scattered power; they sum to 1.
+        Share of each lobe in the scattered power; the shares sum to 1.
     """
 
     cosines: tuple[float, ...]
@@ -77,14 +77,14 @@ class Lobes:
 
 @dataclass(frozen=True)
 class Table:
-    """A measured or computed phase function, linear in the angle between the rows of a table; made by `table`.
+    """A tabulated phase function, interpolated linearly in the angle; `table` makes and checks one.
 
     Parameters
     ----------
     angles : tuple of float
         Scattering angles, radians, ascending from 0 to pi.
     values : tuple of float
-        1/sr, normalised.
+        Scattered share per solid angle at these angles, 1/sr, normalised.
     mean_cosine, second_moment : float
         The first two Legendre moments.
     """
@@ -103,12 +103,12 @@ class Table:
 
 
 def henyey_greenstein(g: float) -> Lobes:
-    """One lobe of mean cosine g.
+    """The Henyey-Greenstein phase function (Henyey & Greenstein 1941).
 
     Parameters
     ----------
     g : float
-        Greater than -1 and less than 1.
+        Mean cosine, greater than -1 and less than 1.
 
     Returns
     -------
@@ -118,20 +118,28 @@ def henyey_greenstein(g: float) -> Lobes:
     ------
     InputError
         If g is out of range.
+
+    Examples
+    --------
+    >>> phase = henyey_greenstein(0.9)
+    >>> phase.mean_cosine, round(phase.second_moment, 6)
+    (0.9, 0.81)
+    >>> phase([1.0, -1.0]).round(6).tolist()
+    [15.11972, 0.002204]
     """
     _check_cosine("g", g)
     return Lobes((g,), (1.0,))
 
 
 def two_term(g1: float, g2: float, share: float) -> Lobes:
-    """Two lobes, commonly one forward and one backward.
+    """A sum of two Henyey-Greenstein lobes, commonly one forward and one backward.
 
     Parameters
     ----------
     g1, g2 : float
         Mean cosines of the lobes, greater than -1 and less than 1.
     share : float
-        Share of the first lobe in the scattered power, from 0 to 1; the second has the rest.
+        Share of the first lobe in the scattered power, from 0 to 1.
 
     Returns
     -------
@@ -140,7 +148,7 @@ def two_term(g1: float, g2: float, share: float) -> Lobes:
     Raises
     ------
     InputError
-        If a number is out of range.
+        If an argument is out of range.
     """
     _check_cosine("g1", g1)
     _check_cosine("g2", g2)
@@ -150,17 +158,17 @@ def two_term(g1: float, g2: float, share: float) -> Lobes:
 
 
 def table(angles: npt.ArrayLike, values: npt.ArrayLike) -> Table:
-    """A phase function from a table, linear in the angle between its rows.
+    """Make a phase function from a table, interpolated linearly in the angle.
 
-    What is left of a wrong integral, up to 2 %, is taken for rounding and for the straight lines between the rows, and
-    divided out.
+    The values are divided by their integral over all directions, which may differ from 1 by up to 2 % because of
+    rounding and linear interpolation.
 
     Parameters
     ----------
     angles : (k,) array_like
         Scattering angles in degrees, ascending from 0 to 180.
     values : (k,) array_like
-        Scattered share per solid angle there, 1/sr.
+        Scattered share per solid angle at these angles, 1/sr.
 
     Returns
     -------
@@ -183,7 +191,7 @@ def table(angles: npt.ArrayLike, values: npt.ArrayLike) -> Table:
         row = int(np.argmin(np.isfinite(p) & (p >= 0)))
         raise InputError(f"the phase function is {p[row]:g} at {theta[row]:g} degrees; give numbers of 0 or more.")
     theta = np.radians(theta)
-    # Between two rows a straight line times sines and cosines: 16 points integrate that to rounding.
+    # The integrands are linear functions times sines and cosines: 16 points integrate them to rounding.
     x, w = np.polynomial.legendre.leggauss(16)
     half = 0.5 * np.diff(theta)[:, None]
     angle = (theta[:-1, None] + half * (1.0 + x)).ravel()

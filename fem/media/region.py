@@ -1,4 +1,4 @@
-"""A part of a body that has a medium of its own."""
+"""A part of a body with a medium of its own."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,14 +11,22 @@ from tetlux.meshing.surface.surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """A closed surface within the body, or within another region, and what it holds.
+    """A closed surface inside a body, and the medium that it encloses.
 
     Parameters
     ----------
     surface : Surface
-        Inside the body's.
+        Inside the surface of the body, or inside that of another region; see `tetlux.meshing.check_regions`.
     medium : Medium, VaryingMedium, or sequence of these
-        Of the refractive index of the body's; one for each of the body's where that is a sequence.
+        With the refractive index of the body's medium. A sequence gives one medium for each channel, as many as the
+        body has.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> from tetlux.meshing import sphere
+    >>> Region(sphere(2.0), Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4)).medium.sigma_a
+    0.1
     """
 
     surface: Surface
@@ -28,7 +36,7 @@ class Region:
 
 
 def check_list_of_regions(regions: Sequence[Region]) -> None:
-    """Refuse what is no list of regions.
+    """Refuse regions that are not a sequence of `Region`.
 
     Raises
     ------
@@ -45,7 +53,13 @@ def check_list_of_regions(regions: Sequence[Region]) -> None:
 
 
 def only_medium(region: Region) -> AnyMedium:
-    """The one medium of a region."""
+    """The medium of a region with a single one.
+
+    Raises
+    ------
+    InputError
+        If the region has a sequence of media.
+    """
     if isinstance(region.medium, AnyMedium):
         return region.medium
     raise InputError(f"a region has {len(region.medium)} media where one is wanted; give the one of this channel.")

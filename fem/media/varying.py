@@ -1,4 +1,4 @@
-"""Media whose absorption and scattering vary from place to place."""
+"""Media whose absorption and scattering vary in space."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,29 +6,39 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
-from tetlux.meshing.describe import one_line
+from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
-# Values (n,) of a coefficient, 1/unit, at points (n, 3); raises InputError where it is not known.
+# A function from points (n, 3) to values (n,) of a coefficient, 1/unit; it raises InputError where it has no value.
 Field = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
 class VaryingMedium:
-    """A medium with coefficients that depend on the place.
+    """A medium whose coefficients vary in space.
 
     Parameters
     ----------
     base : Medium
-        Gives the refractive index, the boundary, the shape of scattering, and the coefficient that does not vary.
+        Its refractive index, boundary and phase function hold everywhere, and so does the coefficient for which no
+        field is given.
     sigma_a, sigma_s_prime : Field, optional
-        Absorption and reduced scattering coefficients, 1/unit. The shape of scattering stays that of `base`.
+        Absorption and reduced scattering coefficients, 1/unit, as functions from points (n, 3) to values (n,), such as
+        `grid_field` and `mesh_field` make.
 
     Raises
     ------
     InputError
-        If a field is no function.
+        If a field is not a function.
+
+    Examples
+    --------
+    >>> base = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> medium = VaryingMedium(base=base, sigma_a=lambda points: 0.01 + 0.001 * points[:, 2])
+    >>> sigma_a, sigma_s_prime = medium.at(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 10.0]]))
+    >>> sigma_a.tolist(), sigma_s_prime.tolist()
+    ([0.01, 0.02], [1.0, 1.0])
     """
 
     base: Medium
@@ -44,11 +54,12 @@ class VaryingMedium:
                 )
 
     def at(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Coefficients at given points.
+        """Evaluate the coefficients.
 
         Parameters
         ----------
         points : (n, 3) ndarray
+            Unit.
 
         Returns
         -------
@@ -58,44 +69,39 @@ class VaryingMedium:
         Raises
         ------
         InputError
-            If a field does not give one number for each point, or somewhere a coefficient is not finite or negative,
-            or does not scatter: light does not diffuse through a void.
+            If a field does not return one number for each point, a coefficient is negative or not finite somewhere, or
+            sigma_s' is 0 somewhere: light does not diffuse where it is not scattered.
         """
-        sigma_a = _values("sigma_a", self.sigma_a, self.base.sigma_a, points)
-        sigma_s_prime = _values("sigma_s_prime", self.sigma_s_prime, self.base.reduced_scattering, points)
-        _refuse("sigma_a", sigma_a, ~(sigma_a >= 0), "a coefficient cannot be negative", points)
-        scatters = "light does not diffuse where it is not scattered; give a coefficient greater than 0"
-        _refuse("sigma_s_prime", sigma_s_prime, ~(sigma_s_prime > 0), scatters, points)
+        sigma_a = _evaluate("sigma_a", self.sigma_a, self.base.sigma_a, points)
+        sigma_s_prime = _evaluate("sigma_s_prime", self.sigma_s_prime, self.base.reduced_scattering, points)
+        _refuse_where("sigma_a", sigma_a, ~(sigma_a >= 0), "a coefficient cannot be negative", points)
+        reason = "light does not diffuse where it is not scattered; give a coefficient greater than 0"
+        _refuse_where("sigma_s_prime", sigma_s_prime, ~(sigma_s_prime > 0), reason, points)
         return sigma_a, sigma_s_prime
 
     def delta_eddington(self, sigma_s_prime: FloatArray) -> tuple[FloatArray, float]:
-        """Scattering coefficients and mean cosine with the forward peak taken out, see `Medium.delta_eddington`.
+        """Scattering coefficients and mean cosine without the forward peak, see `Medium.delta_eddington`.
 
         Parameters
         ----------
         sigma_s_prime : (n,) ndarray
-            As `at` gives them.
+            As `at` returns them, 1/unit.
 
         Returns
         -------
         sigma_s_star : (n,) ndarray
             1/unit.
         g_star : float
-            The same everywhere, that of `base`.
+            The mean cosine of `base`, which holds everywhere.
         """
         _, cosine = self.base.delta_eddington
-        # sigma_s* (1 - g*) = sigma_s', whatever the peak.
+        # sigma_s* (1 - g*) = sigma_s' for every share of the peak.
         return sigma_s_prime / (1.0 - cosine), cosine
 
     __repr__ = one_line
 
 
-def as_text(point: FloatArray | Vector) -> str:
-    """A place or a direction, as people write it."""
-    return "(" + ", ".join(f"{x:.4g}" for x in point) + ")"
-
-
-def _values(name: str, field: Field | None, constant: float, points: FloatArray) -> FloatArray:
+def _evaluate(name: str, field: Field | None, constant: float, points: FloatArray) -> FloatArray:
     if field is None:
         return np.full(len(points), constant)
     try:
@@ -110,11 +116,11 @@ def _values(name: str, field: Field | None, constant: float, points: FloatArray)
             "for each.",
             field=name,
         )
-    _refuse(name, values, ~np.isfinite(values), "a coefficient must be a finite number", points)
+    _refuse_where(name, values, ~np.isfinite(values), "a coefficient must be a finite number", points)
     return values
 
 
-def _refuse(name: str, values: FloatArray, bad: BoolArray, reason: str, points: FloatArray) -> None:
+def _refuse_where(name: str, values: FloatArray, bad: BoolArray, reason: str, points: FloatArray) -> None:
     if bad.any():
         first = int(np.argmax(bad))
         raise InputError(f"{name} is {values[first]:g} at {as_text(points[first])}; {reason}.", field=name)

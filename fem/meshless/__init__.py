@@ -1,7 +1,7 @@
 """Solutions without a mesh: ``solve(..., model="charges")``, for what `tetlux.fem.charges` fits.
 
-    solution  `ChargeSolution`
-    solve     from a body, its media and lights to one
+solution  `ChargeSolution`
+solve     from a body, its media and lights to one
 """
 
 from tetlux.fem.meshless.solution import ChargeSolution

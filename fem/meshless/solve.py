@@ -8,15 +8,16 @@ import numpy as np
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST
-from tetlux.fem.meshless.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.split import check_list
-from tetlux.fem.labelled import GivenMedia
+from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
+from tetlux.fem.meshless.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.outcome.solution import Power
-from tetlux.fem.sources.deposit import Deposit, Light
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
@@ -96,10 +97,11 @@ def solve_with_charges(
         for light, deposit in zip(lights, deposits, strict=True):
             check_deposit(light, deposit, whole, [each for each, _ in inner])
     with watch.stage("solve"):
-        owners = np.repeat(np.arange(len(deposits)), [len(deposit.points) for deposit in deposits])
-        powers = np.zeros((len(owners), len(deposits)))
-        powers[np.arange(len(owners)), owners] = np.concatenate([deposit.powers for deposit in deposits])
-        points = np.vstack([deposit.points for deposit in deposits])
+        terms = [deposit.terms for deposit in deposits]
+        owners = np.repeat(np.arange(len(terms)), [len(each.points) for each in terms])
+        powers = np.zeros((len(owners), len(terms)))
+        powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
+        points = np.vstack([each.points for each in terms])
         entries = [_entry(deposit) for deposit in deposits]
         solution = charge_solution(surface, body, points, powers, entries, inner=inner, tolerance=tolerance, most=most)
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
@@ -131,8 +133,9 @@ def _below_zero(solution: ChargeSolution) -> list[str]:
 
 
 def _entry(deposit: Deposit) -> Entry:
-    known = Power(deposit.incident, deposit.specular, deposit.absorbed, 0.0, deposit.ballistic)
-    return Entry(known, float(deposit.irradiance), float(deposit.transmitted_irradiance))
+    ledger, terms = deposit.ledger, deposit.terms
+    known = Power(ledger.incident, ledger.specular, ledger.absorbed, 0.0, ledger.ballistic)
+    return Entry(known, float(terms.irradiance), float(terms.transmitted_irradiance))
 
 
 def check_simple(surface: Surface) -> None:
@@ -190,13 +193,13 @@ def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Su
     ------
     InputError
     """
-    name = type(light).__name__
-    if len(deposit.starts) or deposit.on_mesh is not None:
+    name, terms = type(light).__name__, deposit.terms
+    if len(terms.segments) or deposit.on_mesh is not None:
         raise InputError(f'{name} leaves light along lines or by facets, and model "charges" has points; {_INSTEAD}')
-    if np.any(deposit.emission):
+    if np.any(terms.emission):
         raise InputError(f'{name} emits light throughout, and model "charges" has points; {_INSTEAD}')
-    if np.ndim(deposit.irradiance) or np.ndim(deposit.transmitted_irradiance):
+    if np.ndim(terms.irradiance) or np.ndim(terms.transmitted_irradiance):
         raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
-    if deposit.irradiance and body.only_medium is None:
+    if terms.irradiance and body.only_medium is None:
         raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
-    _check_apart(deposit.points, body.outer, inner)
+    _check_apart(terms.points, body.outer, inner)

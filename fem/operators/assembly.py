@@ -22,9 +22,9 @@ from tetlux.fem.linear.krylov import Preconditioner
 from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of, condition_bound
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import FloatArray, IndexArray, summed
+from tetlux.meshing.arrays import FloatArray, IndexArray, sum_by_index
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.corners import cross, dot, over_corners
+from tetlux.meshing.host.corners import cross, dot, run_on_corners
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import EDGES
 
@@ -112,7 +112,7 @@ class Assembly:
         mesh, nodes = self.mesh, len(self.mesh.points)
         low, high = mesh.edges.T
         edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
-        diagonal = -summed(low, edges, nodes) - summed(high, edges, nodes)
+        diagonal = -sum_by_index(low, edges, nodes) - sum_by_index(high, edges, nodes)
         absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
         diagonal += absorbed if absorption_scale is None else absorption_scale * absorbed
         diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
@@ -120,8 +120,10 @@ class Assembly:
             # Their rows sum to what those of the lumped ones hold on the diagonal.
             within = np.tile(sigma_a * mesh.volumes / 20.0, 6)
             across = np.repeat(escape * mesh.boundary_areas / 12.0, 3)
-            coupling = summed(self._slots, within, len(edges)) + summed(mesh.boundary_edges, across, len(edges))
-            diagonal -= summed(low, coupling, nodes) + summed(high, coupling, nodes)
+            coupling = sum_by_index(self._slots, within, len(edges)) + sum_by_index(
+                mesh.boundary_edges, across, len(edges)
+            )
+            diagonal -= sum_by_index(low, coupling, nodes) + sum_by_index(high, coupling, nodes)
             edges = edges + coupling
         indptr, indices, source = self._pattern
         return csr_array((np.concatenate([edges, diagonal])[source], indices, indptr), shape=(nodes, nodes))
@@ -148,8 +150,8 @@ class Assembly:
             for edge, (i, j) in enumerate(EDGES):
                 values[edge, block] = scale * dot(normals[i], normals[j])
 
-        over_corners(fill, mesh.points, mesh.tetrahedra)
-        return summed(self._slots, values, len(mesh.edges))
+        run_on_corners(fill, mesh.points, mesh.tetrahedra)
+        return sum_by_index(self._slots, values, len(mesh.edges))
 
     @cached_property
     def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:

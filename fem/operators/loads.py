@@ -1,4 +1,4 @@
-"""The right-hand side: what deposits put on the nodes, ``∫ Q0 v + (1/sigma_t') ∫ Q1 . grad v``.
+"""The right-hand side: loads of source terms on the nodes, ``∫ Q0 v + (1/sigma_t') ∫ Q1 . grad v``.
 
 Diffuse light adds ``∮ 2 E_t v / (1 + 3 C2)``, with E_t the irradiance that passes to the inside; emission adds
 ``∫ Q0 v`` by the corners.
@@ -8,12 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.ballistic.follow import cells_of, optical_depths
+from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.operators.operator import Operator
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray, IntArray, summed
+from tetlux.fem.sources.ledger import Ledger
+from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.terms import SourceTerms
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
@@ -40,7 +43,7 @@ class Load:
     @property
     def has_first_moment(self) -> bool:
         """Whether it has a Q1, beside which the diffusion equation itself may have a fluence below zero."""
-        return len(self.deposit.starts) > 0 and bool(np.any(self.operator.coefficients.cosine != 0))
+        return len(self.deposit.terms.segments) > 0 and bool(np.any(self.operator.coefficients.cosine != 0))
 
     __repr__ = one_line
 
@@ -51,24 +54,25 @@ def load_of(deposit: Deposit, operator: Operator) -> Load:
     A fitted operator absorbs only in the layer: the rest of what is emitted is absorbed where it is emitted.
     """
     mesh = operator.mesh
-    at_nodes = load_vector(mesh, operator.coefficients, deposit)
-    if operator.fitting is not None and np.any(deposit.emission):
-        emitted = mesh.to_nodes(deposit.emission * mesh.volumes)
+    at_nodes = load_vector(mesh, operator.coefficients, deposit.terms)
+    if operator.fitting is not None and np.any(deposit.terms.emission):
+        emitted = mesh.to_nodes(deposit.terms.emission * mesh.volumes)
         withheld = (1.0 - operator.fitting.absorption_scale) * emitted
         at_nodes -= withheld
-        deposit = replace(deposit, absorbed=deposit.absorbed + float(withheld.sum()))
+        ledger = Ledger.merge([deposit.ledger, Ledger(absorbed=float(withheld.sum()))])
+        deposit = replace(deposit, ledger=ledger)
     return Load(deposit, operator, at_nodes)
 
 
-def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> FloatArray:
-    """Load of a deposit on the nodes of a mesh.
+def load_vector(mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
+    """Load of source terms on the nodes of a mesh.
 
     Parameters
     ----------
     mesh : TetMesh
     coefficients : Coefficients
-    deposit : Deposit
-        As it is on this mesh, see `Deposit.on`.
+    terms : SourceTerms
+        On this mesh, see `Deposit.evaluate_on`.
 
     Returns
     -------
@@ -76,43 +80,43 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, deposit: Deposit) -> 
         Sums to the scattered power that its points and segments hold and its volume emits, W, to rounding.
     """
     load = np.zeros(len(mesh.points))
-    if len(deposit.points) or len(deposit.starts):
-        line, points, powers = _line_load(mesh, coefficients, deposit)
+    if len(terms.points) or len(terms.segments):
+        line, points, powers = _line_load(mesh, coefficients, terms.segments)
         load += line
         # Points go with what is left of the lines.
-        points, powers = np.vstack([deposit.points, points]), np.concatenate([deposit.powers, powers])
-        homes = np.full(len(points), -1)
-        if deposit.homes is not None:
-            homes[: len(deposit.homes)] = deposit.homes
-        load += _point_load(mesh, points, powers, homes)
-    if np.any(deposit.transmitted_irradiance):
+        points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
+        cells = np.full(len(points), -1)
+        if terms.point_cells is not None:
+            cells[: len(terms.point_cells)] = terms.point_cells
+        load += _point_load(mesh, points, powers, cells)
+    if np.any(terms.transmitted_irradiance):
         _, c2 = moments(coefficients.outer.eta)
-        load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * deposit.transmitted_irradiance / (1.0 + 3.0 * c2)
-    if np.any(deposit.emission):
-        load += mesh.to_nodes(deposit.emission * mesh.volumes)
+        load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * terms.transmitted_irradiance / (1.0 + 3.0 * c2)
+    if np.any(terms.emission):
+        load += mesh.to_nodes(terms.emission * mesh.volumes)
     return load
 
 
-def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, homes: IntArray) -> FloatArray:
+def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, point_cells: IntArray) -> FloatArray:
     """Points by their barycentric coordinates, in tetrahedra that are known or have to be found."""
     if len(points) == 0:
         return np.zeros(len(mesh.points))
-    known, lost = np.flatnonzero(homes >= 0), np.flatnonzero(homes < 0)
-    cells, weights = homes.copy(), np.empty((len(points), 4))
-    weights[known] = mesh.barycentric(points[known], homes[known])
+    known, lost = np.flatnonzero(point_cells >= 0), np.flatnonzero(point_cells < 0)
+    cells, weights = point_cells.copy(), np.empty((len(points), 4))
+    weights[known] = mesh.barycentric(points[known], point_cells[known])
     if len(lost):
         cells[lost], weights[lost] = mesh.locate(points[lost])
     inside = cells >= 0
-    load = summed(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
+    load = sum_by_index(mesh.tetrahedra[cells[inside]], powers[inside, None] * weights[inside], len(mesh.points))
     if not inside.all():
         # Between the surface and the mesh's facets, a hair outside the mesh.
         _, faces, corner = mesh.closest_boundary(points[~inside])
-        load += summed(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
+        load += sum_by_index(mesh.boundary_faces[faces], powers[~inside, None] * corner, len(mesh.points))
     return load
 
 
 def _line_load(
-    mesh: TetMesh, coefficients: Coefficients, deposit: Deposit
+    mesh: TetMesh, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, integrated in closed form over every tetrahedron that they pass.
 
@@ -121,12 +125,12 @@ def _line_load(
     """
     load = np.zeros(len(mesh.points))
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
-    for part in march(mesh, deposit.starts, deposit.directions, deposit.lengths, deposit.cells):
-        cells = cells_of(mesh, coefficients, part, deposit.starts, deposit.directions)
+    for part in march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells):
+        cells = cells_of(mesh, coefficients, part, segments.starts, segments.directions)
         extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter
         phi1, phi2 = _phi(extinction * step)
-        carried = deposit.fluxes[part.paths] * at_cells(coefficients.scattering, cells) * step
+        carried = segments.fluxes[part.paths] * at_cells(coefficients.scattering, cells) * step
         carried *= np.exp(-optical_depths(part, coefficients.extinction, cells))
         mean = carried * phi1
         # What goes with the derivatives along the path: the rest of Q0, and Q1.
@@ -136,7 +140,7 @@ def _line_load(
             load += np.bincount(corner, mean * weights + along * slopes, len(load))
         outside = np.flatnonzero(part.cells < 0)
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
-        points.append(deposit.starts[paths] + middle[:, None] * deposit.directions[paths])
+        points.append(segments.starts[paths] + middle[:, None] * segments.directions[paths])
         powers.append(mean[outside])
     return load, np.concatenate(points), np.concatenate(powers)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.media.varying import as_text
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
 # How far from the surface a point may be, as a share of the body's diagonal.

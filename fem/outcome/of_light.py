@@ -33,20 +33,20 @@ def solution_of_light(
     -------
     Solution
     """
-    deposit, operator = load.deposit, load.operator
+    known, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
     mesh, limited_power = operator.mesh, 0.0
     if limit and not (load.has_first_moment or any(each.patch.charges.dips for each in subtractions)):
         fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
-    outside = mesh.boundary_node_areas * deposit.irradiance
-    transmitted = mesh.boundary_node_areas * deposit.transmitted_irradiance
-    emitted = float((mesh.volumes * deposit.emission).sum())
+    outside = mesh.boundary_node_areas * terms.irradiance
+    transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
+    emitted = float((mesh.volumes * terms.emission).sum())
     absorbed = float((operator.absorbing * fluence).sum())
     ledger = Power(
-        incident=deposit.incident + float(outside.sum()) + emitted,
-        specular=deposit.specular + float((outside - transmitted).sum()),
-        absorbed=deposit.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
+        incident=known.incident + float(outside.sum()) + emitted,
+        specular=known.specular + float((outside - transmitted).sum()),
+        absorbed=known.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
         exited=0.0,
-        ballistic=deposit.ballistic,
+        ballistic=known.ballistic,
     )
     solution = Solution(
         mesh,
@@ -55,7 +55,7 @@ def solution_of_light(
         fluence,
         ledger,
         tuple(each.patch for each in subtractions),
-        deposit.transmitted_irradiance,
+        terms.transmitted_irradiance,
         limited_power=limited_power,
     )
     exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(each.terms.exited for each in subtractions)

@@ -14,7 +14,8 @@ from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.surface import Surface, longest_sides
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
 from tetlux.meshing.surface.surface import Surface
 
 # An edge is split if the exitance in its middle is off the mean of its ends by more than a share of the largest
@@ -43,7 +43,7 @@ def surface_exitance(solution: ResolvedField) -> tuple[Surface, FloatArray]:
     # Edges that were looked at and found short enough stay so.
     known = np.zeros((0, 2), dtype=np.int64)
     while len(flat) < len(given.points) + MOST_ADDED:
-        edges = ends, edge = edges_of(faces)
+        edges = ends, edge = number_triangle_edges(faces)
         owner = np.empty(len(ends), dtype=np.int64)
         owner[edge.ravel()] = np.repeat(parents, 3)
         key, done = (e[:, 0] * np.int64(len(flat)) + e[:, 1] for e in (ends, known))
@@ -60,7 +60,7 @@ def surface_exitance(solution: ResolvedField) -> tuple[Surface, FloatArray]:
         if not marked.any():
             break
         known = np.vstack([known, ends[new[~marked[new]]]])
-        marked = with_longest(flat, edges, marked)
+        marked = mark_longest_edges(flat, edges, marked)
         flat, faces, origin = split_edges(flat, faces, edges, marked)
         added, _ = given.on_curve(owner[marked], flat[len(points) :])
         parents = parents[origin]

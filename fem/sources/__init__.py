@@ -1,1 +1,1 @@
-"""What a light leaves in a body, as plain data."""
+"""What a light deposits in a body, as plain data that can be pickled."""

@@ -1,194 +1,107 @@
-"""What a light leaves in a medium: points, beams that fade along straight segments, diffuse light, emission."""
+"""`Deposit`: what a light leaves in a body."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-import numpy as np
-
-from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.fem.sources.footprint import Footprint
+from tetlux.fem.sources.hints import MeshHints
+from tetlux.fem.sources.ledger import Ledger
+from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 
-def _no_vectors() -> FloatArray:
-    return np.zeros((0, 3))
-
-
-def _no_values() -> FloatArray:
-    return np.zeros(0)
-
-
 @dataclass(frozen=True, eq=False)
 class Deposit:
-    """Where the power of a light goes.
-
-    What depends on the body alone is known at once; light that falls on each facet of a mesh, and paths through
-    several media, are known on a mesh only: `on`.
+    """What a light leaves in a body, as plain data that can be pickled.
 
     Parameters
     ----------
-    incident : float
-        Power that meets the body, W; for an irradiance it follows from the mesh's area.
-    specular : float
-        Power that its surface reflects at once, W.
-    absorbed : float
-        Power absorbed before it was ever scattered, W.
-    ballistic : float
-        Power that leaves the body without having been scattered, W.
-    points, powers : (p, 3), (p,) ndarray
-        Isotropic points and their power, W.
-    homes : (p,) ndarray, optional
-        The tetrahedra of a mesh in which they lie, -1 where not known.
-    starts, directions, lengths, fluxes : (s, 3), (s, 3), (s,), (s,) ndarray
-        Beam segments: start, unit direction, length, and power carried at the start, W. The power fades
-        as ``exp(-sigma_t* l)``.
-    cells : (s,) ndarray, optional
-        The tetrahedra of a mesh in which they begin, -1 where not known.
-    irradiance, transmitted_irradiance : float or (b,) ndarray
-        Diffuse light on the outside, of the whole surface or at each boundary node of a mesh, and what of it
-        passes to the inside, W/unit².
-    emission : float or (m,) ndarray
-        Power that the volume emits, throughout or in each tetrahedron of a mesh, W/unit³.
-    resolution : float
-        Length near the deposit that a mesh has to resolve, unit.
-    lit : (p, 3) ndarray
-        Other places near which it has to.
-    entries : (e, 3) ndarray
-        Some of the places where beams enter the body.
-    breadth : float, optional
-        Radius of an even disc that spreads as what is lit does, unit; inf for light on the whole body. If not given, it
-        follows from `entries`, or from `points` where there are none.
-    beams_as_points : bool
-        Whether each point stands for a thin beam that enters at one of `entries`.
+    ledger : Ledger
+        What becomes of its power before it is scattered.
+    terms : SourceTerms
+        What it adds to the right-hand side.
+    hints : MeshHints
+        Where the mesh has to be fine.
+    footprint : Footprint
+        Where it enters the body, for the error of the diffusion approximation.
     warnings : tuple of str
-    on_mesh : OnMesh, optional
-        What comes to it on a mesh; plain data too, so that a deposit can be pickled.
-    """
-
-    incident: float = 0.0
-    specular: float = 0.0
-    absorbed: float = 0.0
-    ballistic: float = 0.0
-    points: FloatArray = field(default_factory=_no_vectors)
-    powers: FloatArray = field(default_factory=_no_values)
-    homes: IntArray | None = None
-    starts: FloatArray = field(default_factory=_no_vectors)
-    directions: FloatArray = field(default_factory=_no_vectors)
-    lengths: FloatArray = field(default_factory=_no_values)
-    fluxes: FloatArray = field(default_factory=_no_values)
-    cells: IntArray | None = None
-    irradiance: float | FloatArray = 0.0
-    transmitted_irradiance: float | FloatArray = 0.0
-    emission: float | FloatArray = 0.0
-    resolution: float = np.inf
-    lit: FloatArray = field(default_factory=_no_vectors)
-    entries: FloatArray = field(default_factory=_no_vectors)
-    breadth: float | None = None
-    beams_as_points: bool = False
-    warnings: tuple[str, ...] = ()
-    on_mesh: "OnMesh | None" = None
-
-    @property
-    def even(self) -> bool:
-        """Whether it is spread over surface or volume, and nothing of it lies at points or along segments."""
-        return len(self.points) == 0 and len(self.starts) == 0
-
-    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> "Deposit":
-        """What it is on a mesh of the surface with given coefficients."""
-        if self.on_mesh is None:
-            return self
-        return together([replace(self, on_mesh=None), self.on_mesh.on(mesh, surface, coefficients)])
-
-    __repr__ = one_line
-
-
-def together(parts: Sequence[Deposit]) -> Deposit:
-    """Several deposits as one."""
-    on_mesh = tuple(part.on_mesh for part in parts if part.on_mesh is not None)
-    return Deposit(
-        incident=sum(p.incident for p in parts),
-        specular=sum(p.specular for p in parts),
-        absorbed=sum(p.absorbed for p in parts),
-        ballistic=sum(p.ballistic for p in parts),
-        points=np.vstack([p.points for p in parts]),
-        powers=np.concatenate([p.powers for p in parts]),
-        homes=_known([(p.homes, len(p.points)) for p in parts]),
-        starts=np.vstack([p.starts for p in parts]),
-        directions=np.vstack([p.directions for p in parts]),
-        lengths=np.concatenate([p.lengths for p in parts]),
-        fluxes=np.concatenate([p.fluxes for p in parts]),
-        cells=_known([(p.cells, len(p.starts)) for p in parts]),
-        irradiance=sum((p.irradiance for p in parts), 0.0),
-        transmitted_irradiance=sum((p.transmitted_irradiance for p in parts), 0.0),
-        emission=sum((p.emission for p in parts), 0.0),
-        resolution=min(p.resolution for p in parts),
-        lit=np.vstack([p.lit for p in parts]),
-        entries=np.vstack([p.entries for p in parts]),
-        breadth=max((p.breadth for p in parts if p.breadth is not None), default=None),
-        beams_as_points=any(p.beams_as_points for p in parts),
-        warnings=tuple(w for p in parts for w in p.warnings),
-        on_mesh=_Several(on_mesh) if on_mesh else None,
-    )
-
-
-class OnMesh(Protocol):
-    """What is known of a deposit on a mesh only: a dataclass of plain values, and no closure."""
-
-    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
-        """Say what it deposits on a mesh of the surface with given coefficients."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class _Several:
-    """What several deposits leave on a mesh."""
-
-    parts: tuple[OnMesh, ...]
-
-    def on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
-        """See `OnMesh`."""
-        return together([part.on(mesh, surface, coefficients) for part in self.parts])
-
-    __repr__ = one_line
-
-
-def _known(parts: Sequence[tuple[IntArray | None, int]]) -> IntArray | None:
-    """Tetrahedra of all parts, by those of each and how many they are."""
-    if all(cells is None for cells, _ in parts):
-        return None
-    return np.concatenate([np.full(count, -1) if cells is None else cells for cells, count in parts])
-
-
-class Light(Protocol):
-    """A light: any object with this method can stand in the list of lights that is solved for.
+        What the user should know; a `Note` is a sentence with a code.
+    on_mesh : MeshDependent, optional
+        The part that can only be computed on a mesh, such as light on each of its facets.
 
     Examples
     --------
-    A glowing wire, as points along it:
+    An isotropic point source of 2 W, on a mesh that resolves half a length unit:
 
-    >>> class Wire:
-    ...     def deposit_in(self, body):
-    ...         points = np.column_stack([np.zeros((9, 2)), np.linspace(-4.0, 4.0, 9)])
-    ...         finest = float(body.mean_free_paths(points).min())
-    ...         return Deposit(incident=1.0, points=points, powers=np.full(9, 1.0 / 9.0), resolution=finest)
+    >>> import numpy as np
+    >>> terms = SourceTerms(points=np.array([[0.0, 0.0, 1.0]]), powers=np.array([2.0]))
+    >>> Deposit(Ledger(incident=2.0), terms, MeshHints(resolution=0.5)).ledger.incident
+    2.0
     """
 
-    def deposit_in(self, body: Body) -> Deposit:
-        """Say what this light leaves in a body.
+    ledger: Ledger = field(default_factory=Ledger)
+    terms: SourceTerms = field(default_factory=SourceTerms)
+    hints: MeshHints = field(default_factory=MeshHints)
+    footprint: Footprint = field(default_factory=Footprint)
+    warnings: tuple[str, ...] = ()
+    on_mesh: "MeshDependent | None" = None
+
+    def evaluate_on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> "Deposit":
+        """Compute what depends on the mesh, and add it to the rest.
 
         Parameters
         ----------
-        body : Body
-            Its surface, and the medium of each place: `Body.mean_free_paths`, `Body.region_at`, `Body.paths`.
+        mesh : TetMesh
+        surface : Surface
+            The surface of the body, which the mesh approximates.
+        coefficients : Coefficients
+            Of the tetrahedra.
 
         Returns
         -------
         Deposit
-            Its ledger must close: ``incident`` is the sum of ``specular``, ``absorbed``, ``ballistic`` and the power of
-            all that is deposited, W.
+            Without `on_mesh`.
         """
+        if self.on_mesh is None:
+            return self
+        return merge_deposits([replace(self, on_mesh=None), self.on_mesh.deposit_on(mesh, surface, coefficients)])
+
+    __repr__ = one_line
+
+
+class MeshDependent(Protocol):
+    """The part of a deposit that depends on the mesh: a frozen dataclass of plain values, without closures."""
+
+    def deposit_on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """Compute the deposit on a mesh; see `Deposit.evaluate_on` for the parameters."""
         ...
+
+
+def merge_deposits(parts: Sequence[Deposit]) -> Deposit:
+    """Add up several deposits, at least one."""
+    on_mesh = tuple(part.on_mesh for part in parts if part.on_mesh is not None)
+    return Deposit(
+        Ledger.merge([part.ledger for part in parts]),
+        SourceTerms.merge([part.terms for part in parts]),
+        MeshHints.merge([part.hints for part in parts]),
+        Footprint.merge([part.footprint for part in parts]),
+        warnings=tuple(warning for part in parts for warning in part.warnings),
+        on_mesh=_Several(on_mesh) if on_mesh else None,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Several:
+    """The mesh-dependent parts of several deposits."""
+
+    parts: tuple[MeshDependent, ...]
+
+    def deposit_on(self, mesh: TetMesh, surface: Surface, coefficients: Coefficients) -> Deposit:
+        """See `MeshDependent`."""
+        return merge_deposits([part.deposit_on(mesh, surface, coefficients) for part in self.parts])
+
+    __repr__ = one_line

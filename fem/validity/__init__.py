@@ -1,1 +1,1 @@
-"""Where the diffusion approximation itself is off, with figures."""
+"""Expected errors of the diffusion approximation itself, and the warnings about them."""

@@ -1,4 +1,4 @@
-"""Is diffusion a fair model here? What a user should read before the picture."""
+"""Checks of media against the diffusion approximation: what it cannot model is refused, what it models badly noted."""
 
 from collections.abc import Sequence
 
@@ -12,20 +12,27 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 
-# Bodies of fewer or more mean free paths than these are a mistaken unit, not a scene.
+# Diagonals in mean free paths below and above which the unit of a body must be wrong.
 SMALLEST_BODY = 0.5
 LARGEST_BODY = 2e4
+# Reduced albedo below which diffusion is off by some per cent.
 LOW_ALBEDO = 0.9
-# Mean free paths: a body thinner than the first is said to be, and so is what is nearer to the light than the second.
+# Mean free paths: thickness below which a body is thin, and distance below which a place is near the light.
 THIN, NEAR = 4.0, 2.0
-# A part of the surface, and errors close to the light and far from it, that are worth a sentence.
-NEGLIGIBLE_PART, WORTH_SAYING, DIM = 0.05, 0.1, 0.25
-# A region that has less than this share of the scattering and absorption around it may be a void.
+# Notes are made if more than this share of the surface is concerned, and if the error in thin parts and near the light,
+# or far from it, is more than these.
+NEGLIGIBLE_SHARE, NOTABLE_ERROR, NOTABLE_FAR_ERROR = 0.05, 0.1, 0.25
+# A region with less than this share of the extinction around it may be a void.
 VOID = 0.1
 
 
 def check_scattering(medium: AnyMedium) -> None:
-    """Refuse a medium that light passes without being scattered; where it varies, that is seen when it is asked.
+    """Refuse a medium without scattering.
+
+    Parameters
+    ----------
+    medium : Medium or VaryingMedium
+        A medium that varies is checked when its coefficients are computed.
 
     Raises
     ------
@@ -39,12 +46,16 @@ def check_scattering(medium: AnyMedium) -> None:
 
 
 def check_size(body: Body) -> None:
-    """Refuse a body that cannot be of the unit its coefficients are in.
+    """Refuse a body whose size and coefficients cannot be in the same unit.
+
+    Parameters
+    ----------
+    body : Body
 
     Raises
     ------
     InputError
-        If the body's bounding box is under 0.5 or over 20,000 mean free paths across, in each of its media.
+        If the diagonal of the body is less than 0.5, or more than 20,000, mean free paths of each of its media.
     """
     surface, ranges = body.surface, body.ranges_of_mean_free_path
     least, most = min(low for low, _ in ranges), max(high for _, high in ranges)
@@ -63,18 +74,27 @@ def check_size(body: Body) -> None:
 
 
 def check_media(body: Body) -> None:
-    """Refuse media that do not go together, or with the body.
+    """Refuse media that cannot be in one body, or whose coefficients do not suit its size.
+
+    Parameters
+    ----------
+    body : Body
 
     Raises
     ------
     InputError
     """
-    check_together(list(body.by_label.values()))
+    check_compatible(list(body.by_label.values()))
     check_size(body)
 
 
-def check_together(media: Sequence[AnyMedium]) -> None:
-    """Refuse media of one body, its own first, that differ in what the whole body shares.
+def check_compatible(media: Sequence[AnyMedium]) -> None:
+    """Refuse media of one body that do not scatter, or that differ in refractive index or boundary.
+
+    Parameters
+    ----------
+    media : sequence of Medium or VaryingMedium
+        That of the body first, then those of its regions.
 
     Raises
     ------
@@ -92,19 +112,30 @@ def check_together(media: Sequence[AnyMedium]) -> None:
 
 
 def warnings_for(surface: Surface, validity: Validity) -> list[str]:
-    """Plain sentences on where the diffusion approximation itself is off, with figures.
+    """Notes on where the diffusion approximation itself is off.
 
-    The figures are of diffusion against Monte Carlo. Those by reduced albedo and index are of slabs under a wide beam,
-    as ``python -m tests.tables.diffusion_against_monte_carlo`` prints them; all others are those of
+    The figures are errors of diffusion compared with Monte Carlo. Those by reduced albedo and index are of slabs under
+    a wide beam, printed by ``python -m tests.tables.diffusion_against_monte_carlo``; all others are those of
     `tetlux.fem.validity.tables`.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of the body.
+    validity : Validity
+        On a mesh of it.
+
+    Returns
+    -------
+    list of Note
     """
-    return [*_of_albedo(validity), *_of_thin_parts(surface, validity), *_of_distance(validity)]
+    return [*_albedo_notes(validity), *_thickness_notes(surface, validity), *_distance_notes(validity)]
 
 
-def _of_albedo(validity: Validity) -> list[str]:
+def _albedo_notes(validity: Validity) -> list[str]:
     low = validity.below.albedo < LOW_ALBEDO
     share = validity.mean(low)
-    if share <= (NEGLIGIBLE_PART if not low.all() else 0.0):
+    if share <= (NEGLIGIBLE_SHARE if not low.all() else 0.0):
         return []
     albedo, where = validity.below.albedo[low].min(), "" if low.all() else f" below {share:.0%} of the surface"
     return [
@@ -118,16 +149,16 @@ def _of_albedo(validity: Validity) -> list[str]:
     ]
 
 
-def _of_distance(validity: Validity) -> list[str]:
+def _distance_notes(validity: Validity) -> list[str]:
     found: list[str] = []
     middles = validity.middles
     distances, near = validity.distances(middles), validity.near_errors(middles)
     close = distances < NEAR
-    if (near[close] > WORTH_SAYING).any():
+    if (near[close] > NOTABLE_ERROR).any():
         error = validity.mean(near * close) / validity.mean(close)
         assumed = ""
-        if validity.unknown_cosine(middles)[close].any():
-            # A point stands for a beam half as well where scattering is isotropic, so the figure hangs on it.
+        if validity.lacks_cosine(middles)[close].any():
+            # A beam as a point has twice the error where scattering is isotropic, so that the figure depends on g.
             assumed = " (g = 0 assumed, as sigma_s_prime alone is given: give sigma_s and g instead)"
         found.append(
             Note(
@@ -137,20 +168,21 @@ def _of_distance(validity: Validity) -> list[str]:
                 value=error,
             )
         )
-    dim = validity.far_errors(middles, np.arange(len(middles))) > DIM
-    if validity.mean(dim) > NEGLIGIBLE_PART:
+    dim = validity.far_errors(middles, np.arange(len(middles))) > NOTABLE_FAR_ERROR
+    if validity.mean(dim) > NEGLIGIBLE_SHARE:
         found.append(
             Note(
                 "strong-absorption",
                 f"diffusion fades too fast at this absorption: farther than {distances[dim].min():.2g} mean free paths "
-                f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than {DIM:.0%}.",
+                f"from the light, {validity.mean(dim):.0%} of the surface, it is off by more than "
+                f"{NOTABLE_FAR_ERROR:.0%}.",
             )
         )
     return found
 
 
-def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
-    # The mean chord of the body itself, which on a coarse mesh is a little longer than that of the mesh.
+def _thickness_notes(surface: Surface, validity: Validity) -> list[str]:
+    # The mean chord of a coarse mesh, 4 V/S, scaled to that of the body itself.
     mesh = validity.mesh
     mean = validity.mean_chord * (surface.volume / mesh.volume) * (mesh.area / surface.area)
     errors = validity.thin_errors
@@ -165,7 +197,7 @@ def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
         ]
     thin = validity.thickness < THIN
     share = validity.mean(thin)
-    if share <= NEGLIGIBLE_PART or validity.mean(errors * thin) < WORTH_SAYING * share:
+    if share <= NEGLIGIBLE_SHARE or validity.mean(errors * thin) < NOTABLE_ERROR * share:
         return []
     return [
         Note(
@@ -178,7 +210,19 @@ def _of_thin_parts(surface: Surface, validity: Validity) -> list[str]:
 
 
 def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]) -> list[str]:
-    """The same of the media of regions, the body's own first, in short."""
+    """Notes on regions with a low albedo and on voids.
+
+    Parameters
+    ----------
+    surfaces : sequence of Surface
+        Of the regions.
+    media : sequence of Medium or VaryingMedium
+        That of the body first, then those of the regions.
+
+    Returns
+    -------
+    list of Note
+    """
     outer, *inner = map(base_of, media)
     found: list[str] = []
     for number, (surface, medium) in enumerate(zip(surfaces, inner, strict=True), 1):
@@ -187,7 +231,22 @@ def warnings_for_regions(surfaces: Sequence[Surface], media: Sequence[AnyMedium]
 
 
 def warning_for_part(name: str, chord: float, medium: Medium, outer: Medium) -> list[str]:
-    """A sentence on a part of a body that diffusion is not good for, by its mean chord and its medium, or none."""
+    """Note on a part of a body that diffusion models badly, if it is one.
+
+    Parameters
+    ----------
+    name : str
+        What the note calls the part.
+    chord : float
+        Mean chord of the part, unit.
+    medium, outer : Medium
+        Of the part, and around it.
+
+    Returns
+    -------
+    list of Note
+        At most one.
+    """
     across = chord / medium.mean_free_path
     if across < 1.0 and medium.sigma_t_prime < VOID * outer.sigma_t_prime:
         return [

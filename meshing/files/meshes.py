@@ -17,13 +17,13 @@ from tetlux.meshing.files.gmsh_write import write_gmsh
 from tetlux.meshing.files.labels import REGION, labels_of
 from tetlux.meshing.files.raw import RawMesh
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
-from tetlux.meshing.tets.given import Given, checked_mesh, oriented
+from tetlux.meshing.tets.given import Given, make_checked_mesh
 from tetlux.meshing.tets.mesh import TetMesh
 
 if TYPE_CHECKING:
     import meshio
 
-__all__ = ["oriented", "read_mesh", "read_with_meshio", "write_mesh"]
+__all__ = ["read_mesh", "read_with_meshio", "write_mesh"]
 
 WRITTEN = (".vtu", ".msh")
 # Formats by lower-case suffix. Other formats of meshio have no tetrahedra or are not read reliably.
@@ -107,7 +107,7 @@ def read_mesh(path: str | Path, *, unit: str = "mm", scale: float = 1.0, labels:
             repairs=notes,
             warnings=(*raw.notes, *found.notes),
         )
-        return checked_mesh(given, unit)[0]
+        return make_checked_mesh(given, unit)[0]
     except InputError as error:
         said = str(error)
         raise InputError(said if said.startswith(str(path)) else f"{path}: {said}") from error

@@ -12,9 +12,9 @@ from tetlux.meshing.arrays import IntArray
 
 # Rows per block. Fresh memory costs more than the arithmetic on it, and blocks of this size reuse memory.
 BLOCK = 8192
-# Keys sorted at once, and the largest number of parts, since each part scans all keys.
-PART = 1 << 20
-MOST_PARTS = 8
+# Keys sorted at once, and the largest number of parts that keys are divided into, since each part scans all keys.
+KEYS_AT_ONCE = 1 << 20
+MOST_KEY_PARTS = 8
 
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
@@ -22,24 +22,23 @@ _Result = TypeVar("_Result")
 THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
 
 
-def at_once(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """``[work(item) for item in items]``, on all cores at once."""
+def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
+    """Compute ``[work(item) for item in items]`` in threads on all cores."""
     if len(items) < 2 or THREADS < 2:
         return [work(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(work, items))
 
 
-def in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:
-    """Call ``work(slice)`` for slices of `size` that together cover ``range(count)``, on all cores at once."""
-    at_once(work, [slice(start, min(start + size, count)) for start in range(0, count, size)])
+def run_in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:
+    """Call ``work(slice)`` for slices of `size` that together cover ``range(count)``, in threads on all cores."""
+    map_in_threads(work, [slice(start, min(start + size, count)) for start in range(0, count, size)])
 
 
 def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.int32]]:
-    """``numpy.unique(keys, return_inverse=True)``, about ten times faster for many keys.
+    """Compute ``numpy.unique(keys, return_inverse=True)``, about ten times faster for many keys.
 
-    NumPy sorts numbers several times faster than it finds their order, so every key is sorted with its index as
-    its low digits.
+    NumPy's `sort` is several times faster than its `argsort`, so each key is sorted with its index as low digits.
 
     Parameters
     ----------
@@ -51,10 +50,10 @@ def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], np
         Ascending.
     inverse : (k,) ndarray of int32
     """
-    parts = min(max(1, -(-len(keys) // PART)), MOST_PARTS)
+    parts = min(max(1, -(-len(keys) // KEYS_AT_ONCE)), MOST_KEY_PARTS)
     sample = np.sort(keys[:: max(1, len(keys) // (64 * parts))])
     limits = [np.uint64(0), *sample[(np.arange(1, parts) * len(sample)) // parts]]
-    found: list[tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]] = [_NOTHING] * parts
+    found: list[tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]] = [_NO_KEYS] * parts
 
     def sort_part(block: slice) -> None:
         part = block.start
@@ -63,7 +62,7 @@ def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], np
             inside &= keys < limits[part + 1]
         found[part] = _group_part(keys, np.flatnonzero(inside), limits[part])
 
-    in_blocks(sort_part, parts, 1)
+    run_in_blocks(sort_part, parts, 1)
     first = np.concatenate([[0], np.cumsum([len(unique) for unique, _, _ in found])])
     inverse = np.empty(len(keys), dtype=np.int32)
 
@@ -71,11 +70,11 @@ def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], np
         _, places, rank = found[block.start]
         inverse[places] = rank + np.int32(first[block.start])
 
-    in_blocks(place_part, parts, 1)
+    run_in_blocks(place_part, parts, 1)
     return np.concatenate([unique for unique, _, _ in found]), inverse
 
 
-_NOTHING = (np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros(0, np.int32))
+_NO_KEYS = (np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros(0, np.int32))
 
 
 def _group_part(
@@ -83,7 +82,7 @@ def _group_part(
 ) -> tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]:
     """The unique keys at `places`, the places in ascending order of keys, and the rank of each key."""
     if len(places) == 0:
-        return _NOTHING
+        return _NO_KEYS
     key = keys[places] - least
     count = np.uint64(len(places))
     if int(key.max()) < (2**64 - len(places)) // len(places):
@@ -104,7 +103,7 @@ def _group_part(
     return sorted_key[new] + least, places[order], rank
 
 
-def once(keys: npt.NDArray[np.uint64]) -> IntArray:
+def find_single_keys(keys: npt.NDArray[np.uint64]) -> IntArray:
     """Indices (o,), ascending, of the keys (k,) that occur once."""
     ordered = np.sort(keys)
     differs = ordered[1:] != ordered[:-1]
@@ -120,7 +119,7 @@ def once(keys: npt.NDArray[np.uint64]) -> IntArray:
     def mark(block: slice) -> None:
         maybe[block] = table[_hash(keys[block])]
 
-    in_blocks(mark, len(keys), 16 * BLOCK)
+    run_in_blocks(mark, len(keys), 16 * BLOCK)
     places = np.flatnonzero(maybe)
     found = np.searchsorted(single, keys[places])
     known = found < len(single)

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.host.blocks import in_blocks
+from tetlux.meshing.host.blocks import run_in_blocks
 
 
-def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray, tetrahedra: IntArray) -> None:
+def run_on_corners(work: Callable[[slice, FloatArray], object], points: FloatArray, tetrahedra: IntArray) -> None:
     """Call ``work(block, corners)`` for blocks of tetrahedra, on all cores.
 
     Parameters
@@ -24,11 +24,11 @@ def over_corners(work: Callable[[slice, FloatArray], object], points: FloatArray
         nodes = np.ascontiguousarray(tetrahedra[block].T)
         work(block, np.stack([[axis[corner] for axis in coordinates] for corner in nodes]))
 
-    in_blocks(work_on, len(tetrahedra))
+    run_in_blocks(work_on, len(tetrahedra))
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products (3, b) of vectors (3, b): NumPy's own is several times slower."""
+    """Cross products (3, b) of vectors (3, b); `numpy.cross` is several times slower."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 

@@ -8,20 +8,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-# Seconds after which unfinished files count as left by a killed process.
-ABANDONED = 86_400.0
+# Age in seconds above which an unfinished file belongs to no running process: a day.
+LONGEST_RUN = 86_400.0
 
 
-def abandoned(path: Path) -> bool:
+def is_abandoned(path: Path) -> bool:
     """Whether a file or folder is too old to belong to a running process."""
-    return path.stat().st_mtime < time.time() - ABANDONED
+    return path.stat().st_mtime < time.time() - LONGEST_RUN
 
 
 @contextmanager
 def scratch(kind: str) -> Iterator[Path]:
-    """A folder ``tetlux-<kind>-...`` among the system's temporary files, removed at exit.
+    """Make a folder ``tetlux-<kind>-...`` among the system's temporary files, and remove it at the end.
 
-    Folders of the same kind that killed processes left are removed after a day.
+    Folders of the same kind that are older than a day are removed too: their processes were killed.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def scratch(kind: str) -> Iterator[Path]:
     """
     for path in Path(tempfile.gettempdir()).glob(f"tetlux-{kind}-*"):
         with suppress(OSError):
-            if abandoned(path):
+            if is_abandoned(path):
                 shutil.rmtree(path, ignore_errors=True)
     with tempfile.TemporaryDirectory(prefix=f"tetlux-{kind}-", ignore_cleanup_errors=True) as folder:
         yield Path(folder)
@@ -38,12 +38,12 @@ def scratch(kind: str) -> Iterator[Path]:
 def run_child(
     command: Sequence[str], folder: Path, seconds: float, environment: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command in a folder; it never outlives this call.
+    """Run a command in a folder; its process has always ended when this returns or raises.
 
     Raises
     ------
     subprocess.TimeoutExpired
-        If it exceeds the time limit.
+        If it takes longer than `seconds`.
     OSError
         If it cannot be started.
     """

@@ -27,7 +27,7 @@ def main() -> None:
     sys.path[:] = setting["paths"]
     import numpy as np  # noqa: PLC0415
 
-    tetrahedralize = _without_package(setting["pytetwild"])
+    tetrahedralize = _import_tetrahedralize(setting["pytetwild"])
     with np.load(Path("input.npz")) as job:
         points, tetrahedra = tetrahedralize(
             job["points"],
@@ -50,7 +50,7 @@ def die_with(parent: int) -> None:
             sys.exit("the process that asked for the mesh is gone")
 
 
-def _without_package(folder: str) -> Callable[..., Any]:
+def _import_tetrahedralize(folder: str) -> Callable[..., Any]:
     """Import pytetwild's function without the package's ``__init__``, which takes .3 s to import PyVista.
 
     Where that fails (``__init__`` of a Windows wheel locates its libraries), import the package as usual.

@@ -10,19 +10,19 @@ from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# A mesh whose boundary is more than this many deviations from the surface has lost a part.
-LOST = 2.5
-# Sample points that look for a lost part, which is larger than a triangle.
-SAMPLES = 3_000
+# A mesh that is farther from the surface than this many deviations lacks a part of the body.
+LOST_PART = 2.5
+# Sample points for the distance of a mesh from its surface: a lost part is larger than a triangle, so few suffice.
+PART_SAMPLES = 3_000
 
 
 class NotTheBodyError(RunError):
-    """The mesh does not represent the surface; one of a smaller deviation may."""
+    """The mesh does not represent the surface; a mesh within a smaller deviation may."""
 
 
-def has_lost_a_part(mesh: TetMesh, shell: Shell) -> bool:
-    """Whether the mesh is anywhere so far from a surface that a part must be missing."""
-    return surface_deviation(part_of(mesh, shell), shell.surface, SAMPLES) > LOST * shell.deviation
+def has_lost_part(mesh: TetMesh, shell: Shell) -> bool:
+    """Whether the mesh is so far from the surface of a shell, at some place, that it must lack a part."""
+    return surface_deviation(part_of(mesh, shell), shell.surface, PART_SAMPLES) > LOST_PART * shell.deviation
 
 
 def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:
@@ -39,8 +39,13 @@ def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:
 
 
 def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
-    """Refuse a mesh that does not represent the surface."""
-    # Nearly all boundary nodes are on the surface; facets cut off thin round parts, by at most the deviation.
+    """Refuse a mesh that does not represent a surface within a deviation, unit.
+
+    Raises
+    ------
+    NotTheBodyError
+    """
+    # Nearly all boundary nodes lie on the surface; flat facets cut off thin round parts by at most the deviation.
     slack = 0.02 + deviation * surface.area / surface.volume
     # The volume of a surface that crosses itself counts overlaps repeatedly; the mesh is of their union.
     lowest = -0.9 if surface.overlaps else -slack
@@ -58,13 +63,13 @@ def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
     _, first = np.unique(body_of, return_index=True)
     vertices = surface.points[surface.faces[first]].reshape(-1, 3)
     distances = np.linalg.norm(mesh.closest_boundary(vertices)[0] - vertices, axis=1)
-    if not surface.overlaps and (distances > LOST * deviation).any():
+    if not surface.overlaps and (distances > LOST_PART * deviation).any():
         raise NotTheBodyError(
             f"{surface.name}: the mesh lacks one of the surface's {len(first)} bodies, which is too small beside the "
             "others; leave it out, or make it larger."
         )
-    parted = parts_of(surface.points, surface.faces)
-    wanted = max(len(first), 0 if parted is None else int(parted.max()) + 1)
+    part_numbers = parts_of(surface.points, surface.faces)
+    wanted = max(len(first), 0 if part_numbers is None else int(part_numbers.max()) + 1)
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
     if parts > wanted:
         raise NotTheBodyError(

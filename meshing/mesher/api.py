@@ -12,17 +12,18 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError, RunError
-from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_a_part, part_of
-from tetlux.meshing.mesher.cache import cache_directory, mesh_key, remember_mesh, remembered_mesh
+from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_part, part_of
+from tetlux.meshing.mesher.cache import cache_directory, load_cached_mesh, mesh_key, store_cached_mesh
 from tetlux.meshing.mesher.child import run_pytetwild
 from tetlux.meshing.mesher.proxy import proxy
-from tetlux.meshing.mesher.shells import shells_of
+from tetlux.meshing.mesher.shells import make_shells
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import Surface, body_sizes
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import body_sizes
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import moved_to_surface
+from tetlux.meshing.tets.refine import move_to_surface
 from tetlux.meshing.tets.tagging import tag_tetrahedra
 
 # Measured with the settings below on 2 cores, without the cache. Seconds are the least of four runs; the other columns
@@ -51,8 +52,8 @@ EDGE_LENGTH = 1.0 / 12.0
 STOP_ENERGY = 9.5
 # Default seconds after which the mesher is stopped: ten times the time of slow bodies.
 TIME_LIMIT = 300.0
-# Factor on the deviation in the second attempt, made if the first mesh does not match the surface.
-SECOND = 0.3
+# Factor on the deviation in the second attempt, which follows if the first mesh does not represent the surface.
+SECOND_ATTEMPT = 0.3
 # Bodies of a mean thickness 2 V/A below this share of their diagonal are refused. A plate 60 wide and 1, .5 or .25
 # thick (.011, .0058, .0029) takes the mesher 2, 5 and over 60 s, with 2k and 8k tetrahedra in the first two; a needle
 # 100 widths long (.005) takes 2 s, one of 1000 (.0005) over 60 s.
@@ -74,7 +75,7 @@ def tetrahedralize(
     time_limit: float = TIME_LIMIT,
     cache: bool | str | Path = True,
 ) -> TetMesh:
-    """Mesh the inside of a closed surface with tetrahedra that conform to inner closed surfaces.
+    """Mesh the inside of a closed surface with tetrahedra that conform to the closed surfaces of its regions.
 
     The surfaces are decimated within a measured distance, pytetwild meshes the result in a separate process, and the
     nodes on surfaces are moved onto the given ones. Meshes are cached on disk.
@@ -84,7 +85,7 @@ def tetrahedralize(
     surface : Surface
     regions : sequence of Surface
         Closed surfaces inside the body or inside each other, in any order; see `check_regions`. A tetrahedron is in
-        region i if the i-th surface, counted from 1, is the innermost around it, and in region 0 if none is.
+        region i if surface i, counted from 1, is the innermost that contains it, and in region 0 if none contains it.
     edge_length : float, optional
         Target edge length, unit; a twelfth of the bounding box's diagonal if not given. Edges are shorter where
         thin parts need it.
@@ -116,7 +117,16 @@ def tetrahedralize(
 
     Notes
     -----
-    fTetWild (Hu et al. 2020) is not deterministic: the number of nodes varies by about a per cent between runs.
+    fTetWild (Hu et al. 2020) is not deterministic: the number of nodes varies by about one per cent between runs.
+
+    Examples
+    --------
+    >>> from tetlux.meshing import sphere
+    >>> mesh = tetrahedralize(sphere(10.0))
+    >>> 2000 < len(mesh.tetrahedra) < 4000
+    True
+    >>> abs(mesh.volume / sphere(10.0).volume - 1.0) < 0.04
+    True
     """
     for name, value in (
         ("edge_length", edge_length),
@@ -152,12 +162,12 @@ def tetrahedralize(
             pytetwild=version("pytetwild"),
             fast_simplification=version("fast-simplification"),
         )
-        known = remembered_mesh(key, directory, surface.unit)
-        if known is not None:
-            return known
+        cached = load_cached_mesh(key, directory, surface.unit)
+        if cached is not None:
+            return cached
     mesh = _mesh_body(surface, wanted, deviation, envelope, stop_energy, time_limit, regions)
     if directory is not None:
-        remember_mesh(key, directory, mesh)
+        store_cached_mesh(key, directory, mesh)
     return mesh
 
 
@@ -188,7 +198,7 @@ def _mesh_body(
 ) -> TetMesh:
     """Mesh the body; if the first mesh does not match the surface, mesh again within a smaller deviation."""
     end = time.monotonic() + time_limit
-    shells = shells_of(surface, regions, deviation)
+    shells = make_shells(surface, regions, deviation)
     if len(regions) > 0:
         envelope = min(envelope, *(ENVELOPE * shell.deviation for shell in shells))
     # Where two surfaces touch, fTetWild loses the orientation of their triangles, so its inside test fails.
@@ -200,7 +210,7 @@ def _mesh_body(
             for shell in shells
         ]
         seconds = end - time.monotonic()
-        mesh = _fill(
+        mesh = _mesh_proxies(
             surface, regions, coarse, edge_length, share * envelope, stop_energy, seconds, time_limit, filtered
         )
         for shell in shells:
@@ -209,13 +219,13 @@ def _mesh_body(
 
     try:
         mesh = attempt(1.0)
-        lost = any(has_lost_a_part(mesh, shell) for shell in shells)
+        lost = any(has_lost_part(mesh, shell) for shell in shells)
     except NotTheBodyError:
         lost = True
-    return attempt(SECOND) if lost else mesh
+    return attempt(SECOND_ATTEMPT) if lost else mesh
 
 
-def _fill(
+def _mesh_proxies(
     surface: Surface,
     regions: Sequence[Surface],
     coarse: Sequence[Surface],
@@ -226,7 +236,7 @@ def _fill(
     time_limit: float,
     filtered: bool,
 ) -> TetMesh:
-    """Mesh the proxies of the surfaces, and move the nodes on them onto the surfaces themselves."""
+    """Mesh the proxies of the surfaces, and move the nodes on the proxies to the surfaces."""
     # Scaled to unit size about the origin, since some of fTetWild's tolerances are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     first = np.cumsum([0, *(len(each.points) for each in coarse)])
@@ -244,14 +254,14 @@ def _fill(
     )
     points = points * size + origin
     tags = tag_tetrahedra(points, tetrahedra, coarse[0], coarse[1:], envelope) if len(regions) > 0 else None
-    mesh = _clean(points, tetrahedra, surface, tags)
-    return moved_to_surface(mesh, surface, regions)
+    mesh = _remove_debris(points, tetrahedra, surface, tags)
+    return move_to_surface(mesh, surface, regions)
 
 
-def _clean(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
-    """A mesh without flat tetrahedra, small debris, unused nodes and tetrahedra tagged as outside (-1).
+def _remove_debris(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: IntArray | None = None) -> TetMesh:
+    """Make a mesh without flat tetrahedra, debris, unused nodes and tetrahedra tagged as outside (-1).
 
-    Debris is what fTetWild's envelope can leave beside the body.
+    Debris are small separate tetrahedra that fTetWild leaves inside its envelope, beside the body.
     """
     if tags is not None:
         tetrahedra, tags = tetrahedra[tags >= 0], tags[tags >= 0]
@@ -261,15 +271,15 @@ def _clean(points: FloatArray, tetrahedra: IntArray, surface: Surface, tags: Int
     if (volumes < 0).any():
         raise RunError(f"{surface.name}: the mesher returned inverted tetrahedra; repair the surface in a mesh editor.")
     keep = volumes > 0
-    lump = bodies(len(points), tetrahedra)
-    share = np.bincount(lump, volumes) / volumes.sum()
-    keep &= share[lump] > _largest_debris(surface)
+    component = bodies(len(points), tetrahedra)
+    share = np.bincount(component, volumes) / volumes.sum()
+    keep &= share[component] > _largest_debris(surface)
     mesh = TetMesh(*compact(points, tetrahedra[keep]), surface.unit)
     return mesh if tags is None else replace(mesh, regions=tags[keep])
 
 
 def _largest_debris(surface: Surface) -> float:
-    """The share of the volume below which a separate lump is debris; smaller than every body of the surface."""
+    """The share of the volume below which a connected component is debris: less than any body of the surface has."""
     if surface.overlaps:
         return DEBRIS
     volume, _ = body_sizes(surface.points, surface.faces, bodies(len(surface.points), surface.faces))

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.meshing.host.scratch import abandoned
+from tetlux.meshing.host.scratch import is_abandoned
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Raise it when the code makes other meshes for the same settings, or writes them differently.
+# Increase it when the same settings give another mesh, or when the files change.
 FORMAT = 2
 # Largest cache size, bytes; the least recently used entries are removed first.
-LIMIT = 1_000_000_000
+LARGEST_CACHE = 1_000_000_000
 
 
 def cache_directory() -> Path | None:
@@ -26,17 +26,17 @@ def cache_directory() -> Path | None:
 
     None if there is none, as for a container's user without a home.
     """
-    own = os.environ.get("TETLUX_CACHE_DIR")
-    if own:
-        return Path(own)
+    chosen = os.environ.get("TETLUX_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
     with contextlib.suppress(RuntimeError):
         if sys.platform == "darwin":
             return Path.home() / "Library" / "Caches" / "tetlux"
         if os.name == "nt":
             return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "tetlux"
         # The XDG specification: relative paths are to be ignored.
-        given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-        return (given if given.is_absolute() else Path.home() / ".cache") / "tetlux"
+        user = Path(os.environ.get("XDG_CACHE_HOME", ""))
+        return (user if user.is_absolute() else Path.home() / ".cache") / "tetlux"
     return None
 
 
@@ -51,9 +51,9 @@ def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: floa
     return digest.hexdigest()
 
 
-def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
+def load_cached_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     """The cached mesh of a key, or None if there is none or its file is unusable."""
-    path = _entry(key, directory)
+    path = _entry_path(key, directory)
     try:
         # Opened here, since np.load does not close a truncated file.
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
@@ -69,8 +69,8 @@ def remembered_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     return mesh
 
 
-def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
-    """Cache a mesh under a key; do nothing if files cannot be written."""
+def store_cached_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
+    """Write a mesh to the cache under a key; do nothing if files cannot be written."""
     with contextlib.suppress(OSError, MemoryError):
         directory.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=directory, suffix=".part")
@@ -86,30 +86,30 @@ def remember_mesh(key: str, directory: Path, mesh: TetMesh) -> None:
                     key=np.array(key),
                 )
             # An atomic rename, so that other processes see the whole entry or none.
-            part.replace(_entry(key, directory))
+            part.replace(_entry_path(key, directory))
         except BaseException:
             part.unlink()
             raise
         _make_room(directory)
 
 
-def _entry(key: str, directory: Path) -> Path:
+def _entry_path(key: str, directory: Path) -> Path:
     return directory / f"{key}.npz"
 
 
 def _make_room(directory: Path) -> None:
-    """Remove the least recently used entries beyond the limit, and files that dead processes left unfinished."""
-    found = []
+    """Remove the least recently used entries beyond the size limit, and unfinished files of killed processes."""
+    entries = []
     for path in directory.iterdir():
         with contextlib.suppress(OSError):  # another process may be removing it too
             status = path.stat()
             if path.suffix == ".npz":
-                found.append((status.st_mtime, status.st_size, path))
-            elif path.suffix == ".part" and abandoned(path):
+                entries.append((status.st_mtime, status.st_size, path))
+            elif path.suffix == ".part" and is_abandoned(path):
                 path.unlink()
-    total = sum(size for _, size, _ in found)
-    for _, size, path in sorted(found, key=lambda entry: entry[0]):
-        if total <= LIMIT:
+    total = sum(size for _, size, _ in entries)
+    for _, size, path in sorted(entries, key=lambda entry: entry[0]):
+        if total <= LARGEST_CACHE:
             break
         with contextlib.suppress(OSError):
             path.unlink()

@@ -13,7 +13,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
 
-# Meshes input.npz of its working directory. With -S (no site packages), since module paths are passed to it.
+# The command that meshes input.npz of its working directory; -S (no site packages), since it is given module paths.
 MESHER: tuple[str, ...] = (sys.executable, "-S", str(Path(__file__).with_name("_mesher_process.py")))
 MAKE_ROOM = "make room in the system's folder for temporary files, or name another one in TMPDIR."
 
@@ -30,7 +30,37 @@ def run_pytetwild(
     name: str,
     filtered: bool = True,
 ) -> tuple[FloatArray, IntArray]:
-    """Mesh a surface: points and tetrahedra; if not filtered, including tetrahedra outside the body."""
+    """Mesh a surface by pytetwild in a child process.
+
+    Parameters
+    ----------
+    points : (n, 3) ndarray
+        Vertices.
+    faces : (f, 3) ndarray
+        Triangles, outward oriented.
+    edge_length : float
+        Target edge length, in the unit of `points`.
+    epsilon : float
+        Envelope, as a share of the bounding box's diagonal.
+    stop_energy : float
+        AMIPS energy at which a tetrahedron is good enough.
+    seconds, time_limit : float
+        Seconds that remain, and the limit that a message names.
+    name : str
+        The surface, for messages.
+    filtered : bool
+        Whether to leave out tetrahedra outside the surface.
+
+    Returns
+    -------
+    points : (k, 3) ndarray
+    tetrahedra : (m, 4) ndarray
+
+    Raises
+    ------
+    RunError
+        If pytetwild fails, is killed, exceeds the time, or its files cannot be written.
+    """
     try:
         with scratch("mesher") as folder:
             np.savez(

@@ -6,13 +6,13 @@ from tetlux.meshing.arrays import FloatArray, spread_indices
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Sample points per surface, at 4 µs each. A surface with more vertices is far finer than the other one, so a subset of
-# its vertices gives the same distance.
-SAMPLES = 6_000
+# Sample points per surface, at 4 µs each. A surface with more vertices is far finer than the other surface, so a subset
+# of its vertices gives the same distance.
+DISTANCE_SAMPLES = 6_000
 
 
-def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) -> float:
-    """Largest distance from either surface to the other, unit: the Hausdorff distance, sampled.
+def two_sided_distance(first: Surface, second: Surface, samples: int = DISTANCE_SAMPLES) -> float:
+    """The largest distance from either surface to the other, unit: the Hausdorff distance at sample points.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def two_sided_distance(first: Surface, second: Surface, samples: int = SAMPLES) 
     return max(_farthest(first, second, samples), _farthest(second, first, samples))
 
 
-def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = SAMPLES) -> float:
+def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = DISTANCE_SAMPLES) -> float:
     """Two-sided distance between a mesh's boundary and a surface, unit."""
     return two_sided_distance(mesh.surface, surface, samples)
 

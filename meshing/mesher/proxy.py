@@ -11,26 +11,27 @@ from tetlux.meshing.repair.crossings import count_self_intersections
 from tetlux.meshing.repair.pinches import pull_apart
 from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
-from tetlux.meshing.surface.surface import Surface, signed_volume, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
-# Triangles that quadrics need to stay within a deviation d are about this x area / (d x diagonal): 1.5 on a
-# sphere, 5 to 10 on organic and mechanical surfaces. The first try; the next ones follow from what it measured.
-TRIANGLES = 6.0
-# fast-simplification's `agg`: at its default, 7, it collapses in haste and needs twice the triangles for the
-# same distance; at 3 and below it stops short of the count wanted.
-HASTE = 4.0
-# Decimations that are measured, and triangle counts tried for each until one is closed and manifold: quadric
-# decimation occasionally merges sheets, and a slightly different count does not.
-TRIES = 6
-COUNTS = 4
-# Sample points of the first measurement; a decimation that passes it is measured at more.
-ROUGHLY = 1_500
-# A proxy with less than this share of the allowed deviation has more triangles than needed.
-GOOD_USE = 0.6
-# A part of at most this many triangles, attached by an edge of four triangles, is removed as a flap.
-CRUMB = 8
+# Quadric decimation within a deviation d needs about this x area / (d x diagonal) triangles: 1.5 on a sphere, 5 to 10
+# on organic and mechanical surfaces. It gives the first count; later counts follow from measured distances.
+TRIANGLES_NEEDED = 6.0
+# fast-simplification's `agg`: at its default, 7, the same distance needs twice the triangles; at 3 and below,
+# decimation ends above the wanted count.
+AGGRESSIVENESS = 4.0
+# Proxies whose distance is measured, and triangle counts tried for each until a proxy is closed and manifold: quadric
+# decimation occasionally merges sheets, and with a slightly different count it does not.
+MEASURED_PROXIES = 6
+COUNTS_TRIED = 4
+# Sample points of the first measurement of a proxy; one that passes is measured again at DISTANCE_SAMPLES.
+FIRST_SAMPLES = 1_500
+# A proxy closer to the surface than this share of the allowed deviation has more triangles than needed.
+USED_DEVIATION = 0.6
+# A part with at most this many triangles, attached by an edge of four triangles, is a flap and is removed.
+LARGEST_FLAP = 8
 # Surfaces of fewer triangles are not decimated.
-FEWEST = 300
+FEWEST_TRIANGLES = 300
 
 
 def proxy(surface: Surface, deviation: float) -> Surface:
@@ -46,7 +47,7 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     -------
     Surface
         Closed, manifold, outward oriented, of as many bodies as `surface`, and free of self-intersections if
-        `surface` is; `surface` itself if nothing coarser is all that.
+        `surface` is; `surface` itself if no coarser surface is.
 
     Raises
     ------
@@ -59,13 +60,13 @@ def proxy(surface: Surface, deviation: float) -> Surface:
     """
     if not np.isfinite(deviation) or deviation <= 0:
         raise InputError(f"deviation is {deviation:g}; give a length greater than 0.")
-    apart = pull_apart(surface.points, surface.faces)
-    if apart is None or len(apart[0]) == len(surface.points):
+    separated = pull_apart(surface.points, surface.faces)
+    if separated is None or len(separated[0]) == len(surface.points):
         return _decimate(surface, deviation)
-    return _merge([_decimate(part, deviation) for part in _parts(surface, *apart)], surface)
+    return _merge([_decimate(part, deviation) for part in _connected_parts(surface, *separated)], surface)
 
 
-def _parts(surface: Surface, points: FloatArray, faces: IntArray) -> list[Surface]:
+def _connected_parts(surface: Surface, points: FloatArray, faces: IntArray) -> list[Surface]:
     """The connected parts of a surface separated at pinches, without walls between bodies, which bound no volume."""
     body = bodies(len(points), faces)
     parts = []
@@ -89,44 +90,44 @@ def _merge(parts: list[Surface], surface: Surface) -> Surface:
 
 
 def _decimate(surface: Surface, deviation: float) -> Surface:
-    """Decimate a manifold surface; the surface itself if no coarser one is close enough and sound."""
-    if len(surface.faces) <= FEWEST:
+    """Decimate a manifold surface; the surface itself if no coarser one is close enough, closed and manifold."""
+    if len(surface.faces) <= FEWEST_TRIANGLES:
         return surface
-    wanted = min(TRIANGLES * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
+    wanted = min(TRIANGLES_NEEDED * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
     # Scaled to unit size about the origin, since fast-simplification's thresholds are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     fine: tuple[FloatArray, IntArray] = (surface.points - origin) / size, surface.faces
     # Do most of the decimation once instead of once per attempt.
     base = _decimate_to(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
     best = surface
-    for _ in range(TRIES):
-        count = int(max(wanted, FEWEST))
+    for _ in range(MEASURED_PROXIES):
+        count = int(max(wanted, FEWEST_TRIANGLES))
         if count >= 0.8 * len(best.faces):
             break
         if count > 0.6 * len(base[1]):
             base = fine
-        coarse = _sound(surface, base, count, origin, size)
+        coarse = _decimate_soundly(surface, base, count, origin, size)
         if coarse is None:
             wanted *= 2.0
             continue
-        distance = two_sided_distance(coarse, surface, ROUGHLY)
+        distance = two_sided_distance(coarse, surface, FIRST_SAMPLES)
         if distance <= deviation:
             distance = two_sided_distance(coarse, surface)
         if distance <= deviation:
             best = coarse
-            if distance > GOOD_USE * deviation or count <= FEWEST:
+            if distance > USED_DEVIATION * deviation or count <= FEWEST_TRIANGLES:
                 break
         # The distance of a chord from its arc grows with the edge squared, and so with the inverse of the count.
         wanted = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
     return best
 
 
-def _sound(
+def _decimate_soundly(
     surface: Surface, base: tuple[FloatArray, IntArray], count: int, origin: FloatArray, size: float
 ) -> Surface | None:
-    """Decimate to about `count` triangles with as many bodies as the surface; None if no attempt has."""
+    """Decimate to about `count` triangles; None if no result is manifold with as many bodies as the surface."""
     wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
-    for attempt in range(COUNTS):
+    for attempt in range(COUNTS_TRIED):
         target = int(count * (1.0 + 0.04 * attempt))
         if target >= len(base[1]):
             return None
@@ -145,14 +146,14 @@ def _sound(
 def _decimate_to(points: FloatArray, faces: IntArray, count: int) -> tuple[FloatArray, IntArray]:
     from fast_simplification import simplify  # noqa: PLC0415
 
-    points, faces = simplify(points, faces.astype(np.int32), target_count=count, agg=HASTE)
-    return compact(np.asarray(points, dtype=np.float64), _without_flaps(faces.astype(np.int64)))
+    points, faces = simplify(points, faces.astype(np.int32), target_count=count, agg=AGGRESSIVENESS)
+    return compact(np.asarray(points, dtype=np.float64), _remove_flaps(faces.astype(np.int64)))
 
 
-def _without_flaps(faces: IntArray) -> IntArray:
-    """Remove flaps that quadric decimation leaves at thin places: a few triangles attached by edges of four triangles.
+def _remove_flaps(faces: IntArray) -> IntArray:
+    """Remove the flaps of quadric decimation at thin places: a few triangles attached by an edge of four triangles.
 
-    Most are two triangles back to back; some are a tetrahedron.
+    Most flaps are two triangles back to back; some are a tetrahedron.
     """
     from scipy.sparse import coo_matrix  # noqa: PLC0415
     from scipy.sparse.csgraph import connected_components  # noqa: PLC0415
@@ -164,10 +165,10 @@ def _without_flaps(faces: IntArray) -> IntArray:
     pairs = plain[np.argsort(edges.edge[plain], kind="stable")].reshape(-1, 2) % len(faces)
     graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(faces), len(faces)))
     _, part = connected_components(graph, directed=False)
-    return faces[np.bincount(part)[part] > CRUMB]
+    return faces[np.bincount(part)[part] > LARGEST_FLAP]
 
 
 def _is_manifold(faces: IntArray) -> bool:
-    """Whether two triangles of opposite direction meet at each edge."""
+    """Whether each edge has two triangles, which traverse it in opposite directions."""
     edges = Edges(faces)
     return bool((edges.triangles == 2).all() and (edges.balance == 0).all())

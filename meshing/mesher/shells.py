@@ -15,8 +15,8 @@ from tetlux.meshing.tets.nesting import nesting
 # The proxy of each surface has its own deviation (with a common one the first case takes 2 to 4 times as long); the
 # envelope is common.
 INNER_DEVIATION = 0.03
-# A region with less than this share of its volume outside its inner regions counts as filled by them.
-LEFT = 1e-6
+# A region whose inner regions leave less than this share of its volume is filled by them, as by layers.
+EMPTY_REGION = 1e-6
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,19 @@ class Shell:
     regions: tuple[int, ...] = ()
 
 
-def shells_of(surface: Surface, regions: Sequence[Surface], deviation: float) -> list[Shell]:
-    """The shells of the body and of its regions, with their deviations."""
+def make_shells(surface: Surface, regions: Sequence[Surface], deviation: float) -> list[Shell]:
+    """Make the shells of the body and of its regions, each with its deviation."""
     if len(regions) == 0:
         return [Shell(surface, deviation)]
     nested = nesting(surface, regions)
     surfaces = [surface, *(replace(s, name=f"region {i} ({s.name})") for i, s in enumerate(regions, 1))]
     by_thickness = []
     for i, each in enumerate(surfaces):
-        held = [surfaces[j] for j, parent in enumerate(nested.parents, 1) if parent == i]
-        own = each.volume - sum(inner.volume for inner in held)
-        thickness = 2.0 * own / (each.area + sum(inner.area for inner in held))
+        children = [surfaces[j] for j, parent in enumerate(nested.parents, 1) if parent == i]
+        own = each.volume - sum(inner.volume for inner in children)
+        thickness = 2.0 * own / (each.area + sum(inner.area for inner in children))
         # Layers may fill the whole region.
-        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > LEFT * each.volume else math.inf)
+        by_thickness.append(DEVIATION_OF_THICKNESS * thickness if own > EMPTY_REGION * each.volume else math.inf)
     shells = [Shell(surface, min(deviation, by_thickness[0]), nested.touching[0], tuple(nested.within(0)))]
     for i, (each, parent) in enumerate(zip(surfaces[1:], nested.parents, strict=True), 1):
         # The regions on both sides of it may be thin.

@@ -5,13 +5,13 @@ from typing import Literal
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.caps import cap
 from tetlux.meshing.repair.rims import join_nested_rims
 from tetlux.meshing.repair.topology import Edges, boundary_loops
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 
 Holes = Literal["small", "close", "refuse"]
 # A hole wider than this share of the diagonal is a missing part; closing it would invent a shape.
@@ -157,4 +157,4 @@ def _caps_sentence(areas: list[float], places: list[str], unit: str) -> str:
 
 def _middle(points: FloatArray, loop: IntArray) -> str:
     """The centre of a rim, as text."""
-    return place_words(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))
+    return as_text(points[loop].mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))))

@@ -7,7 +7,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.repair.topology import Edges, bodies, components
 from tetlux.meshing.search.proximity import winding_number
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.triangles import signed_volume
 
 # A surface with more separate bodies is refused as fragmented.
 MOST_BODIES = 1000

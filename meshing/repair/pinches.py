@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import winding_number
-from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
-from tetlux.meshing.surface.surface import signed_volume
+from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
+from tetlux.meshing.surface.triangles import signed_volume
 
 # Triangles at one edge with less than this angle between them, radians, coincide.
 SAME_PLANE = 1e-4
@@ -43,10 +43,10 @@ def pull_apart(points: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArra
         Two triangles at each edge, one fan at each vertex.
         None instead of both if the surface is not consistently oriented.
     """
-    edges = edges_of(faces)
+    edges = number_triangle_edges(faces)
     crowded = np.bincount(edges[1].ravel(), minlength=len(edges[0])) > 2
     if crowded.any():
-        points, faces, _ = split_edges(points, faces, edges, with_longest(points, edges, crowded))
+        points, faces, _ = split_edges(points, faces, edges, mark_longest_edges(points, edges, crowded))
     pairs = _pairs(points, faces)
     if pairs is None:
         return None
@@ -136,7 +136,7 @@ def _following(side: IntArray) -> IntArray:
 
 def _pairs(points: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray] | None:
     """Pairs of sides that meet at an edge of one part, each once; side 3 f + k of face f starts at its corner k."""
-    ends, number = edges_of(faces)
+    ends, number = number_triangle_edges(faces)
     number = number.ravel()
     up = faces.ravel() == ends[number, 0]
     if np.bincount(number, np.where(up, 1, -1)).any():

@@ -17,7 +17,8 @@ from tetlux.meshing.repair.seams import stitch
 from tetlux.meshing.repair.specks import drop_specks
 from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
-from tetlux.meshing.surface.surface import UNITS, Surface, signed_volume, triangle_areas
+from tetlux.meshing.surface.surface import UNITS, Surface
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 # Bounds on coordinates, in any unit.
 LONGEST = 1e30

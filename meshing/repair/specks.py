@@ -3,10 +3,10 @@
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.repair.topology import bodies, compact
 from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
-from tetlux.meshing.surface.surface import body_sizes
+from tetlux.meshing.surface.triangles import body_sizes
 
 # A body with a mean thickness 2 V/A below this many deviations of the mesher is dropped. Balls and cubes beside a ball
 # of 20 were meshed down to .2: in 2 s above 1, 3 s at .45, 6 to 12 s at .2, where a second attempt is needed.
@@ -65,7 +65,7 @@ def _sentence(points: FloatArray, faces: IntArray, body: IntArray, specks: IntAr
     largest = float(np.linalg.norm(extent[specks], axis=1).max())
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     middles = [points[faces[body == one]].mean(axis=(0, 1)) for one in specks[:DESCRIBED]]
-    places = ", ".join(place_words(middle, size) for middle in middles)
+    places = ", ".join(as_text(middle, size) for middle in middles)
     more = f" and {len(specks) - DESCRIBED} more places" if len(specks) > DESCRIBED else ""
     what = "a speck" if len(specks) == 1 else f"{len(specks):,} specks"
     return f"dropped {what} of up to {largest:.2g} {unit}, smaller than the mesh can show, at {places}{more}."

@@ -1,4 +1,4 @@
-"""Find the tetrahedra that straight paths pass or that contain points, for thousands at once."""
+"""Find the tetrahedra that straight paths cross, and those that contain points, for thousands at once."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,23 +8,23 @@ from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.host.corners import dot, face_normals, over_corners
+from tetlux.meshing.host.corners import dot, face_normals, run_on_corners
 
-# How far outside a tetrahedron, in barycentric coordinates, a path may run and still count as inside.
+# A path whose barycentric coordinates are above minus this lies inside the tetrahedron.
 SLACK = 1e-9
-# The same for a point and the tetrahedron that it is deepest in; thin tetrahedra lose this many digits.
+# The same for single points: rounding in thin tetrahedra is of this size.
 POINT_SLACK = 1e-6
 # Children per box of the tree, and pairs of a path and a box that are processed at once (some megabytes).
 CHILDREN = 8
-PORTION = 1 << 13
+PAIRS_AT_ONCE = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
 class PathSegments:
     """Paths cut into segments, one per tetrahedron.
 
-    The segments of a path cover it without overlap. Where it runs along a face or an edge, the segment belongs to the
-    tetrahedron that it enters first.
+    The segments of a path cover it without overlap. Along a face or an edge, the segment belongs to the tetrahedron
+    that the path enters first.
 
     Parameters
     ----------
@@ -33,9 +33,10 @@ class PathSegments:
     cells : (s,) ndarray
         The tetrahedron of each segment; -1 outside the mesh.
     enter, leave : (s,) ndarray
-        Distances along the path at which the segment begins and ends.
+        Distances along the path at which the segment begins and ends, unit.
     weights, slopes : (s, 4) ndarray
-        Barycentric coordinates at its beginning, and their derivatives along the path; 0 outside the mesh.
+        Barycentric coordinates at the beginning of the segment, and their derivatives along the path, 1/unit; 0 outside
+        the mesh.
     """
 
     paths: IntArray
@@ -65,7 +66,7 @@ class CellTree:
         def fill(block: slice, corners: FloatArray) -> None:
             low[:, block], high[:, block] = corners.min(axis=0), corners.max(axis=0)
 
-        over_corners(fill, points, tetrahedra)
+        run_on_corners(fill, points, tetrahedra)
         # The leaf order of a k-d tree keeps neighbours together, also in graded meshes.
         leaves = cKDTree((0.5 * (low + high)).T, balanced_tree=False, compact_nodes=False)
         self._order = np.asarray(leaves.indices, dtype=np.int64)
@@ -100,7 +101,7 @@ class CellTree:
         """
         for some, near, cells in self._near(starts, directions, lengths):
             base, slopes = self._lines(cells, starts[near], directions[near])
-            # Along a face a coordinate is constant: the path is on its inner side everywhere or nowhere.
+            # A path parallel to a face is on its inner side everywhere or nowhere.
             change = np.where(np.abs(slopes) < 1e-200, 1e-200, slopes)
             roots = -(base + SLACK) / change
             enter = np.where(change > 0, roots, -np.inf).max(axis=0).clip(min=0.0)
@@ -116,7 +117,7 @@ class CellTree:
             chosen = hit[order[inside]]
             begin = np.maximum(enter, covered)[inside]
             weights = base[:, chosen] + begin * slopes[:, chosen]
-            # Far from a small tetrahedron, coordinates at the start are huge, and their sum lost digits.
+            # Coordinates are huge at a start far from a small tetrahedron, and their sum has lost digits.
             weights[0] = 1.0 - weights[1:].sum(axis=0)
             none = np.zeros((len(outside), 4))
             yield PathSegments(
@@ -157,13 +158,13 @@ class CellTree:
         self, starts: FloatArray, directions: FloatArray, lengths: FloatArray
     ) -> Iterator[tuple[slice, IntArray, IntArray]]:
         """Slices of paths, with the pairs (paths, cells) whose boxes intersect, in ascending order of paths."""
-        # A path perpendicular to an axis is within a box's range on that axis everywhere or nowhere.
+        # A path perpendicular to an axis is inside a box's interval on that axis everywhere or nowhere.
         per_length = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
         everything = np.arange(len(starts))
         todo = [(0, len(starts), len(self._levels) - 1, everything, np.zeros_like(everything))]
         while todo:
             first, last, level, paths, boxes = todo.pop()
-            if len(paths) > PORTION and last - first > 1:
+            if len(paths) > PAIRS_AT_ONCE and last - first > 1:
                 middle = (first + last) // 2
                 half = int(np.searchsorted(paths, middle))
                 todo.append((middle, last, level, paths[half:], boxes[half:]))

@@ -6,8 +6,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 
-# Coordinates are clipped to this range of single precision.
-FARTHEST = 1e12
+# Coordinates are clipped to this range, whose squares single precision can hold.
+SINGLE_RANGE = 1e12
 
 
 class Embree:
@@ -24,13 +24,13 @@ class Embree:
         from embreex.rtcore_scene import EmbreeScene  # noqa: PLC0415
 
         self._scene = EmbreeScene(robust=True)
-        TriangleMesh(self._scene, _single(corners))
+        TriangleMesh(self._scene, _to_single(corners))
 
     def __call__(self, starts: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
         """The first triangle that each ray (q, 3) hits, -1 for none, and the distance to six digits."""
-        met = self._scene.run(_single(starts), np.ascontiguousarray(directions, dtype=np.float32), output=True)
-        return np.asarray(met["primID"], dtype=np.int64), np.asarray(met["tfar"], dtype=np.float64)
+        hits = self._scene.run(_to_single(starts), np.ascontiguousarray(directions, dtype=np.float32), output=True)
+        return np.asarray(hits["primID"], dtype=np.int64), np.asarray(hits["tfar"], dtype=np.float64)
 
 
-def _single(places: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
-    return np.asarray(np.clip(places, -FARTHEST, FARTHEST), dtype=np.float32)
+def _to_single(points: FloatArray) -> np.ndarray[Any, np.dtype[np.float32]]:
+    return np.asarray(np.clip(points, -SINGLE_RANGE, SINGLE_RANGE), dtype=np.float32)

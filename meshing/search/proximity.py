@@ -1,4 +1,4 @@
-"""Nearest points, overlapping boxes, winding numbers and line intersections of triangles."""
+"""Closest points, overlapping boxes, winding numbers and line intersections of triangles."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,14 +7,14 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
-# Lines at less than this sine of the angle to a triangle's plane count as parallel.
+# A line whose angle to a triangle's plane has a sine below this is parallel to it.
 PARALLEL = 1e-9
 # Pairs of boxes processed at once (tens of megabytes).
-PORTION = 1 << 18
+BOX_PAIRS_AT_ONCE = 1 << 18
 
 
 class ClosestPoint:
-    """Nearest point of a triangle soup, by VTK's static cell locator (about 10 µs a point).
+    """Closest points of a set of triangles, by VTK's static cell locator (about 10 µs per query).
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class ClosestPoint:
         self._locator = cell_locator(points, faces)
 
     def __call__(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Nearest points (q, 3) and the faces (q,) that they lie on, for queries (q, 3)."""
+        """Closest points (q, 3) of the triangles to queries (q, 3), and the triangle of each, (q,)."""
         from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
 
         nearest = np.empty((len(queries), 3))
@@ -115,17 +115,17 @@ def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntAr
     while todo:
         level, i, j = todo.pop()
         if level == 0:
-            apart = i != j
-            yield order[i[apart]], order[j[apart]]
-        elif len(i) > PORTION:
+            distinct = i != j
+            yield order[i[distinct]], order[j[distinct]]
+        elif len(i) > BOX_PAIRS_AT_ONCE:
             half = len(i) // 2
             todo += [(level, i[:half], j[:half]), (level, i[half:], j[half:])]
         else:
             lows, highs = levels[level - 1]
             i, j = 2 * i, 2 * j
-            # For a node paired with itself, (second child, first child) repeats (first, second).
-            other = i != j
-            i, j = np.concatenate([i, i, i + 1, i[other] + 1]), np.concatenate([j, j + 1, j + 1, j[other]])
+            # For a node paired with itself, the pair (second child, first child) repeats (first, second).
+            distinct = i != j
+            i, j = np.concatenate([i, i, i + 1, i[distinct] + 1]), np.concatenate([j, j + 1, j + 1, j[distinct]])
             for lowest, highest in zip(lows, highs, strict=True):
                 keep = (lowest[i] <= highest[j]) & (lowest[j] <= highest[i])
                 i, j = i[keep], j[keep]
@@ -199,7 +199,7 @@ def cross_segments(
     p = np.cross(directions, edge2)
     determinant = np.einsum("ij,ij->i", edge1, p)
     size = np.prod([np.linalg.norm(v, axis=1) for v in (edge1, edge2, directions)], axis=0)
-    # Products with an origin near the end of the number range overflow; such a line misses the triangle.
+    # Products of huge origins overflow; such a line misses the triangle.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         inverse = 1.0 / determinant
         s = origins - corners[:, 0]

@@ -44,25 +44,25 @@ class RayCaster:
         Returns
         -------
         distances : (q,) ndarray
-            inf for rays without a hit.
+            Unit; inf for rays without a hit.
         faces : (q,) ndarray
             -1 for rays without a hit.
         """
         if len(origins) == 0:
             return np.zeros(0), np.zeros(0, dtype=np.int64)
         # Move distant origins near the triangles, where coordinates keep their precision.
-        gone = np.maximum(np.einsum("ij,ij->i", self._origin - origins, directions) - self._size, 0.0)
-        origins = origins + gone[:, None] * directions
+        skipped = np.maximum(np.einsum("ij,ij->i", self._origin - origins, directions) - self._size, 0.0)
+        origins = origins + skipped[:, None] * directions
         offset = OFFSET * self._size
         starts = (origins + offset * directions - self._origin) / self._size
-        faces, rough = self._engine(starts, directions)
+        faces, approximate = self._engine(starts, directions)
         # The engine finds the triangle; its distance is recomputed in double precision.
         corners = self._corners[faces]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         with np.errstate(divide="ignore", invalid="ignore"):
             exact = np.einsum("ij,ij->i", corners[:, 0] - origins, normals)
             exact /= np.einsum("ij,ij->i", directions, normals)
-        rough = rough * self._size + offset
+        approximate = approximate * self._size + offset
         with np.errstate(invalid="ignore"):
-            distances = np.where(np.abs(exact - rough) < 10.0 * offset, exact, rough)
-        return np.where(faces >= 0, gone + distances, np.inf), faces
+            distances = np.where(np.abs(exact - approximate) < 10.0 * offset, exact, approximate)
+        return np.where(faces >= 0, skipped + distances, np.inf), faces

@@ -9,11 +9,11 @@ from tetlux.meshing.search.proximity import cell_locator
 
 # A ray within this distance of a triangle hits it. With 0, one in fifty rays aimed at an edge or a vertex of a sphere
 # passes between its triangles.
-TOLERANCE = 1e-10
-# Rays that can hit start within `NEAR` extents of the centre of the triangles and have passed all of them after
-# `LENGTH`.
-NEAR = 1.5
-LENGTH = 3.0
+HIT_TOLERANCE = 1e-10
+# Rays that can hit a triangle start within START_RANGE extents of the centre of the triangles, and have passed all
+# triangles after RAY_LENGTH extents.
+START_RANGE = 1.5
+RAY_LENGTH = 3.0
 # Triangles per bucket of the locator: 30 % faster than with the default of ten.
 PER_BUCKET = 3
 
@@ -37,14 +37,14 @@ class RayLocator:
 
         faces, distances = np.full(len(starts), -1), np.full(len(starts), np.inf)
         # VTK computes bucket indices from coordinates, so they must be finite. Comparisons with nan are false.
-        near = np.flatnonzero((np.abs(starts) <= NEAR).all(axis=1) & np.isfinite(directions).all(axis=1))
-        ends = starts[near] + LENGTH * directions[near]
-        share: Any = reference(0.0)
+        near = np.flatnonzero((np.abs(starts) <= START_RANGE).all(axis=1) & np.isfinite(directions).all(axis=1))
+        ends = starts[near] + RAY_LENGTH * directions[near]
+        parameter: Any = reference(0.0)
         sub: Any = reference(0)
         face: Any = reference(0)
-        place, weights = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        meet = self._locator.IntersectWithLine
+        point, weights = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        intersect = self._locator.IntersectWithLine
         for ray, start, end in zip(near.tolist(), starts[near].tolist(), ends.tolist(), strict=True):
-            if meet(start, end, TOLERANCE, share, place, weights, sub, face):
-                faces[ray], distances[ray] = int(face), LENGTH * float(share)
+            if intersect(start, end, HIT_TOLERANCE, parameter, point, weights, sub, face):
+                faces[ray], distances[ray] = int(face), RAY_LENGTH * float(parameter)
         return faces, distances

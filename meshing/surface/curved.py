@@ -13,9 +13,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.surface.subdivide import NEXT_CORNER
 
-# Corner i of a triangle is followed by corner i + 1.
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+# Corner i of a triangle is preceded by corner PREVIOUS_CORNER[i].
+PREVIOUS_CORNER = np.array([2, 0, 1])
 
 
 class CurvedPatches:
@@ -38,24 +39,24 @@ class CurvedPatches:
 
     def __call__(self, faces: IntArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Points (q, 3) and unit normals (q, 3) at barycentric weights (q, 3) of faces (q,)."""
-        wanted, index = np.unique(faces, return_inverse=True)
-        corners, along, middle = (part[index] for part in self._control_points(wanted))
+        distinct, index = np.unique(faces, return_inverse=True)
+        corners, along, middle = (part[index] for part in self._control_points(distinct))
         w = weights[:, :, None]
-        after, before = w[:, _NEXT], w[:, _LAST]
-        # along[:, i, 0] is a third of the way to the next corner, along[:, i, 1] a third of the way to the last.
+        after, before = w[:, NEXT_CORNER], w[:, PREVIOUS_CORNER]
+        # along[:, i, 0] is a third of the way to the next corner, along[:, i, 1] to the previous one.
         value = w**3 * corners + 3.0 * w**2 * (after * along[:, :, 0] + before * along[:, :, 1])
         position = value.sum(axis=1) + 6.0 * w.prod(axis=1) * middle
         slope = 3.0 * w**2 * corners + 6.0 * w * (after * along[:, :, 0] + before * along[:, :, 1])
         slope += (
-            3.0 * (after**2 * along[:, _NEXT, 1] + before**2 * along[:, _LAST, 0])
+            3.0 * (after**2 * along[:, NEXT_CORNER, 1] + before**2 * along[:, PREVIOUS_CORNER, 0])
             + 6.0 * after * before * middle[:, None]
         )
         normal = np.cross(slope[:, 1] - slope[:, 0], slope[:, 2] - slope[:, 0])
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         flat = self._normals[faces]
-        # Where a patch would fold over its own triangle, use the triangle's normal.
-        bad = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
-        return position, np.where(bad, flat, normal / np.where(length > 0, length, 1.0))
+        # Where a patch folds over its triangle, use the triangle's normal.
+        folded = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
+        return position, np.where(folded, flat, normal / np.where(length > 0, length, 1.0))
 
     def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Control points of faces (f,): corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
@@ -63,7 +64,7 @@ class CurvedPatches:
         normals = self._corner_normals[faces]
         smooth = self._smooth_sides[faces]
         along = np.empty((len(faces), 3, 2, 3))
-        for side, (other, edge) in enumerate(((_NEXT, np.arange(3)), (_LAST, _LAST))):
+        for side, (other, edge) in enumerate(((NEXT_CORNER, np.arange(3)), (PREVIOUS_CORNER, PREVIOUS_CORNER))):
             reach = corners[:, other] - corners
             height = np.einsum("fij,fij->fi", reach, normals) * smooth[:, edge]
             along[:, :, side] = corners + (reach - height[:, :, None] * normals) / 3.0
@@ -79,12 +80,12 @@ class CurvedPatches:
         count = len(self._faces)
         first, second = self._smooth_edges
         # The two sides of an edge run in opposite directions, so the start of one is the end of the other.
-        after_first, after_second = (3 * (edge // 3) + _NEXT[edge % 3] for edge in (first, second))
+        after_first, after_second = (3 * (edge // 3) + NEXT_CORNER[edge % 3] for edge in (first, second))
         ends = np.concatenate([first, after_first]), np.concatenate([after_second, second])
         graph = coo_array((np.ones(len(ends[0]), dtype=bool), ends), shape=(3 * count, 3 * count))
         _, fan = connected_components(graph, directed=False)
         corners = self._points[self._faces]
-        a, b = corners[:, _NEXT] - corners, corners[:, _LAST] - corners
+        a, b = corners[:, NEXT_CORNER] - corners, corners[:, PREVIOUS_CORNER] - corners
         size = np.einsum("fij,fij->fi", a, a) * np.einsum("fij,fij->fi", b, b)
         part = (np.cross(a, b) / np.where(size > 0, size, 1.0)[:, :, None]).reshape(-1, 3)
         total = np.column_stack([np.bincount(fan, part[:, i]) for i in range(3)])[fan]
@@ -102,7 +103,7 @@ class CurvedPatches:
     @cached_property
     def _smooth_edges(self) -> tuple[IntArray, IntArray]:
         """Edges that bend less than the crease angle, by the corners (3 face + place) where their two sides start."""
-        tail, head = self._faces, self._faces[:, _NEXT]
+        tail, head = self._faces, self._faces[:, NEXT_CORNER]
         key = (np.minimum(tail, head) * np.int64(len(self._points)) + np.maximum(tail, head)).ravel()
         order = np.argsort(key, kind="stable")
         same = key[order][1:] == key[order][:-1]

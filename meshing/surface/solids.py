@@ -10,8 +10,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, Vector
 
-# Tolerance for vertices on their shape, as a share of its size or of their distance from the origin.
-ROUNDING = 1e-9
+# Largest distance of a vertex from the shape that it lies on, as a share of the largest coordinate.
+ON_SHAPE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ Shape = Sphere | Box | Slab | Cylinder | Torus
 def lies_on(points: FloatArray, shape: Shape) -> bool:
     """Whether all points (n, 3) lie on the surface of a shape, within rounding."""
     scale = float(np.abs(points).max(initial=0.0))
-    return bool((shape.distance(points) <= ROUNDING * scale).all())
+    return bool((shape.distance(points) <= ON_SHAPE * scale).all())
 
 
 def _distance_from_box(points: FloatArray, half: FloatArray) -> FloatArray:

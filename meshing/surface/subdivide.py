@@ -1,25 +1,26 @@
-"""Split triangles with long edges, conformingly."""
+"""Split edges of triangle meshes so that the meshes stay conforming."""
 
 import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
-_NEXT = np.array([1, 2, 0])
+# Corner i of a triangle is followed by corner NEXT_CORNER[i].
+NEXT_CORNER = np.array([1, 2, 0])
 
 
-def edges_of(faces: IntArray) -> tuple[IntArray, IntArray]:
-    """The edges of triangles (f, 3): end nodes (e, 2), and the edge from each corner to the next, (f, 3)."""
-    ends = np.sort(np.stack([faces, faces[:, _NEXT]], axis=2).reshape(-1, 2), axis=1)
+def number_triangle_edges(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Number the edges of triangles (f, 3): end nodes (e, 2), and the edge from each corner to the next, (f, 3)."""
+    ends = np.sort(np.stack([faces, faces[:, NEXT_CORNER]], axis=2).reshape(-1, 2), axis=1)
     count = int(faces.max(initial=0)) + 1
     key, number = np.unique(ends[:, 0] * np.int64(count) + ends[:, 1], return_inverse=True)
     return np.column_stack([key // count, key % count]), number.reshape(-1, 3)
 
 
-def with_longest(points: FloatArray, edges: tuple[IntArray, IntArray], marked: BoolArray) -> BoolArray:
+def mark_longest_edges(points: FloatArray, edges: tuple[IntArray, IntArray], marked: BoolArray) -> BoolArray:
     """Mark the longest edge of every triangle with a marked edge, until nothing changes.
 
-    `edges` are those of `edges_of`, `marked` has shape (e,). Longest-edge splits keep triangles from degenerating
-    (Rivara 1984).
+    `edges` are those of `number_triangle_edges`, `marked` has shape (e,). Longest-edge splits keep triangles from
+    degenerating (Rivara 1984).
     """
     ends, edge = edges
     lengths = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
@@ -42,9 +43,9 @@ def split_edges(
     points : (n, 3) ndarray
     faces : (f, 3) ndarray
     edges : tuple of ndarray
-        The edges of the triangles, from `edges_of`.
+        The edges of the triangles, from `number_triangle_edges`.
     marked : (e,) ndarray of bool
-        Edges to split, as `with_longest` returns them.
+        Edges to split, as `mark_longest_edges` returns them.
 
     Returns
     -------
@@ -52,7 +53,7 @@ def split_edges(
         The given points, then the midpoints of the marked edges in their order.
     faces : (g, 3) ndarray
     parents : (g,) ndarray
-        The original triangle of each.
+        The given triangle that contains each.
     """
     ends, edge = edges
     middle = np.full(len(ends), -1)
@@ -78,7 +79,7 @@ def split_edges(
     return np.vstack([points, points[ends[marked]].mean(axis=1)]), np.vstack(parts), np.concatenate(parents)
 
 
-def quartered(corners: FloatArray) -> FloatArray:
+def quarter_triangles(corners: FloatArray) -> FloatArray:
     """Split each triangle (f, 3, 3) into four, (4 f, 3, 3)."""
     a, b, c = (corners[:, i] for i in range(3))
     ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)

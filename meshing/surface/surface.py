@@ -5,43 +5,18 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, summed
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.solids import Shape, lies_on
+from tetlux.meshing.surface.triangles import barycentric_on_triangles, signed_volume, triangle_areas
 
-# Above this number of triangles, a surface counts as fine enough.
-MOST_BULGING = 20_000
+# The bulge of a surface of more triangles is taken as 0, since it falls with their number.
+MOST_TRIANGLES_THAT_BULGE = 20_000
 MILLIMETRES = {"nm": 1e-6, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 UNITS = tuple(MILLIMETRES)
-
-
-def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Unit normals (m, 3) and areas (m,) of triangles; the normal of a degenerate one is zero."""
-    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
-
-
-def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Volume and area of each body, (b,), of either orientation; `body` (m,) is the body of each triangle, from 0."""
-    corners = points[faces]
-    count = int(body.max()) + 1
-    # Relative to its own centre, since a small body far from the origin would lose digits.
-    middle = np.column_stack([summed(body, x, count) for x in corners.mean(axis=1).T])
-    middle /= np.bincount(body, minlength=count)[:, None]
-    a, b, c = (corners[:, i] - middle[body] for i in range(3))
-    volume = np.abs(summed(body, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, count))
-    return volume, summed(body, triangle_areas(points, faces)[1], count)
-
-
-def longest_sides(corners: FloatArray) -> FloatArray:
-    """Longest sides (f,) of triangles (f, 3, 3)."""
-    sides = corners - corners[:, [1, 2, 0]]
-    return np.asarray(np.sqrt(np.einsum("fij,fij->fi", sides, sides).max(axis=1, initial=0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +34,9 @@ class Surface:
     unit : str
         The unit of length; coefficients are in 1/unit.
     name : str
+        For messages.
     repairs, warnings : tuple of str
-        What was repaired when the surface was read, and what the user should know about it.
+        Sentences: what was repaired when the surface was read, and what the user should know about it.
     overlaps : bool
         Whether it crosses itself or contains one body inside another, so that `volume` and `area` count parts of
         the body more than once.
@@ -70,6 +46,19 @@ class Surface:
     shape : Sphere, Box, Slab, Cylinder or Torus, optional
         The built-in shape that the triangles were made from, if any. Copies (``replace``) keep it while all vertices
         lie on it.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from tetlux.meshing import box
+    >>> cube = box((2.0, 2.0, 2.0))
+    >>> round(cube.area, 6), round(cube.volume, 6)
+    (24.0, 8.0)
+    >>> cube.contains(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 3.0]])).tolist()
+    [True, False]
+    >>> points, faces = cube.closest(np.array([[0.5, 0.0, 3.0]]))
+    >>> points.tolist()
+    [[0.5, 0.0, 1.0]]
     """
 
     points: FloatArray
@@ -109,7 +98,7 @@ class Surface:
 
     @property
     def extent(self) -> str:
-        """The ranges of the coordinates, as text."""
+        """The ranges of the coordinates with their unit, as text."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         return ", ".join(f"{axis} {a:.4g}..{b:.4g}" for axis, a, b in zip("xyz", low, high, strict=True)) + (
             f" {self.unit}"
@@ -120,11 +109,24 @@ class Surface:
         return ClosestPoint(self.points, self.faces)
 
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Nearest points of the surface (q, 3) and the faces they lie on (q,), for queries (q, 3)."""
+        """Closest points of the triangles to query points.
+
+        Parameters
+        ----------
+        queries : (q, 3) ndarray
+            Unit.
+
+        Returns
+        -------
+        points : (q, 3) ndarray
+            Unit.
+        faces : (q,) ndarray
+            The triangle of each closest point.
+        """
         return self._closest(queries)
 
     def near(self, queries: FloatArray, distance: float) -> BoolArray:
-        """Whether each of the queries (q, 3) is no farther from the surface than a distance."""
+        """Whether each query point (q, 3) lies within a distance, unit, of the triangles, (q,)."""
         return self._closest.within(queries, distance)
 
     @cached_property
@@ -132,23 +134,25 @@ class Surface:
         return CurvedPatches(self.points, self.faces, self.normals, self.crease_angle)
 
     def on_curve(self, faces: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The smooth surface at points of the triangles.
+        """The smooth surface over points of the triangles.
 
         Parameters
         ----------
         faces : (q,) ndarray
+            Triangles.
         points : (q, 3) ndarray
-            Barycentric coordinates in these faces.
+            A point on each of these triangles, unit.
 
         Returns
         -------
         points : (q, 3) ndarray
+            Points of the smooth surface with the same barycentric coordinates, unit.
         normals : (q, 3) ndarray
             Outward unit normals of the smooth surface there.
         """
         if self.crease_angle <= 0 or len(faces) == 0:
             return points, self.normals[faces]
-        return self._patches(faces, barycentric_of(points, self.points[self.faces[faces]]))
+        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))
 
     @cached_property
     def bulge(self) -> float:
@@ -156,22 +160,35 @@ class Surface:
 
         It is taken as 0 for surfaces of many triangles.
         """
-        if self.crease_angle <= 0 or len(self.faces) > MOST_BULGING:
+        if self.crease_angle <= 0 or len(self.faces) > MOST_TRIANGLES_THAT_BULGE:
             return 0.0
         corners = self.points[self.faces]
-        faces, added = np.arange(len(self.faces)), np.zeros(len(self.faces))
+        faces, heights = np.arange(len(self.faces)), np.zeros(len(self.faces))
         for i in range(3):
             middle = 0.5 * (corners[:, i] + corners[:, i - 1])
-            added += np.einsum("ij,ij->i", self.on_curve(faces, middle)[0] - middle, self.normals) / 3.0
-        return float(added @ triangle_areas(self.points, self.faces)[1]) / self.volume
+            heights += np.einsum("ij,ij->i", self.on_curve(faces, middle)[0] - middle, self.normals) / 3.0
+        return float(heights @ triangle_areas(self.points, self.faces)[1]) / self.volume
 
     def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Points (q, 3) and normals (q, 3) of the smooth surface, at the nearest points of the triangles."""
+        """Project query points on the smooth surface.
+
+        Parameters
+        ----------
+        queries : (q, 3) ndarray
+            Unit.
+
+        Returns
+        -------
+        points : (q, 3) ndarray
+            Points of the smooth surface over the closest points of the triangles, unit.
+        normals : (q, 3) ndarray
+            Outward unit normals of the smooth surface there.
+        """
         nearest, faces = self.closest(queries)
         return self.on_curve(faces, nearest)
 
     def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether each of the queries (q, 3) lies inside."""
+        """Whether each query point (q, 3) lies inside, (q,), by the winding number."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)
         inside = np.asarray(((queries >= low) & (queries <= high)).all(axis=1))
         inside[inside] = winding_number(self.points, self.faces, queries[inside]) > 0.5
@@ -180,11 +197,19 @@ class Surface:
     def crossings(self, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, IntArray]:
         """Intersections of a ray with the surface.
 
+        Parameters
+        ----------
+        origin : (3,) ndarray
+            Unit.
+        direction : (3,) ndarray
+            Unit vector.
+
         Returns
         -------
         distances : (k,) ndarray
-            Along the unit vector `direction`, ascending, all positive.
+            Along `direction`, ascending, all positive, unit.
         faces : (k,) ndarray
+            The triangle at each.
         """
         count = len(self.faces)
         distances, _ = cross_segments(
@@ -208,10 +233,17 @@ class Surface:
 
         Parts of the surface inside the body (overlaps, inner shells) do not count.
 
+        Parameters
+        ----------
+        origin : (3,) ndarray
+            A point inside, unit.
+        direction : (3,) ndarray
+            Unit vector.
+
         Returns
         -------
         tuple of float and int, or None
-            Distance along the unit vector `direction`, and the face; None if the ray meets no surface.
+            Distance along `direction`, unit, and the triangle; None if the ray meets no surface.
         """
         distances, faces = self.crossings(origin, direction)
         outward = np.sign(self.normals[faces] @ direction)
@@ -231,21 +263,3 @@ class Surface:
             f'Surface("{self.name}", {count(len(self.faces), "triangle")}, {size(self.points, self.unit)}, '
             f"volume {self.volume:.3g} {self.unit}³)"
         )
-
-
-def barycentric_of(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Barycentric coordinates (q, 3) of points (q, 3) on triangles (q, 3, 3)."""
-    u, v, w = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
-    normal = np.cross(u, v)
-    scale = np.einsum("ij,ij->i", normal, normal)
-    scale = np.where(scale > 0, scale, 1.0)
-    second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
-    third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
-    return np.column_stack([1.0 - second - third, second, third])
-
-
-def signed_volume(points: FloatArray, faces: IntArray) -> float:
-    """Volume enclosed by outward oriented triangles (divergence theorem), negative if they face inward."""
-    origin = points.mean(axis=0)
-    a, b, c = (points[faces[:, i]] - origin for i in range(3))
-    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)

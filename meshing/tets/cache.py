@@ -1,4 +1,4 @@
-"""Cache results that are computed once per mesh."""
+"""Results that are computed once per mesh."""
 
 from collections.abc import Callable, Hashable
 from contextlib import suppress
@@ -14,7 +14,7 @@ _T = TypeVar("_T")
 
 @dataclass(frozen=True, eq=False)
 class MeshCache:
-    """What was computed for one mesh.
+    """Results for one mesh.
 
     Attributes
     ----------
@@ -26,9 +26,9 @@ class MeshCache:
     _results: dict[Hashable, Any] = field(default_factory=dict)
 
     def get(self, key: Hashable, compute: Callable[[], _T]) -> _T:
-        """The cached result of `key`, or else what `compute` returns, which is then cached.
+        """The cached result of a key; if there is none, compute and cache it.
 
-        A key without a hash, such as one that contains lists, is computed each time.
+        The result of an unhashable key, such as one that contains lists, is computed each time.
         """
         results = self._results
         try:

@@ -11,17 +11,17 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import FACES, face_keys
 
-# Distance outside a facet's centroid at which another tetrahedron is searched, as a share of the facet's size, and its
-# minimum as a share of the mesh's diagonal, since files round coordinates.
-OUTSIDE, ROUNDED = 1e-4, 2e-6
-# A tetrahedron that contains a facet's centroid deeper than this many times that distance overlaps.
-DEEP = 20.0
-# The share of the boundary's area that may lie against or inside other tetrahedra: more is refused, less is noted.
-MOST_INSIDE = 1e-3
+# A facet is covered if a tetrahedron contains the point at this distance outside its centroid: the first share of the
+# facet's size, but at least the second share of the mesh's diagonal, since files round coordinates.
+PROBE_DISTANCE, LEAST_PROBE_DISTANCE = 1e-4, 2e-6
+# A tetrahedron overlaps the mesh if that point is deeper in it than this many times the distance.
+OVERLAP_DEPTH = 20.0
+# Largest share of the boundary's area that may lie against or inside other tetrahedra, with a warning.
+MOST_COVERED = 1e-3
 
 
-def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
-    """The number of faces with several tetrahedra on one side, which therefore overlap.
+def count_doubly_covered_faces(corners: IntArray, nodes: int) -> int:
+    """Count the faces with several tetrahedra on one side: these tetrahedra overlap.
 
     Parameters
     ----------
@@ -43,16 +43,16 @@ def doubly_covered_faces(corners: IntArray, nodes: int) -> int:
 
 
 def check_overlap(corners: IntArray, nodes: int) -> None:
-    """Refuse tetrahedra that lie on the same side of a common face.
+    """Refuse tetrahedra that share a face and lie on the same side of it.
 
     Raises
     ------
     InputError
     """
-    overlapped = doubly_covered_faces(corners, nodes)
-    if overlapped:
+    covered = count_doubly_covered_faces(corners, nodes)
+    if covered:
         raise InputError(
-            f"tetrahedra overlap: {overlapped:,} of their faces have several tetrahedra on one side, as when some are "
+            f"tetrahedra overlap: {covered:,} of their faces have several tetrahedra on one side, as when some are "
             "given twice; give each part of the volume once."
         )
 
@@ -83,13 +83,13 @@ def check_facets(mesh: TetMesh, merged: bool = False) -> tuple[str, ...]:
     against, inside = _covered_facets(mesh)
     area = float(mesh.boundary_areas[against | inside].sum())
     if area == 0.0:
-        parts = _parts(mesh)
+        parts = _count_parts(mesh)
         if parts == 1:
             return ()
         sentence = f"the mesh is {parts} parts without a common node; no light passes between them."
         return (Note("several-bodies", sentence, value=parts),)
     figure = f"{area:.3g} {mesh.unit}²"
-    if area <= MOST_INSIDE * mesh.area:
+    if area <= MOST_COVERED * mesh.area:
         sentence = f"{figure} of the mesh's boundary face each other inside it; no light passes there."
         return (Note("facets-covered", sentence, value=area),)
     if mesh.boundary_areas[inside].sum() > 0.5 * area:
@@ -105,8 +105,8 @@ def check_facets(mesh: TetMesh, merged: bool = False) -> tuple[str, ...]:
     )
 
 
-def _parts(mesh: TetMesh) -> int:
-    """The number of parts without common nodes."""
+def _count_parts(mesh: TetMesh) -> int:
+    """The number of connected components by common nodes."""
     size = len(mesh.points)
     used = np.unique(mesh.tetrahedra).size
     links = coo_array((np.ones(len(mesh.edges), dtype=bool), mesh.edges.T), shape=(size, size))
@@ -119,13 +119,13 @@ def _covered_facets(mesh: TetMesh) -> tuple[BoolArray, BoolArray]:
     corners = mesh.points[mesh.boundary_faces]
     middles = corners.mean(axis=1)
     normals, areas = mesh.surface.normals, mesh.boundary_areas
-    steps = np.maximum(OUTSIDE * np.sqrt(areas), ROUNDED * mesh.diagonal)
+    steps = np.maximum(PROBE_DISTANCE * np.sqrt(areas), LEAST_PROBE_DISTANCE * mesh.diagonal)
     cells, weights = mesh.locate(middles + steps[:, None] * normals)
     covered = (cells >= 0) & (cells != mesh.boundary_cells)
     rows = np.flatnonzero(covered)
     # The distance from a face of that tetrahedron is a barycentric coordinate times the height on the face.
     heights = 1.0 / np.linalg.norm(mesh.hat_gradients[cells[rows]], axis=2)
-    deep = (weights[rows] * heights).min(axis=1) > DEEP * steps[rows]
+    deep = (weights[rows] * heights).min(axis=1) > OVERLAP_DEPTH * steps[rows]
     inside = np.zeros(len(cells), dtype=bool)
     inside[rows[deep]] = True
     return covered & ~inside, inside

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.host.corners import cross, dot, face_normals, over_corners
+from tetlux.meshing.host.corners import cross, dot, face_normals, run_on_corners
 from tetlux.meshing.tets.topology import EDGES
 
 
@@ -15,7 +15,7 @@ def tetrahedron_volumes(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
         u, v, w = corners[1:] - corners[0]
         result[block] = dot(u, cross(v, w)) / 6.0
 
-    over_corners(fill, points, tetrahedra)
+    run_on_corners(fill, points, tetrahedra)
     return result
 
 
@@ -28,7 +28,7 @@ def hat_gradients(points: FloatArray, tetrahedra: IntArray, volumes: FloatArray)
         result[block, 1:] = three.transpose(2, 0, 1)
         result[block, 0] = -three.sum(axis=0).T
 
-    over_corners(fill, points, tetrahedra)
+    run_on_corners(fill, points, tetrahedra)
     return result
 
 
@@ -40,7 +40,7 @@ def longest_edges(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
         squares = [dot(side, side) for side in (corners[j] - corners[i] for i, j in EDGES)]
         result[block] = np.sqrt(np.maximum.reduce(squares))
 
-    over_corners(fill, points, tetrahedra)
+    run_on_corners(fill, points, tetrahedra)
     return result
 
 
@@ -57,12 +57,12 @@ def quality(points: FloatArray, tetrahedra: IntArray) -> FloatArray:
         area = 0.5 * sum(np.sqrt(dot(n, n)) for n in (vw, wu, uv, vw + wu + uv))
         result[block] = 9.0 * volume / area / circumradius
 
-    over_corners(fill, points, tetrahedra)
+    run_on_corners(fill, points, tetrahedra)
     return result
 
 
 def barycentric_coordinates(corners: FloatArray, queries: FloatArray) -> FloatArray:
     """Barycentric coordinates (q, 4) of each query (q, 3) in the tetrahedron with the corners (q, 4, 3)."""
     matrix = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    rest = np.linalg.solve(matrix, (queries - corners[:, 0])[..., None])[..., 0]
-    return np.column_stack([1.0 - rest.sum(axis=1), rest])
+    three = np.linalg.solve(matrix, (queries - corners[:, 0])[..., None])[..., 0]
+    return np.column_stack([1.0 - three.sum(axis=1), three])

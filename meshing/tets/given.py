@@ -1,4 +1,4 @@
-"""Repair and check tetrahedra that were made elsewhere, and make a `TetMesh` of them."""
+"""Repair and check tetrahedra of other programs, and make a `TetMesh` of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,30 +12,30 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.topology import distinct_rows
-from tetlux.meshing.tets.conformity import check_conformity, check_facets, check_overlap, doubly_covered_faces
+from tetlux.meshing.tets.conformity import check_conformity, check_facets, check_overlap, count_doubly_covered_faces
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import EDGES
 
 # Largest coordinate, in any unit.
-LONGEST = 1e30
-# Nodes are merged within the first share of the mesh's diagonal (rounding in files is a tenth of it), or within the
-# second share of the shortest edge if that is less.
-SAME_PLACE, OF_SHORTEST_EDGE = 1e-6, 1e-3
-# A tetrahedron is flat if its volume is below this share of the cube of its size, the level of rounding errors.
-FLAT = 1e-13
+LARGEST_COORDINATE = 1e30
+# Nodes are merged if they are closer than the first share of the mesh's diagonal (rounding in files is a tenth of it),
+# and than the second share of the shortest edge.
+MERGE_DISTANCE, MERGE_SHARE_OF_EDGE = 1e-6, 1e-3
+# A tetrahedron is flat if its volume is below this share of the cube of its size: the level of rounding errors.
+FLAT_VOLUME = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class _Tetrahedra:
-    """Tetrahedra that are being repaired.
+    """Tetrahedra during their repair.
 
     Attributes
     ----------
     points : (n, 3) ndarray
     corners : (m, 4) ndarray
     nodes, cells : (n,), (m,) ndarray
-        Indices of the nodes and tetrahedra in the given arrays.
+        Indices of the nodes and tetrahedra in the arrays of the caller.
     repairs : tuple of str
     """
 
@@ -45,8 +45,8 @@ class _Tetrahedra:
     cells: IntArray
     repairs: tuple[str, ...] = ()
 
-    def only(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
-        """The tetrahedra that are kept, with a sentence on why the others are not."""
+    def select(self, kept: BoolArray, repair: str) -> "_Tetrahedra":
+        """The tetrahedra to keep, (m,), and a sentence on the repair."""
         if kept.all():
             return self
         if not kept.any():
@@ -100,12 +100,12 @@ def mesh_from_arrays(
     ({7: 'skin'}, array([7]), ('nodes are numbered from 1.',))
     """
     given = Given(points, tetrahedra, labels, names or {}, numbered_from)
-    return checked_mesh(given, unit)[0]
+    return make_checked_mesh(given, unit)[0]
 
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Arrays as `mesh_from_arrays` takes them, with notes on how they were read."""
+    """The arguments of `mesh_from_arrays`, with the repairs and warnings of the reader of their file."""
 
     points: npt.ArrayLike
     tetrahedra: npt.ArrayLike
@@ -116,15 +116,15 @@ class Given:
     warnings: tuple[str, ...] = ()
 
 
-def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
-    """Make a checked mesh of arrays; also return the given index of each of its nodes, (k,).
+def make_checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
+    """Make a checked mesh of arrays; also return the index of each of its nodes in the given points, (k,).
 
     Raises
     ------
     InputError
         As `mesh_from_arrays`.
     """
-    numbered = _check_arrays(given.points, given.tetrahedra, given.numbered_from)
+    numbered = _check_tetrahedra(given.points, given.tetrahedra, given.numbered_from)
     regions = None if given.labels is None else whole_numbers(given.labels, len(numbered.corners))
     if given.labels is not None and regions is None:
         raise InputError("its labels are no whole numbers, one for each tetrahedron; give an integer for each.")
@@ -147,25 +147,25 @@ def checked_mesh(given: Given, unit: str) -> tuple[TetMesh, IntArray]:
     return mesh, repaired.nodes
 
 
-def oriented(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """`mesh_from_arrays` without labels; also return the given index of each of the mesh's nodes, (k,)."""
-    return checked_mesh(Given(points, cells), unit)
+def mesh_with_nodes(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
+    """Make a checked mesh without labels; also return the index of each of its nodes in `points`, (k,)."""
+    return make_checked_mesh(Given(points, cells), unit)
 
 
-def unjoined(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
-    """Make a mesh that only carries values, so its parts need no common nodes; inverted tetrahedra are reoriented.
+def value_mesh(points: npt.ArrayLike, cells: npt.ArrayLike, unit: str = "mm") -> tuple[TetMesh, IntArray]:
+    """Make a mesh to interpolate values on, whose parts need no common nodes; inverted tetrahedra are reoriented.
 
     Returns
     -------
     mesh : TetMesh
     nodes : (k,) ndarray
-        The given index of each of its nodes.
+        The index of each of its nodes in `points`.
     """
-    given = _reorient(_check_arrays(points, cells))
+    given = _reorient(_check_tetrahedra(points, cells))
     return TetMesh(given.points, given.corners, unit), given.nodes
 
 
-def _check_arrays(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
+def _check_tetrahedra(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: int | None = 0) -> _Tetrahedra:
     """Check shapes, node numbers and coordinates; drop unused nodes."""
     try:
         vertices, corners = np.asarray(points, dtype=np.float64), np.array(cells)
@@ -184,7 +184,7 @@ def _check_arrays(points: npt.ArrayLike, cells: npt.ArrayLike, numbered_from: in
     if corners.min() < 0 or corners.max() >= len(vertices):
         raise InputError("a tetrahedron names a node that does not exist; the file is damaged.")
     vertices, corners, nodes = _drop_unused(vertices, corners, np.arange(len(vertices)))
-    if not (np.abs(vertices) < LONGEST).all():
+    if not (np.abs(vertices) < LARGEST_COORDINATE).all():
         raise InputError("a node's coordinate is no number, or absurdly large; export the file again.")
     return _Tetrahedra(vertices, corners, nodes, np.arange(len(corners)), tuple(repairs))
 
@@ -201,15 +201,15 @@ def _drop_unused(points: FloatArray, corners: IntArray, nodes: IntArray) -> tupl
 def _merge_nodes(given: _Tetrahedra) -> _Tetrahedra:
     """Merge nodes that coincide."""
     points, corners = given.points, given.corners
-    near = SAME_PLACE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    near = MERGE_DISTANCE * float(np.linalg.norm(np.ptp(points, axis=0)))
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
     if len(pairs) == 0:
         return given
     # Do not merge the nodes of small tetrahedra.
     starts, ends = points[corners[:, EDGES]].transpose(2, 0, 1, 3)
     lengths = np.linalg.norm(ends - starts, axis=2)
-    shortest = float(lengths.min(initial=near / OF_SHORTEST_EDGE, where=lengths > 0.0))
-    pairs = pairs[np.linalg.norm(np.diff(points[pairs], axis=1)[:, 0], axis=1) <= OF_SHORTEST_EDGE * shortest]
+    shortest = float(lengths.min(initial=near / MERGE_SHARE_OF_EDGE, where=lengths > 0.0))
+    pairs = pairs[np.linalg.norm(np.diff(points[pairs], axis=1)[:, 0], axis=1) <= MERGE_SHARE_OF_EDGE * shortest]
     if len(pairs) == 0:
         return given
     size = len(points)
@@ -224,8 +224,8 @@ def _remove_flat(given: _Tetrahedra) -> _Tetrahedra:
     points, corners = given.points, given.corners
     volumes = np.abs(tetrahedron_volumes(points, corners))
     sizes = np.ptp(points[corners], axis=1).max(axis=1)
-    flat = volumes <= FLAT * sizes**3
-    found = given.only(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
+    flat = volumes <= FLAT_VOLUME * sizes**3
+    found = given.select(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
     vertices, corners, nodes = _drop_unused(found.points, found.corners, found.nodes)
     return replace(found, points=vertices, corners=corners, nodes=nodes)
 
@@ -243,8 +243,8 @@ def _reorient(given: _Tetrahedra) -> _Tetrahedra:
 
 
 def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
-    """Keep each tetrahedron once: of copies, the one with the rarest label, which is that of a part of a whole."""
-    if not doubly_covered_faces(given.corners, len(given.points)):
+    """Keep one of several equal tetrahedra: that with the rarest label, since parts have rarer labels than wholes."""
+    if not count_doubly_covered_faces(given.corners, len(given.points)):
         return given
     labels = np.zeros(len(given.corners), dtype=np.int64) if regions is None else regions[given.cells]
     _, kind, sizes = np.unique(labels, return_inverse=True, return_counts=True)
@@ -255,7 +255,7 @@ def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
     copies = int((~kept).sum())
     alike = (labels[order] == labels[order[chosen]][of_kind]).all()
     which = "as the first of each" if alike else "with the rarer label"
-    found = given.only(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
+    found = given.select(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
     check_overlap(found.corners, len(found.points))
     return found
 

@@ -14,17 +14,17 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.host.corners import dot, face_normals
 from tetlux.meshing.search.cell_tree import SLACK, PathSegments
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.path_cache import TracedPaths, keys_of
+from tetlux.meshing.tets.path_cache import TracedPaths, hash_lines
 
-# How far outside its tetrahedron, in barycentric coordinates, a segment may begin. A path within `SLACK` of an edge
-# may be several times `SLACK` outside the next tetrahedron.
-ASIDE = 10.0 * SLACK
-# A path that ends beyond the boundary by less than this share of its length ends at the boundary.
-ROUNDING = 1e-12
-# After this many successive tetrahedra without progress, a path is stuck around a node and is given up.
+# A segment may begin outside its tetrahedron by at most this much, in barycentric coordinates. A path within SLACK of
+# an edge may be several times SLACK outside the next tetrahedron.
+START_SLACK = 10.0 * SLACK
+# A path that leaves the mesh less than this share of its length before its end has reached its end.
+END_TOLERANCE = 1e-12
+# A path without progress in more than this many successive tetrahedra circles around a node; the tree cuts it instead.
 MOST_STALLS = 64
-# Paths that are traced at once: their segments take some tens of megabytes.
-PORTION = 1 << 12
+# Paths traced at once: their segments take some tens of megabytes.
+PATHS_AT_ONCE = 1 << 12
 
 
 def march(
@@ -36,7 +36,7 @@ def march(
     *,
     keep: bool = True,
 ) -> Iterator[PathSegments]:
-    """Cut paths into segments, one per tetrahedron, from the start of each path on.
+    """Cut paths into segments, one per tetrahedron, by walking from each tetrahedron to its neighbour.
 
     In a tetrahedron the path continues until a barycentric coordinate is less than -`SLACK`, as in `CellTree.cut`, and
     then passes the face of that coordinate. Paths that do not reach their end in this way, or that begin outside
@@ -57,16 +57,16 @@ def march(
     PathSegments
         All segments of some of the paths.
     """
-    left = [np.arange(len(starts))]
+    remaining = [np.arange(len(starts))]
     if cells is not None:
-        known, left = np.flatnonzero(cells >= 0), [np.flatnonzero(cells < 0)]
+        known, remaining = np.flatnonzero(cells >= 0), [np.flatnonzero(cells < 0)]
         lines = np.vstack([starts[known].T, directions[known].T, lengths[known]])
         for some, part in (
             _trace_cached(mesh, lines, cells[known]) if keep else _trace_portions(mesh, lines, cells[known])
         ):
             yield replace(part.segments, paths=known[some[part.segments.paths]])
-            left.append(known[some[part.lost]])
-    others = np.concatenate(left)
+            remaining.append(known[some[part.lost]])
+    others = np.concatenate(remaining)
     if len(others):
         for segments in mesh.tree.cut(starts[others], directions[others], lengths[others]):
             yield replace(segments, paths=others[segments.paths])
@@ -74,7 +74,7 @@ def march(
 
 def _trace_cached(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, TracedPaths]]:
     """Trace the lines (7, p) that are not cached; yield indices of lines with their paths."""
-    keys, unknown = keys_of(lines), np.arange(len(cells))
+    keys, unknown = hash_lines(lines), np.arange(len(cells))
     for part in list(mesh.cache.paths.parts):
         places = part.find(keys[unknown], lines[:, unknown], cells[unknown])
         found = places >= 0
@@ -98,8 +98,8 @@ def _trace_cached(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator
 
 def _trace_portions(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator[tuple[IntArray, TracedPaths]]:
     """Trace lines (7, p) in portions; yield indices of lines with their paths."""
-    for start in range(0, len(cells), PORTION):
-        some = np.arange(start, min(start + PORTION, len(cells)))
+    for start in range(0, len(cells), PATHS_AT_ONCE):
+        some = np.arange(start, min(start + PATHS_AT_ONCE, len(cells)))
         yield some, _trace(mesh, lines[:, some], cells[some], np.zeros(len(some)))
 
 
@@ -119,11 +119,11 @@ def _trace(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArra
         beyond = mesh.neighbours[cells, face].astype(np.int64)
         outside = beyond < 0
         leave = reached + np.maximum(nearest, 0.0)
-        done = leave >= np.where(outside, (1.0 - ROUNDING) * lengths, lengths)
+        done = leave >= np.where(outside, (1.0 - END_TOLERANCE) * lengths, lengths)
         leave[done] = lengths[done]
         advanced = leave > reached
-        stalls = np.where(leave > reached + ROUNDING * lengths, 0, stalls + 1)
-        failed = (advanced & (base.min(axis=0) < -ASIDE)) | ((outside | (stalls > MOST_STALLS)) & ~done)
+        stalls = np.where(leave > reached + END_TOLERANCE * lengths, 0, stalls + 1)
+        failed = (advanced & (base.min(axis=0) < -START_SLACK)) | ((outside | (stalls > MOST_STALLS)) & ~done)
         failed |= ~np.isfinite(base[0] + slopes[0])
         parts.append(_select(advanced, paths, cells, reached, leave, base, slopes))
         lost[paths[failed]] = True
@@ -139,7 +139,7 @@ def _trace(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArra
 
 
 def _select(chosen: BoolArray, *arrays: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
-    """The chosen columns of each array, along its last axis."""
+    """The chosen entries of each array along its last axis."""
     if chosen.all():
         return list(arrays)
     places = np.flatnonzero(chosen)

@@ -6,19 +6,20 @@ from functools import cached_property
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray, sum_by_index
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
-from tetlux.meshing.surface.surface import Surface, triangle_areas
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets import geometry, topology
 from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
 
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
-# Labels that a message lists; of further ones it gives the number.
-MOST_NAMED = 8
+# Labels that a message lists; it counts the others.
+MOST_LABELS_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,18 +33,29 @@ class TetMesh:
     tetrahedra : (m, 4) ndarray
         Corners; the first three are anticlockwise seen from the fourth, so that volumes are positive.
     unit : str
+        Unit of length; coefficients are in 1/unit.
     regions : (m,) ndarray of int, optional
         The region or label of each tetrahedron; all 0 if not given. In a mesh made from surfaces, 0 is the body itself
         and regions are numbered from 1; the labels of other meshes are kept.
     labels : mapping of int to str, optional
-        Names of those labels that have one.
+        Names of labels; not every label needs one.
     repairs, warnings : tuple of str
-        What was repaired when the mesh was read, and what the user should know about it.
+        Sentences: what was repaired when the mesh was read, and what the user should know about it.
 
     Raises
     ------
     InputError
         If shapes or indices are wrong, a coordinate is not finite, or a tetrahedron is inverted or flat.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    >>> mesh = TetMesh(points, np.array([[0, 1, 2, 3]]))
+    >>> len(mesh.edges), len(mesh.boundary_faces), round(mesh.volume, 6)
+    (6, 4, 0.166667)
+    >>> mesh.locate([[0.25, 0.25, 0.25], [1.0, 1.0, 1.0]])[0].tolist()
+    [0, -1]
     """
 
     points: FloatArray
@@ -55,21 +67,15 @@ class TetMesh:
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        p, t = self.points, self.tetrahedra
-        if p.ndim != 2 or p.shape[1] != 3 or t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
-            raise InputError(f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}.")
-        if t.min() < 0 or t.max() >= len(p):
-            raise InputError("a tetrahedron names a node that does not exist.")
-        if not np.isfinite(p).all():
-            raise InputError("a node's coordinate is not finite.")
+        topology.check_arrays(self.points, self.tetrahedra)
+        total = len(self.tetrahedra)
         if self.regions is _NO_REGIONS:
             # A broadcast zero takes no memory.
-            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), len(t)))
-        elif self.regions.shape != (len(t),) or self.regions.dtype.kind not in "iu":
-            raise InputError(f"a mesh of {len(t)} tetrahedra needs as many numbers of regions, all integers.")
-        bad = int((self.volumes <= 0).sum())
-        if bad:
-            raise InputError(f"{bad} of {len(t)} tetrahedra are inverted or flat; orient and clean the mesh.")
+            object.__setattr__(self, "regions", np.broadcast_to(np.int64(0), total))
+        elif self.regions.shape != (total,) or self.regions.dtype.kind not in "iu":
+            raise InputError(f"a mesh of {total} tetrahedra needs as many numbers of regions, all integers.")
+        if bad := int((self.volumes <= 0).sum()):
+            raise InputError(f"{bad} of {total} tetrahedra are inverted or flat; orient and clean the mesh.")
 
     @cached_property
     def volumes(self) -> FloatArray:
@@ -169,21 +175,20 @@ class TetMesh:
 
     @cached_property
     def boundary_node_areas(self) -> FloatArray:
-        """A third of the area of the triangles around each boundary node, (b,): weights that sum to `area`."""
+        """A third of the area of the triangles at each boundary node, (b,), unit²: weights that sum to `area`."""
         return self.to_boundary_nodes(self.boundary_areas)
 
     def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
-        """Sums (b,) at boundary nodes of integrals over boundary triangles (f,), a third to each corner."""
-        nodes, weights = self.boundary_triangles.ravel(), np.repeat(shares / 3.0, 3)
-        return np.asarray(np.bincount(nodes, weights, minlength=len(self.boundary_nodes)), dtype=np.float64)
+        """Distribute integrals over boundary triangles (f,) to boundary nodes (b,), a third to each corner."""
+        return sum_by_index(self.boundary_triangles, np.repeat(shares / 3.0, 3), len(self.boundary_nodes))
 
     @cached_property
     def node_volumes(self) -> FloatArray:
-        """A quarter of the volume of the tetrahedra around each node, (n,): weights that sum to `volume`."""
+        """A quarter of the volume of the tetrahedra at each node, (n,), unit³: weights that sum to `volume`."""
         return self.to_nodes(self.volumes)
 
     def to_nodes(self, shares: FloatArray) -> FloatArray:
-        """Sums (n,) at nodes of integrals over tetrahedra (m,), a quarter to each corner."""
+        """Distribute integrals over tetrahedra (m,) to nodes (n,), a quarter to each corner."""
         sums = np.zeros(len(self.points))
         for corner in self.tetrahedra.T:
             sums += np.bincount(corner, shares / 4.0, minlength=len(sums))
@@ -219,7 +224,7 @@ class TetMesh:
         return BoundaryQueries(self.points, self.boundary_faces)
 
     def closest_boundary(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Nearest boundary points of queries (q, 3): points (q, 3), faces (q,), barycentric weights (q, 3)."""
+        """Closest boundary points to queries (q, 3): points (q, 3), their faces (q,), barycentric weights (q, 3)."""
         return self._boundary_queries.closest(queries)
 
     def boundary_distances(self, surface: Surface, faces: IntArray) -> FloatArray:
@@ -264,15 +269,18 @@ class TetMesh:
     def region_at(self, queries: FloatArray) -> IntArray:
         """The region of the tetrahedron that contains each point (q, 3), or of the nearest one, (q,)."""
         cells, _ = self.locate(queries)
-        outside = np.flatnonzero(cells < 0)
-        if len(outside):
+        if len(outside := np.flatnonzero(cells < 0)):
             cells[outside] = self.boundary_cells[self.closest_boundary(queries[outside])[1]]
         return np.asarray(self.regions[cells])
 
     def named(self, labels: Iterable[int]) -> str:
         """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
         texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
-        shown = texts if len(texts) <= MOST_NAMED else [*texts[:MOST_NAMED], f"{len(texts) - MOST_NAMED} more"]
+        shown = (
+            texts
+            if len(texts) <= MOST_LABELS_NAMED
+            else [*texts[:MOST_LABELS_NAMED], f"{len(texts) - MOST_LABELS_NAMED} more"]
+        )
         return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
     @cached_property
@@ -280,9 +288,8 @@ class TetMesh:
         """Volume of each region, unit³, by its number in ascending order."""
         if self.regions.strides == (0,):
             return {int(self.regions[0]): self.volume}
-        numbers, place = np.unique(self.regions, return_inverse=True)
-        volumes = np.bincount(place, self.volumes)
-        return dict(zip(numbers.tolist(), volumes.tolist(), strict=True))
+        numbers, index = np.unique(self.regions, return_inverse=True)
+        return dict(zip(numbers.tolist(), np.bincount(index, self.volumes).tolist(), strict=True))
 
     def __repr__(self) -> str:
         regions = len(np.unique(self.regions))

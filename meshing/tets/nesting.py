@@ -1,4 +1,4 @@
-"""How the closed surfaces of regions lie in the body and in each other, and which arrangements are refused."""
+"""The nesting of the closed surfaces of regions in the body and in each other, and the refusal of crossings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,15 +8,15 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, spread_indices
-from tetlux.meshing.describe import place_words
+from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.proximity import cross_segments, overlapping_boxes
 from tetlux.meshing.surface.surface import Surface
 
-# Surfaces within this share of the body's diagonal touch; rounding in files is about a tenth of it.
-TOUCH = 1e-6
-# Sample points per surface that decide on which side of another it lies; without a crossing one would do.
-SAMPLES = 64
+# Surfaces closer than this share of the body's diagonal touch; rounding in files is about a tenth of it.
+TOUCH_DISTANCE = 1e-6
+# Sample points per surface that decide whether it lies inside another; one would suffice if none touched.
+SIDE_SAMPLES = 64
 # Regions below this share of the body's diagonal are refused. The mesher's time grows with the inverse of the size of
 # the smallest region: 8 s at 0.012, minutes at 0.0025.
 SMALLEST = 0.005
@@ -24,7 +24,7 @@ SMALLEST = 0.005
 
 @dataclass(frozen=True)
 class Nesting:
-    """How the inner surfaces of a body are nested.
+    """The nesting of the inner surfaces of a body.
 
     Attributes
     ----------
@@ -73,69 +73,71 @@ def check_regions(surface: Surface, regions: Sequence[Surface]) -> None:
 
 
 def nesting(surface: Surface, regions: Sequence[Surface]) -> Nesting:
-    """How the inner surfaces are nested.
+    """Find the nesting of inner surfaces.
 
     Raises
     ------
     InputError
-        As `check_regions`, except for small surfaces.
+        As `check_regions` does, except for small surfaces.
     """
-    near = TOUCH * surface.diagonal
+    near = TOUCH_DISTANCE * surface.diagonal
     touching = np.zeros(len(regions) + 1, dtype=bool)
     around: list[list[int]] = [[0] for _ in regions]
     volumes = [np.inf, *(inner.volume for inner in regions)]
     names = [f"the body ({surface.name})", *(f"region {i} ({inner.name})" for i, inner in enumerate(regions, 1))]
     for i, inner in enumerate(regions, 1):
-        touching[[0, i]] |= _touches_inside(inner, surface, names[i], names[0], near)
+        touching[[0, i]] |= _check_inside_body(inner, surface, names[i], names[0], near)
     for j, second in enumerate(regions, 1):
         for i, first in enumerate(regions[: j - 1], 1):
             if not _boxes_meet(first, second, near):
                 continue
-            one, other = _pair(first, second, names[i], names[j], near)
+            one, other = _compare_pair(first, second, names[i], names[j], near)
             touching[[i, j]] |= one.touches or other.touches
-            if one.answers.all():
+            if one.inside.all():
                 around[i - 1].append(j)
-            elif other.answers.all():
+            elif other.inside.all():
                 around[j - 1].append(i)
     parents = tuple(min(those, key=lambda k: volumes[k]) for those in around)
     return Nesting(parents, tuple(touching.tolist()))
 
 
-def _touches_inside(inner: Surface, body: Surface, name: str, body_name: str, near: float) -> bool:
-    """Whether an inner surface touches the body's surface; an error if it is not inside the body."""
+def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str, near: float) -> bool:
+    """Refuse an inner surface that is not inside the body; whether it touches the body's surface."""
     if inner.unit != body.unit:
         raise InputError(f"{name} is in {inner.unit} and the body in {body.unit}; give both in one unit.")
-    place = _crossing(inner, body, near)
-    sides = _inside(inner, body, near)
-    if place is None and len(sides.answers) == 0:
+    place = _find_crossing(inner, body, near)
+    sides = _locate_sides(inner, body, near)
+    if place is None and len(sides.inside) == 0:
         raise InputError(f"{name} is the whole body; give its medium to the body and leave it out.")
-    if place is None and not sides.answers.any():
-        around = place_words(inner.points.mean(axis=0), near / TOUCH)
-        if _inside(body, inner, near).answers.any():
+    if place is None and not sides.inside.any():
+        around = as_text(inner.points.mean(axis=0), near / TOUCH_DISTANCE)
+        if _locate_sides(body, inner, near).inside.any():
             raise InputError(f"{name} holds {body_name} and not the other way round; exchange or shrink it.")
         raise InputError(f"{name} lies outside {body_name}, around {around}; move it inside, or leave it out.")
-    if place is None and not sides.answers.all():
-        place = sides.places[~sides.answers][0]
+    if place is None and not sides.inside.all():
+        place = sides.points[~sides.inside][0]
     if place is not None:
         raise InputError(
-            f"{name} crosses the surface of {body_name} around {place_words(place, near / TOUCH)}; "
+            f"{name} crosses the surface of {body_name} around {as_text(place, near / TOUCH_DISTANCE)}; "
             "move or shrink it until it lies inside."
         )
-    return sides.touches or bool(lies_on(body.points, inner, near).any())
+    return sides.touches or bool(are_on_surface(body.points, inner, near).any())
 
 
-def _pair(first: Surface, second: Surface, name: str, other_name: str, near: float) -> tuple["_Sides", "_Sides"]:
-    """Each of two inner surfaces relative to the other; an error if they cross or are the same."""
-    place = _crossing(first, second, near)
-    one, other = _inside(first, second, near), _inside(second, first, near)
-    if place is None and 0 in (len(one.answers), len(other.answers)):
+def _compare_pair(
+    first: Surface, second: Surface, name: str, other_name: str, near: float
+) -> tuple["_Sides", "_Sides"]:
+    """Compare two inner surfaces: the sides of each relative to the other; an error if they cross or are equal."""
+    place = _find_crossing(first, second, near)
+    one, other = _locate_sides(first, second, near), _locate_sides(second, first, near)
+    if place is None and 0 in (len(one.inside), len(other.inside)):
         raise InputError(f"{name} and {other_name} are the same surface; leave one of them out.")
     for sides in (one, other):
-        if place is None and sides.answers.any() and not sides.answers.all():
-            place = sides.places[sides.answers][0]
+        if place is None and sides.inside.any() and not sides.inside.all():
+            place = sides.points[sides.inside][0]
     if place is not None:
         raise InputError(
-            f"{name} and {other_name} cross each other around {place_words(place, near / TOUCH)}; "
+            f"{name} and {other_name} cross each other around {as_text(place, near / TOUCH_DISTANCE)}; "
             "move them apart, or put one wholly inside the other."
         )
     return one, other
@@ -150,8 +152,8 @@ def _boxes_meet(first: Surface, second: Surface, near: float) -> bool:
     return bool(((low <= highest + near) & (lowest <= high + near)).all())
 
 
-def _crossing(first: Surface, second: Surface, near: float) -> FloatArray | None:
-    """A point where an edge of either surface passes through a triangle of the other, away from its rim."""
+def _find_crossing(first: Surface, second: Surface, near: float) -> FloatArray | None:
+    """A point where an edge of either surface passes through the interior of a triangle of the other, or None."""
     low = np.maximum(_box(first)[0], _box(second)[0]) - near
     high = np.minimum(_box(first)[1], _box(second)[1]) + near
     if (low > high).any():
@@ -196,19 +198,19 @@ def _find_pierced(triangles: FloatArray, others: FloatArray, near: float) -> Flo
 
 @dataclass(frozen=True, eq=False)
 class _Sides:
-    """Sample points of a surface, whether each is inside another surface, and whether the two surfaces touch."""
+    """Sample points of a surface (s, 3), whether each is inside another surface (s,), and whether the two touch."""
 
-    places: FloatArray
-    answers: BoolArray
+    points: FloatArray
+    inside: BoolArray
     touches: bool
 
 
-def _inside(first: Surface, second: Surface, near: float) -> _Sides:
+def _locate_sides(first: Surface, second: Surface, near: float) -> _Sides:
     """Whether the first surface is inside the second, at sample points off the second.
 
     Surfaces that do not cross change sides only where they touch, so a few sample points per connected part suffice.
     """
-    on = lies_on(first.points, second, near)
+    on = are_on_surface(first.points, second, near)
     ends = np.concatenate([first.faces[:, [0, 1]], first.faces[:, [1, 2]], first.faces[:, [2, 0]]])
     ends = ends[~on[ends].any(axis=1)]
     size = len(first.points)
@@ -216,16 +218,16 @@ def _inside(first: Surface, second: Surface, near: float) -> _Sides:
     free = np.flatnonzero(~on)
     order = free[np.argsort(part[free], kind="stable")]
     starts = np.flatnonzero(np.diff(part[order], prepend=-1))
-    each = max(1, SAMPLES // max(len(starts), 1))
+    each = max(1, SIDE_SAMPLES // max(len(starts), 1))
     chosen = np.concatenate([those[spread_indices(len(those), each)] for those in np.split(order, starts[1:])])
     middles = first.points[first.faces[on[first.faces].any(axis=1)]].mean(axis=1)
-    middles = middles[spread_indices(len(middles), SAMPLES)]
-    places = np.concatenate([first.points[chosen], middles[~lies_on(middles, second, near)]])
-    return _Sides(places, second.contains(places), bool(on.any()))
+    middles = middles[spread_indices(len(middles), SIDE_SAMPLES)]
+    points = np.concatenate([first.points[chosen], middles[~are_on_surface(middles, second, near)]])
+    return _Sides(points, second.contains(points), bool(on.any()))
 
 
-def lies_on(points: FloatArray, surface: Surface, near: float) -> BoolArray:
-    """Whether each of the points (q, 3) lies on the surface."""
+def are_on_surface(points: FloatArray, surface: Surface, near: float) -> BoolArray:
+    """Whether each point (q, 3) is within a distance `near`, unit, of the surface, (q,)."""
     low, high = _box(surface)
     on = np.asarray(((points >= low - near) & (points <= high + near)).all(axis=1))
     on[on] = surface.near(points[on], near)

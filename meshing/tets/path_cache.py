@@ -1,4 +1,4 @@
-"""Paths that were traced through a mesh, cached for later requests.
+"""Traced paths through a mesh, cached for later requests.
 
 At equal refractive index, light takes the same paths in every medium; only its attenuation along them differs.
 """
@@ -13,25 +13,25 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.cell_tree import PathSegments
 
 # Segments cached per mesh: two hundred megabytes.
-MOST_SEGMENTS = 1 << 21
+MOST_CACHED_SEGMENTS = 1 << 21
 # Parts cached per mesh, since each is searched; the oldest are dropped first.
-MOST_PARTS = 64
+MOST_CACHED_PARTS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class TracedPaths:
-    """Paths that were traced.
+    """Traced paths with their segments.
 
     Parameters
     ----------
     lines : (7, p) ndarray
-        Starts, directions, and the length traced of each.
+        Start, direction and traced length of each path, unit.
     cells, ends : (p,) ndarray
         The tetrahedra in which the paths begin and end.
     lost : (p,) ndarray of bool
-        Paths whose tracing failed.
+        Whether tracing failed.
     segments : PathSegments
-        Segments of the other paths.
+        Segments of the paths that are not lost.
     """
 
     lines: FloatArray
@@ -43,7 +43,7 @@ class TracedPaths:
     @cached_property
     def _by_key(self) -> tuple[FloatArray, IntArray]:
         """The keys of all paths, ascending, and the path of each."""
-        keys = keys_of(self.lines)
+        keys = hash_lines(self.lines)
         order = np.argsort(keys)
         return keys[order], order
 
@@ -78,7 +78,7 @@ class TracedPaths:
         return TracedPaths(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], segments)
 
     def shorten(self, lengths: FloatArray) -> "TracedPaths":
-        """The paths cut off at lengths (p,); `ends` of the shortened paths is then not valid."""
+        """The paths cut off at lengths (p,); `ends` is not valid for the shortened paths."""
         if (self.lines[6] <= lengths).all():
             return self
         every = self.segments
@@ -89,7 +89,7 @@ class TracedPaths:
         )
 
     def extend(self, more: "TracedPaths", further: IntArray) -> "TracedPaths":
-        """The paths with continuations `more` of the paths `further`, traced from where these ended."""
+        """Append to the paths of indices `further` their continuations `more`, which begin where these paths end."""
         lines, ends, lost = self.lines.copy(), self.ends.copy(), self.lost.copy()
         lines[6, further], ends[further], lost[further] = more.lines[6], more.ends, more.lost
         one, other = self.segments, more.segments
@@ -126,19 +126,19 @@ def select_segments(every: PathSegments, chosen: BoolArray) -> PathSegments:
 _WEIGHTS = np.sqrt([2.0, 3.0, 5.0, 7.0, 11.0, 13.0])
 
 
-def keys_of(lines: FloatArray) -> FloatArray:
-    """A hash of the start and direction of each line (7, p), (p,); bitwise equal lines have equal hashes."""
+def hash_lines(lines: FloatArray) -> FloatArray:
+    """Hash the start and direction of each line (7, p), (p,); bitwise equal lines have equal hashes."""
     return np.asarray(sum(weight * row for weight, row in zip(_WEIGHTS, lines[:6], strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class PathCache:
-    """The paths that were traced through one mesh."""
+    """The traced paths of one mesh, in parts."""
 
     parts: list[TracedPaths] = field(default_factory=list)
 
     def add(self, part: TracedPaths, instead: TracedPaths | None = None) -> None:
-        """Cache a part, in place of the part that it extends, unless the cache would exceed its size limit."""
+        """Cache traced paths, in place of `instead` if given, unless the cache would exceed its size limit."""
         others = [each for each in self.parts if each is not instead]
-        if sum(len(each.segments.paths) for each in [*others, part]) <= MOST_SEGMENTS:
-            self.parts[:] = [*others, part][-MOST_PARTS:]
+        if sum(len(each.segments.paths) for each in [*others, part]) <= MOST_CACHED_SEGMENTS:
+            self.parts[:] = [*others, part][-MOST_CACHED_PARTS:]

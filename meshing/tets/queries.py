@@ -1,4 +1,4 @@
-"""Nearest points and distances on the boundary of a mesh."""
+"""Closest points of the boundary of a mesh, and distances of its facets from a surface."""
 
 from functools import cached_property
 
@@ -6,11 +6,12 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.search.proximity import ClosestPoint
-from tetlux.meshing.surface.surface import Surface, barycentric_of
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import barycentric_on_triangles
 
 
 class BoundaryQueries:
-    """The boundary of a mesh, prepared for nearest points and distances.
+    """The boundary of a mesh, prepared for closest points and distances.
 
     Parameters
     ----------
@@ -28,9 +29,9 @@ class BoundaryQueries:
         return ClosestPoint(self._points, self._faces)
 
     def closest(self, queries: FloatArray) -> tuple[FloatArray, IntArray, FloatArray]:
-        """Nearest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
+        """Closest boundary points of queries (q, 3), as `TetMesh.closest_boundary` returns them."""
         nearest, face = self._closest(queries)
-        return nearest, face, barycentric_of(nearest, self._points[self._faces[face]])
+        return nearest, face, barycentric_on_triangles(nearest, self._points[self._faces[face]])
 
     def distances(self, surface: Surface, faces: IntArray) -> FloatArray:
         """Distance of the centroids of boundary triangles (q,) from a surface, (q,); each is computed once."""

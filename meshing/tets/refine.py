@@ -10,15 +10,15 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import nodes_of
+from tetlux.meshing.tets.regions import surface_nodes
 from tetlux.meshing.tets.topology import EDGES, EDGES_OF_FACES
 
-# Moves of boundary nodes are shortened until each tetrahedron keeps this share of its volume and of its quality, and a
-# quality above the second value, or its old quality if that was lower.
+# The moves of boundary nodes are shortened until each tetrahedron keeps the first share of its volume, and the same
+# share of its quality or a quality above the second value (or its old quality, if that is lower).
 SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
-# A node on two surfaces is projected on them in turn this many times, which converges to their intersection.
-ROUNDS = 10
+# A node on two surfaces is projected on each in turn, this many times: the projections converge to their intersection.
+PROJECTION_ROUNDS = 10
 # The edges of a tetrahedron, and of each of its faces.
 _GROUPS = [list(range(6)), *EDGES_OF_FACES.tolist()]
 # Even permutations of the corners that put each edge first, and the resulting permutations of the edges.
@@ -58,7 +58,7 @@ def refine(
         fine = replace(fine, regions=mesh.regions[parents])
     if surface is None:
         return fine
-    return moved_to_surface(fine, surface, regions, first=len(mesh.points))
+    return move_to_surface(fine, surface, regions, first=len(mesh.points))
 
 
 def _bisect(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:
@@ -115,20 +115,30 @@ def _mark_edges(edges: IndexArray, priority: IndexArray, marked: BoolArray, coun
     return split
 
 
-def moved_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] = (), *, first: int = 0) -> TetMesh:
-    """Move boundary nodes (those numbered `first` and up) to the nearest point of a surface.
+def move_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] = (), *, first: int = 0) -> TetMesh:
+    """Move boundary nodes to the closest points of a surface, and nodes between regions to the inner surfaces.
 
-    Nodes between regions are moved to the inner surfaces, and those where surfaces touch onto both.
+    A node where surfaces touch moves to a point of both. A node whose move would invert or flatten a tetrahedron moves
+    only part of the way or not at all: 0 to 5 % of the nodes of fTetWild's meshes. A worst quality above 0.1 stays so.
 
-    A node whose move would invert or flatten a tetrahedron moves only part of the way or not at all. On fTetWild's
-    meshes these are 0 to 5 % of the nodes, and a worst quality above 0.1 stays above it.
+    Parameters
+    ----------
+    mesh : TetMesh
+    surface : Surface
+        Of the body.
+    regions : sequence of Surface
+        The inner surfaces of the mesh, in their order.
+    first : int
+        Nodes of smaller numbers stay.
     """
-    targets = [(target, np.flatnonzero(nodes[first:]) + first) for target, nodes in nodes_of(mesh, surface, regions)]
+    targets = [
+        (target, np.flatnonzero(nodes[first:]) + first) for target, nodes in surface_nodes(mesh, surface, regions)
+    ]
     surfaces_at = np.bincount(np.concatenate([nodes for _, nodes in targets]), minlength=len(mesh.points))
     if not surfaces_at.any():
         return mesh
     aim = mesh.points.copy()
-    for again in range(ROUNDS if surfaces_at.max() > 1 else 1):
+    for again in range(PROJECTION_ROUNDS if surfaces_at.max() > 1 else 1):
         for target, nodes in targets:
             some = nodes[surfaces_at[nodes] > 1] if again else nodes
             aim[some], _ = target.project(aim[some])

@@ -14,7 +14,7 @@ from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.nesting import TOUCH, lies_on, nesting
+from tetlux.meshing.tets.nesting import TOUCH_DISTANCE, are_on_surface, nesting
 
 
 @lru_cache(maxsize=16)  # each solution on each mesh needs them
@@ -26,26 +26,26 @@ def own_volumes(surface: Surface, regions: tuple[Surface, ...]) -> FloatArray:
     return own
 
 
-def by_volume(regions: Sequence[Surface]) -> list[int]:
-    """Region numbers from the largest to the smallest: the last one that contains a point is its region."""
+def sort_by_volume(regions: Sequence[Surface]) -> list[int]:
+    """Region numbers by falling volume: the last region in this order that contains a point is the point's region."""
     return sorted(range(1, len(regions) + 1), key=lambda i: -regions[i - 1].volume)
 
 
 def owners(pairs: IntArray, regions: Sequence[Surface]) -> IntArray:
-    """The region that owns each triangle between two regions (f, 2): the smaller of the two, (f,)."""
-    rank = np.argsort([0, *by_volume(regions)])
+    """The region whose surface has each triangle between two regions (f, 2): the smaller of the two, (f,)."""
+    rank = np.argsort([0, *sort_by_volume(regions)])
     return np.asarray(np.where(rank[pairs[:, 0]] > rank[pairs[:, 1]], pairs[:, 0], pairs[:, 1]))
 
 
 def region_at(points: FloatArray, regions: Sequence[Surface]) -> IntArray:
     """The region of each point (q, 3) of a body, (q,)."""
     found = np.zeros(len(points), dtype=np.int64)
-    for region in by_volume(regions):
+    for region in sort_by_volume(regions):
         found[regions[region - 1].contains(points)] = region
     return found
 
 
-def nodes_of(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> list[tuple[Surface, BoolArray]]:
+def surface_nodes(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> list[tuple[Surface, BoolArray]]:
     """The surfaces of a mesh, from the smallest to the body's, each with a mask (n,) of its nodes.
 
     A triangle between two regions belongs to the smaller region's surface.
@@ -65,7 +65,7 @@ def nodes_of(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> lis
             f"the mesh has a region {int(pairs.max())}, and {len(regions)} inner surfaces are given; "
             "give those that it was made of."
         )
-    order = [0, *by_volume(regions)]
+    order = [0, *sort_by_volume(regions)]
     owner = owners(pairs, regions)
     found = []
     for i in order[:0:-1]:
@@ -86,9 +86,9 @@ def _part_off(surface: Surface, others: tuple[Surface, ...]) -> Surface:
     """The triangles of a surface that do not lie on other surfaces."""
     shared = np.zeros(len(surface.faces), dtype=bool)
     for other in others:
-        near = TOUCH * max(surface.diagonal, other.diagonal)
-        whole = np.flatnonzero(lies_on(surface.points, other, near)[surface.faces].all(axis=1))
-        shared[whole[lies_on(surface.points[surface.faces[whole]].mean(axis=1), other, near)]] = True
+        near = TOUCH_DISTANCE * max(surface.diagonal, other.diagonal)
+        whole = np.flatnonzero(are_on_surface(surface.points, other, near)[surface.faces].all(axis=1))
+        shared[whole[are_on_surface(surface.points[surface.faces[whole]].mean(axis=1), other, near)]] = True
     if not shared.any() or shared.all():
         return surface
     return replace(surface, faces=surface.faces[~shared], shape=None)

@@ -1,4 +1,4 @@
-"""The region of each tetrahedron that the mesher returns."""
+"""The regions of the mesher's tetrahedra."""
 
 from collections.abc import Sequence
 
@@ -9,17 +9,17 @@ from scipy.sparse.csgraph import connected_components
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, spread_indices
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
-from tetlux.meshing.tets.nesting import lies_on
-from tetlux.meshing.tets.regions import by_volume
+from tetlux.meshing.tets.nesting import are_on_surface
+from tetlux.meshing.tets.regions import sort_by_volume
 from tetlux.meshing.tets.topology import find_shared_faces
 
-# Sample tetrahedra per compartment that are tested for lying in a region.
-SAMPLES = 500
-# A compartment is tested tetrahedron by tetrahedron if the samples disagree on more than this share of its volume, or
-# of the region's.
+# Tetrahedra per compartment that are tested for lying in a region.
+COMPARTMENT_SAMPLES = 500
+# All tetrahedra of a compartment are tested if its samples disagree on more than this share of its volume, or of the
+# region's volume.
 DISSENT = 0.1
-# The largest distance of a node on a surface from it, in envelopes.
-ROUNDING = 1.01
+# A node on a surface is at most this many envelopes from it.
+ENVELOPE_SLACK = 1.01
 
 
 def tag_tetrahedra(
@@ -45,11 +45,11 @@ def tag_tetrahedra(
     centroids, volumes = points[tetrahedra].mean(axis=1), tetrahedron_volumes(points, tetrahedra)
 
     def is_inside(by: Surface) -> BoolArray:
-        return _is_inside(points, centroids, volumes, shared, by, ROUNDING * envelope)
+        return _is_inside(points, centroids, volumes, shared, by, ENVELOPE_SLACK * envelope)
 
     inside = is_inside(surface)
     result = np.where(inside, 0, -1)
-    for i in by_volume(regions):
+    for i in sort_by_volume(regions):
         result[inside & is_inside(regions[i - 1])] = i
     return result
 
@@ -64,19 +64,19 @@ def _is_inside(
 ) -> BoolArray:
     """Whether each tetrahedron lies inside a surface, (m,)."""
     cells, corners = shared
-    cells = cells[~lies_on(points, surface, near)[corners].all(axis=1)]
+    cells = cells[~are_on_surface(points, surface, near)[corners].all(axis=1)]
     count = len(centroids)
     links = coo_array((np.ones(len(cells), dtype=bool), cells.T), shape=(count, count))
     compartment = connected_components(links, directed=False)[1]
     order = np.argsort(compartment, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(compartment[order])) + 1)
-    samples = np.concatenate([part[spread_indices(len(part), SAMPLES)] for part in parts])
-    answers, of_answers = surface.contains(centroids[samples]), compartment[samples]
-    share = np.bincount(of_answers, answers) / np.bincount(of_answers)
+    samples = np.concatenate([part[spread_indices(len(part), COMPARTMENT_SAMPLES)] for part in parts])
+    inside, sampled = surface.contains(centroids[samples]), compartment[samples]
+    share = np.bincount(sampled, inside) / np.bincount(sampled)
     result = np.asarray((share > 0.5)[compartment])
     # A gap in the mesh's copy of the surface merges two compartments: test each of their tetrahedra.
     size = np.bincount(compartment, volumes)
-    torn = np.minimum(share, 1.0 - share) * size > DISSENT * np.minimum(size, surface.volume)
-    each = np.flatnonzero(torn[compartment])
-    result[each] = surface.contains(centroids[each])
+    mixed = np.minimum(share, 1.0 - share) * size > DISSENT * np.minimum(size, surface.volume)
+    cells = np.flatnonzero(mixed[compartment])
+    result[cells] = surface.contains(centroids[cells])
     return result

@@ -5,8 +5,8 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Rays at 45 degrees around the inward normal.
-AROUND = 6
+# Number of rays at 45 degrees around the inward normal.
+SLANTED_RAYS = 6
 
 
 def thickness(mesh: TetMesh) -> FloatArray:
@@ -26,11 +26,11 @@ def thickness(mesh: TetMesh) -> FloatArray:
     first = np.cross(inward, np.eye(3)[np.abs(inward).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(inward, first)
-    turns = 2.0 * np.pi * np.arange(AROUND) / AROUND
+    turns = 2.0 * np.pi * np.arange(SLANTED_RAYS) / SLANTED_RAYS
     slanted = inward + np.cos(turns)[:, None, None] * first + np.sin(turns)[:, None, None] * second
     rays = np.concatenate([inward[None], slanted / np.sqrt(2.0)])
     starts = np.broadcast_to(mesh.points[mesh.boundary_faces].mean(axis=1), rays.shape)
     lengths = mesh.rays.first(starts.reshape(-1, 3), rays.reshape(-1, 3))[0].reshape(len(rays), -1)
     # Near an edge, up to three of the six rays are short.
-    around = np.sort(lengths[1:], axis=0)[AROUND // 2]
+    around = np.sort(lengths[1:], axis=0)[SLANTED_RAYS // 2]
     return np.asarray(np.minimum(lengths[0], np.sqrt(2.0) * around))

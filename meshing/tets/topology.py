@@ -1,10 +1,11 @@
-"""Which edges, faces and neighbours the tetrahedra of a mesh have."""
+"""Edges, faces and neighbours of the tetrahedra of a mesh."""
 
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.meshing.arrays import IndexArray, IntArray
-from tetlux.meshing.host.blocks import group_keys, in_blocks, once
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.host.blocks import find_single_keys, group_keys, run_in_blocks
 
 # Faces of a positively oriented tetrahedron, each anticlockwise seen from outside.
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
@@ -14,6 +15,22 @@ EDGES_OF_FACES = np.array([[3, 4, 5], [1, 2, 5], [0, 2, 4], [0, 1, 3]])
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 # Up to this many nodes, three node numbers fit into one 64-bit key.
 MOST_NODES_OF_SHORT_KEYS = 2_600_000
+
+
+def check_arrays(points: FloatArray, tetrahedra: IntArray) -> None:
+    """Refuse points that are not (n, 3) or not finite, and tetrahedra that are not (m, 4) indices of points.
+
+    Raises
+    ------
+    InputError
+    """
+    p, t = points, tetrahedra
+    if p.ndim != 2 or p.shape[1] != 3 or t.ndim != 2 or t.shape[1] != 4 or len(t) == 0:
+        raise InputError(f"a mesh needs (n, 3) points and (m, 4) tetrahedra, not {p.shape} and {t.shape}.")
+    if t.min() < 0 or t.max() >= len(p):
+        raise InputError("a tetrahedron names a node that does not exist.")
+    if not np.isfinite(p).all():
+        raise InputError("a node's coordinate is not finite.")
 
 
 def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray]:
@@ -40,16 +57,16 @@ def number_edges(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IndexArray
             low, high = np.minimum(corners[i], corners[j]), np.maximum(corners[i], corners[j])
             keys[edge, block] = low * nodes + high
 
-    in_blocks(fill, len(tetrahedra))
+    run_in_blocks(fill, len(tetrahedra))
     unique, inverse = group_keys(keys.reshape(-1))
     return np.stack(np.divmod(unique.view(np.int64), nodes), axis=1), inverse.reshape(6, -1).T
 
 
 def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
-    """A key for each face of each tetrahedron, (4m,), equal for faces with the same three corners."""
+    """A key for each face of each tetrahedron, (4m,); faces with the same three corners have equal keys."""
     keys = np.empty((len(tetrahedra), 4), dtype=np.uint64)
     short = nodes <= MOST_NODES_OF_SHORT_KEYS
-    # In larger meshes, the number of the pair of the two smaller corners takes the place of these corners.
+    # In larger meshes, the two smaller corners are replaced by the number of their pair.
     pairs = np.empty((0 if short else len(keys), 4), dtype=np.uint64)
 
     def fill(block: slice) -> None:
@@ -63,14 +80,14 @@ def face_keys(tetrahedra: IntArray, nodes: int) -> npt.NDArray[np.uint64]:
             else:
                 keys[block, face], pairs[block, face] = high, pair
 
-    in_blocks(fill, len(keys))
+    run_in_blocks(fill, len(keys))
     if not short:
         keys += (group_keys(pairs.reshape(-1))[1].astype(np.uint64) * np.uint64(nodes)).reshape(-1, 4)
     return keys.reshape(-1)
 
 
 def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
-    """The tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
+    """Find the tetrahedron behind the face opposite each corner, (m, 4); -1 at the boundary."""
     unique, face = group_keys(face_keys(tetrahedra, nodes))
     owners = np.repeat(np.arange(len(tetrahedra)), 4)
     both = np.bincount(face, minlength=len(unique)) == 2
@@ -80,7 +97,7 @@ def find_neighbours(tetrahedra: IntArray, nodes: int) -> IndexArray:
 
 
 def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
-    """The two tetrahedra at each inner face (p, 2), and the corners of that face (p, 3)."""
+    """Find the two tetrahedra at each inner face (p, 2), and the corners of the face (p, 3)."""
     face = group_keys(face_keys(tetrahedra, nodes))[1]
     order = np.argsort(face, kind="stable")
     pair = np.flatnonzero(np.diff(face[order]) == 0)
@@ -89,13 +106,13 @@ def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntAr
 
 
 def find_boundary(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
-    """Faces of one tetrahedron only, as ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
-    places = once(face_keys(tetrahedra, nodes))
+    """Find the faces of only one tetrahedron: ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
+    places = find_single_keys(face_keys(tetrahedra, nodes))
     return places, tetrahedra[places[:, None] // 4, FACES[places % 4]]
 
 
 def find_interfaces(tetrahedra: IntArray, regions: IntArray, nodes: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Triangles between tetrahedra of different regions, as `TetMesh.interfaces` describes them."""
+    """Find the triangles between tetrahedra of different regions, as `TetMesh.interfaces` returns them."""
     regions_at = np.zeros(nodes, dtype=np.int64)
     for region in np.unique(regions):
         touched = np.zeros(nodes, dtype=bool)

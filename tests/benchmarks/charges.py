@@ -29,13 +29,13 @@ from tetlux.fem.charges.places import distance_from
 from tetlux.fem.charges.places import scaled as scaled_spacing
 from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.charges.samples import cells_of, draw
-from tetlux.fem.meshless.solution import Entry, charge_solution
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.meshless.solution import Entry, charge_solution
 from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair.pipeline import surface_from_arrays
-from tetlux.meshing.surface.surface import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
 DARKER = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
@@ -69,7 +69,7 @@ class Scene:
 
 def lit(name: str, surface: Surface, medium: Medium, beam: PencilBeam, radius: float | None = None) -> Scene:
     """A pencil beam as a point."""
-    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).points, radius)
+    return Scene(name, surface, medium, beam.deposit_in(Body(surface, (medium,))).terms.points, radius)
 
 
 def named(files: list[str]) -> list[Scene]:

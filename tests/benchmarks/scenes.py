@@ -97,7 +97,7 @@ def furnace(name: str, medium: Medium) -> Scene:
     k, zb, a = medium.sigma_tr, medium.extrapolation_length, 10.0
     # phi + zb phi' = 4 E_t/(1 - 2 C1) at r = a for phi = c sinh(k r)/r; what flows in, -D phi', does not come out.
     growth = k / np.tanh(k * a) - 1.0 / a
-    passed = deposit.transmitted_irradiance
+    passed = deposit.terms.transmitted_irradiance
     inside = 4.0 * medium.eta**2 / (1.0 + zb * growth)
     truth = np.full(SAMPLES, passed - medium.diffusion * growth * inside)
     return Scene(name, scene.surface, medium, light, scene.points, scene.weights, truth)

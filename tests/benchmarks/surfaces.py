@@ -15,7 +15,7 @@ import numpy as np
 from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, PencilBeam, solve
 from tetlux.meshing import Surface, read_surface
-from tetlux.meshing.surface.subdivide import edges_of, split_edges, with_longest
+from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
 
 ACROSS = 60.0
 
@@ -25,10 +25,10 @@ def refined(surface: Surface, faces: int) -> Surface:
     points, triangles, parents = surface.points, surface.faces, np.arange(len(surface.faces))
     flat = points
     while len(triangles) < faces:
-        edges = ends, edge = edges_of(triangles)
+        edges = ends, edge = number_triangle_edges(triangles)
         owner = np.empty(len(ends), dtype=np.int64)
         owner[edge.ravel()] = np.repeat(parents, 3)
-        marked = with_longest(flat, edges, np.ones(len(ends), dtype=bool))
+        marked = mark_longest_edges(flat, edges, np.ones(len(ends), dtype=bool))
         flat, triangles, origin = split_edges(flat, triangles, edges, marked)
         points = np.vstack([points, surface.on_curve(owner[marked], flat[len(points) :])[0]])
         parents = parents[origin]

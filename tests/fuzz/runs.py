@@ -15,7 +15,7 @@ from tests.fuzz.case_files import case_files, companions, traps
 from tests.fuzz.outcome import Outcome, complaint, outcome_of
 from tests.fuzz.surfaces import Malformed, surfaces
 from tests.fuzz.volumes import MESH, case_of, volumes
-from tetlux.cases.file.case import load_cases
+from tetlux.cases.file.load import load_cases
 
 # What file systems hold.
 LONGEST_NAME = 255

@@ -26,7 +26,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.cases.file.case import load_cases
+from tests.layers_made import CLEAR, DENSE, DOWN, layer
+from tetlux.cases.file.load import load_cases
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
@@ -46,17 +47,13 @@ from tetlux.fem import (
 from tetlux.fem.exact import layered
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.media.coefficients import AnyMedium
-from tetlux.meshing import Surface, box, sphere
+from tetlux.meshing import Surface, sphere
 from tetlux.meshing.arrays import FloatArray
 
 TOLERANCE = 0.04
 # A beam without width is singular where it enters, and would be refined there for ever.
 MOST_TETRAHEDRA = {"pencil line": 40_000}
-# The dense medium and the clear one: a factor of five in scattering and of 25 in absorption.
-DENSE = Medium(sigma_a=0.05, sigma_s=10.0, g=0.8, eta=1.4)
-CLEAR = Medium(sigma_a=0.002, sigma_s=2.0, g=0.8, eta=1.4)
 SIZE, DEPTH, UPPER, THIN = 20.0, 8.0, 3.0, 0.3
-DOWN = (0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True)
@@ -86,8 +83,8 @@ class Written:
 
 
 def plate(low: float, high: float) -> Surface:
-    """What lies between two depths of the plate."""
-    return box((SIZE, SIZE, high - low), center=(0.0, 0.0, -0.5 * (low + high)))
+    """The part between two depths of the plate."""
+    return layer(low, high, SIZE)
 
 
 def two_layers(depth: float, upper: Medium, lower: Medium, *, field: bool = False) -> Written:

@@ -15,8 +15,7 @@ from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab_plane, sphere, sphere_light
 from tetlux.fem.exact.beam import Source
 from tetlux.fem.exact.monte_carlo import Estimate
-from tetlux.fem.exact.numerics.ball import HALF
-from tetlux.fem.exact.numerics.bessel import inner_ratios, wall_rates
+from tetlux.fem.exact.numerics.bessel import SPHERICAL, inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
 from tetlux.fem.exact.slab_plane import escape_front
@@ -197,9 +196,9 @@ def points_under_a_beam(medium: Medium, radius: float) -> Exitance:
     height = mu - np.minimum(medium.mean_free_path / radius, mu)
     r = np.sqrt(height**2 + 1.0 - mu**2)
     x = medium.sigma_tr * radius
-    growth = wall_rates(order, np.array([x]), HALF).growth[:, 0]
+    growth = wall_rates(order, np.array([x]), SPHERICAL).growth[:, 0]
     legendre = np.polynomial.legendre.legvander(height / r, order).T
-    power = medium.albedo * (inner_ratios(order, x, r, HALF) * legendre) @ weight
+    power = medium.albedo * (inner_ratios(order, x, r, SPHERICAL) * legendre) @ weight
     series = 0.5 * (2.0 * np.arange(order + 1) + 1.0) * power
     series /= 1.0 + medium.extrapolation_length / radius * growth
     return lambda gamma: legendre_sum(series, gamma)

@@ -51,7 +51,7 @@ from tetlux.fem import Medium, PencilBeam
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
 from tetlux.fem.exact.monte_carlo import Estimate
-from tetlux.fem.grading import graded_towards, lit_points
+from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.linear.solver import solver_for
 from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.operators.assembly import Assembly
@@ -176,8 +176,8 @@ def exitances_of_ball(medium: Medium, radius: float, edges: FloatArray) -> list[
     surface = sphere(radius=radius)
     deposit = PencilBeam((0.0, 0.0, 3.0 * radius), (0.0, 0.0, -1.0)).deposit_in(Body(surface, (medium,)))
     mesh = tetrahedralize(surface, edge_length=radius / 9.0)
-    mesh = graded_towards(mesh, surface, *lit_points([deposit]), 200_000, longest=0.35)
-    load = load_vector(mesh, coefficients_of(medium), deposit)
+    mesh = grade_mesh(mesh, surface, *places_to_resolve([deposit]), 200_000, longest=0.35)
+    load = load_vector(mesh, coefficients_of(medium), deposit.terms)
     assembly, escape = Assembly(mesh), 0.5 / medium.boundary_factor
     corners = mesh.points[mesh.tetrahedra]
     inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])

@@ -16,6 +16,7 @@ import numpy as np
 from tests.tables.diffusion_against_monte_carlo import entered, line_under_a_beam, medium_of
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab
+from tetlux.fem.exact.checks import Face
 from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
 from tetlux.fem.validity.tables import (
     ALBEDOS,
@@ -160,14 +161,14 @@ def plates() -> None:
             for eta in INDICES:
                 medium = medium_of(0.99, g, eta)
                 run = monte_carlo.slab(medium, thickness=thickness, light="pencil", edges=edges, photons=200_000)
-                faces: tuple[tuple[slab.Face, FloatArray, FloatArray], ...] = (
+                faces: tuple[tuple[Face, FloatArray, FloatArray], ...] = (
                     ("front", run.front, run.front_error),
                     ("back", run.back, run.back_error),
                 )
                 for face, truth, error in faces:
 
                     def exitance(
-                        rho: FloatArray, medium: Medium = medium, length: float = thickness, face: slab.Face = face
+                        rho: FloatArray, medium: Medium = medium, length: float = thickness, face: Face = face
                     ) -> FloatArray:
                         depth = min(1.0, 0.5 * length)
                         return slab.point_exitance(medium, thickness=length, depth=depth, rho=rho, face=face)

@@ -1,4 +1,4 @@
-"""The case file: its keys, their types, and what they are made into."""
+"""`CaseSpec`: the keys of the case file, with their types, defaults and descriptions."""
 
 from typing import Annotated, Any, Literal
 
@@ -40,7 +40,7 @@ class CylinderSpec(Section):
 
 
 class TorusSpec(Section):
-    """A torus round z."""
+    """A torus around z."""
 
     major: Length
     minor: Length
@@ -53,10 +53,13 @@ class SurfaceSpec(Choice):
     file: str | None = Field(None, description="surface file, relative to the case file")
     scale: Length = Field(1.0, description="factor on the file's coordinates")
     crease_angle: float = Field(
-        30.0, ge=0, le=180, description="degrees; triangles that bend less are one smooth surface, 0: all are flat"
+        30.0,
+        ge=0,
+        le=180,
+        description="degrees; triangles that bend by less form a smooth surface; 0: all are flat",
     )
     holes: Literal["small", "close", "refuse"] = Field(
-        "small", description="which holes of a file are closed: small ones, all (close), none (refuse)"
+        "small", description="which holes are capped: small ones, all (close) or none (refuse)"
     )
     sphere: SphereSpec | None = None
     slab: SlabSpec | None = None
@@ -67,14 +70,14 @@ class SurfaceSpec(Choice):
     @model_validator(mode="after")
     def _scale_of_a_file(self) -> "SurfaceSpec":
         if self.file is None and self.scale != 1.0:
-            raise PydanticCustomError("scale", "scale belongs to a file; give the shape its own lengths")
+            raise PydanticCustomError("scale", "scale applies to a surface file; give a shape its lengths directly")
         if self.file is None and self.holes != "small":
-            raise PydanticCustomError("holes", "holes belongs to a file; built-in shapes are closed")
+            raise PydanticCustomError("holes", "holes applies to a surface file; leave it out")
         return self
 
 
 class RegionSpec(Section):
-    """A closed surface inside the body, and what it holds."""
+    """A closed surface inside the body, and the medium inside it."""
 
     name: Label = Field("", description="default: region and number, as in region_1")
     surface: SurfaceSpec
@@ -82,11 +85,11 @@ class RegionSpec(Section):
 
 
 class MeshSpec(Section):
-    """Tetrahedra made elsewhere, with a medium for each of their labels."""
+    """A volume mesh made elsewhere, with a medium for each of its labels."""
 
     file: str = Field(description="volume mesh, relative to the case file")
     scale: Length = Field(1.0, description="factor on the file's coordinates")
-    array: str | None = Field(None, description="the array of the file that holds the labels, if it has several")
+    array: str | None = Field(None, description="the array of labels in the file, if there are several")
     labels: Annotated[dict[str, Media], Field(min_length=1)] = Field(
         description="the medium of each label, by its number or name; 0 if there are no labels"
     )
@@ -117,14 +120,14 @@ class CaseSpec(Section):
     """One scene."""
 
     name: Annotated[str, Field(pattern=r"^[\w][\w .+=,-]*$", max_length=120)] | None = Field(
-        None, description="names the folder of results; the file's name if not given"
+        None, description="name of the folder of results; default: the file's name"
     )
     unit: Literal["nm", "um", "mm", "cm", "m", "in"] = "mm"
     surface: SurfaceSpec | None = None
     medium: Media | None = None
-    mesh: MeshSpec | None = Field(None, description="tetrahedra of your own, in place of surface and medium")
+    mesh: MeshSpec | None = Field(None, description="a volume mesh of your own, in place of surface and medium")
     channels: Annotated[list[Label], Field(min_length=1)] | None = Field(
-        None, description="names of the channels, as many as lists in the case have values"
+        None, description="names of the channels, as many as the lists in the case have values"
     )
     regions: list[RegionSpec] = Field([])
     lights: Annotated[list[LightSpec], Field(min_length=1)]
@@ -135,12 +138,10 @@ class CaseSpec(Section):
         0.02, description="wanted relative L2 error of the exitance"
     )
     detectors: list[DetectorSpec] = Field([])
-    camera: CameraSpec | None = Field(
-        None, description="from where the picture is taken; chosen by the light if left out"
-    )
-    up: Vector3 = Field((0.0, 0.0, 1.0), description="what is up in the picture")
+    camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
+    up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
     outputs: list[Output] = Field(
-        ["surface", "volume", "picture"], description="default: all, with model charges all but volume"
+        ["surface", "volume", "picture"], description="default: all; with model charges all but volume"
     )
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,
@@ -168,7 +169,7 @@ class CaseSpec(Section):
                 if given:
                     raise PydanticCustomError(
                         "no_mesh",
-                        '{what} is for finite elements, which model "charges" does without; leave it out, or write '
+                        '{what} needs finite elements, which model "charges" does not use; leave it out, or write '
                         "model: full",
                         {"key": key, "what": what},
                     )
@@ -187,7 +188,7 @@ class CaseSpec(Section):
         if beside:
             raise PydanticCustomError(
                 "body",
-                "mesh stands in place of surface, medium, regions and compare; leave {beside} out",
+                "mesh replaces surface, medium, regions and compare; leave {beside} out",
                 {"beside": " and ".join(beside)},
             )
         return self

@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from tetlux.cases.file.schema.light_context import LightContext
 from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
-from tetlux.cases.file.schema.place import Place
 from tetlux.fem.inputs import check_positive
 from tetlux.fem.lights import (
     CollimatedBeam,
@@ -28,10 +28,10 @@ AnySpot = Disc | Gaussian | Rectangle | Image
 
 
 class LightSection(Section):
-    """The section of one kind of light, which makes that light."""
+    """The section of one kind of light, which builds that light."""
 
-    def light(self, place: Place) -> Light | None:
-        """The light in one channel, or None where it is dark; a section has no lists any more when it is asked.
+    def light(self, context: LightContext) -> Light | None:
+        """Build the light of one channel, or return None where it is dark; called on what `in_channel` returns.
 
         Raises
         ------
@@ -41,12 +41,12 @@ class LightSection(Section):
         raise NotImplementedError
 
     def in_channel(self, channel: int) -> Self | None:
-        """The section with the values of one channel, or None if one is 0 there: in a list that stands for dark."""
+        """The section with each list replaced by its value in one channel, or None where such a value is 0 (dark)."""
         lists = {name: value[channel] for name, value in self if isinstance(value, list)}
         return None if 0 in lists.values() else self.model_copy(update=lists)
 
     def number(self, name: str) -> float:
-        """A value that may be a list, and is none in one channel."""
+        """The value of a key that may be a list, after `in_channel`."""
         value = getattr(self, name)
         assert not isinstance(value, list)
         return float(value)
@@ -61,9 +61,9 @@ class PencilSpec(LightSection):
     radius: Number = Field(0.0, description="unit")
     deposit: Literal["point", "line"] = "point"
 
-    def light(self, place: Place) -> Light:
+    def light(self, context: LightContext) -> Light:
         """See `LightSection`."""
-        del place
+        del context
         return PencilBeam(self.origin, self.direction, self.number("power"), self.radius, self.deposit)
 
 
@@ -73,9 +73,9 @@ class PointSpec(LightSection):
     position: Vector3
     power: Each = Field(1.0, description="W")
 
-    def light(self, place: Place) -> Light:
+    def light(self, context: LightContext) -> Light:
         """See `LightSection`."""
-        del place
+        del context
         return PointSource(self.position, self.number("power"))
 
 
@@ -84,9 +84,9 @@ class DiffuseSpec(LightSection):
 
     irradiance: Each = Field(description="W/unit²")
 
-    def light(self, place: Place) -> Light:
+    def light(self, context: LightContext) -> Light:
         """See `LightSection`."""
-        del place
+        del context
         return DiffuseLight(self.number("irradiance"))
 
 
@@ -97,9 +97,9 @@ class PatchSpec(LightSection):
     radius: Length
     irradiance: Each = Field(description="W/unit²")
 
-    def light(self, place: Place) -> Light:
+    def light(self, context: LightContext) -> Light:
         """See `LightSection`."""
-        del place
+        del context
         return DiffusePatch(self.center, self.radius, self.number("irradiance"))
 
 
@@ -111,7 +111,7 @@ class DiscSpec(Section):
 
 
 class RectangleSpec(Section):
-    """An even, rectangular spot."""
+    """A uniform rectangular spot."""
 
     center: Vector3
     width: Length
@@ -137,8 +137,8 @@ class SpotSpec(Choice):
     rectangle: RectangleSpec | None = None
     image: ImageSpec | None = None
 
-    def spot(self, place: Place) -> AnySpot | None:
-        """The spot in one channel, or None where an image is dark."""
+    def spot(self, context: LightContext) -> AnySpot | None:
+        """Build the spot of one channel, or return None where its image is dark."""
         if self.disc:
             return Disc(self.disc.center, self.disc.radius)
         if self.gaussian:
@@ -146,8 +146,8 @@ class SpotSpec(Choice):
         if self.rectangle:
             return Rectangle(**dict(self.rectangle))
         assert self.image is not None
-        # An image that is black in all channels is refused by the spot.
-        pixels = place.pixels(self.image.file, self.image.encoding)
+        # `Image` itself refuses an image that is black in all channels.
+        pixels = context.pixels(self.image.file, self.image.encoding)
         return None if pixels is None else Image(self.image.center, self.image.width, pixels, self.image.up)
 
 
@@ -167,18 +167,18 @@ class CollimatedSpec(LightSection):
             raise PydanticCustomError("one_of", "give irradiance or power, not {what}", {"what": what})
         if self.power is not None and self.spot is None:
             raise PydanticCustomError(
-                "one_of", "power belongs to a spot; light on the whole body has an irradiance", {}
+                "one_of", "power belongs to a spot; give light on the whole body an irradiance", {}
             )
         return self
 
-    def light(self, place: Place) -> Light | None:
+    def light(self, context: LightContext) -> Light | None:
         """See `LightSection`."""
         if self.spot is None:
             return CollimatedBeam(self.direction, self.number("irradiance"))
-        spot = self.spot.spot(place)
+        spot = self.spot.spot(context)
         if spot is None:
             if self.power is not None:
-                raise InputError("the image is black in a channel that has power; give an irradiance instead.")
+                raise InputError("the image is black in a channel that has power; give irradiance in place of power.")
             return None
         irradiance = self.number("irradiance") if self.power is None else self.number("power") / spot.area
         return CollimatedBeam(self.direction, irradiance, spot)
@@ -193,16 +193,16 @@ class EnvironmentSpec(LightSection):
     front: Vector3 = Field((0.0, 1.0, 0.0), description="direction of the image's middle")
     encoding: Encoding = "srgb"
 
-    def light(self, place: Place) -> Light | None:
+    def light(self, context: LightContext) -> Light | None:
         """See `LightSection`."""
         brightest = self.number("brightest")
         check_positive(brightest, "brightest", "W/(unit² sr)")
-        pixels = place.pixels(self.file, self.encoding)
+        pixels = context.pixels(self.file, self.encoding)
         return None if pixels is None else EnvironmentLight(brightest * pixels, up=self.up, front=self.front)
 
 
 def _number_as_text(value: object) -> object:
-    """The number of a label as the text that it is looked up by."""
+    """Turn the number of a label into the text that it is looked up by."""
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
@@ -211,12 +211,13 @@ class EmissionSpec(LightSection):
 
     density: Each = Field(description="W/unit³")
     region: Annotated[str | None, BeforeValidator(_number_as_text)] = Field(
-        None, description="name of a region, or body for what is outside all of them; name or number of a mesh's label"
+        None,
+        description="name of a region, body for the part outside of all, or name or number of a mesh's label",
     )
 
-    def light(self, place: Place) -> Light:
+    def light(self, context: LightContext) -> Light:
         """See `LightSection`."""
-        return Emission(self.number("density"), place.region(self.region))
+        return Emission(self.number("density"), context.region(self.region))
 
 
 class LightSpec(Choice):
@@ -231,8 +232,8 @@ class LightSpec(Choice):
     environment: EnvironmentSpec | None = None
     emission: EmissionSpec | None = None
 
-    def light(self, place: Place) -> Light | None:
-        """The light in one channel, or None where it is dark.
+    def light(self, context: LightContext) -> Light | None:
+        """Build the light of one channel, or return None where it is dark.
 
         Raises
         ------
@@ -240,12 +241,12 @@ class LightSpec(Choice):
             If a value is wrong.
         """
         section: LightSection = getattr(self, self.kind)
-        here = section.in_channel(place.channel)
-        return None if here is None else here.light(place)
+        here = section.in_channel(context.channel)
+        return None if here is None else here.light(context)
 
 
 class FibreSpec(DiscSpec):
-    """A fibre that stands on the surface."""
+    """An optical fibre whose end touches the surface."""
 
     numerical_aperture: Number
 
@@ -260,13 +261,13 @@ class DetectorSpec(Choice):
 
 
 class CameraSpec(Section):
-    """From where the surface is seen: a place, or a direction by two angles."""
+    """Where the surface is seen from: a position, or a direction by two angles."""
 
     position: Vector3 | None = Field(
         None, description="the picture is taken from this side; radiance towards it is written with the surface"
     )
     azimuth: Number | None = Field(
-        None, description="of the picture alone: degrees about up, from the x axis anticlockwise seen from above"
+        None, description="for the picture only: degrees about up, anticlockwise from the x axis as seen from above"
     )
     elevation: Annotated[float, Field(strict=True, ge=-90, le=90)] | None = Field(
         None, description="degrees above the horizon, with azimuth; 20 if not given"
@@ -278,5 +279,5 @@ class CameraSpec(Section):
             what = "neither" if self.position is None else "both"
             raise PydanticCustomError("one_of", "give position or azimuth, not {what}", {"what": what})
         if self.position is not None and self.elevation is not None:
-            raise PydanticCustomError("one_of", "elevation belongs to azimuth; leave it out beside position", {})
+            raise PydanticCustomError("one_of", "elevation goes with azimuth; leave it out where position is given", {})
         return self

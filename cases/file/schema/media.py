@@ -22,7 +22,7 @@ class VolumeSpec(Section):
     """Values at the nodes or in the tetrahedra of a mesh."""
 
     file: str = Field(description="VTU file, relative to the case file")
-    name: str = Field(description="the array of values in it")
+    name: str = Field(description="name of the array of values in it")
     scale: Length = Field(1.0, description="factor on the file's coordinates")
 
 
@@ -30,21 +30,21 @@ class ImagesSpec(Section):
     """Grey images as slices along z."""
 
     files: str = Field(description="folder of PNG or TIFF slices, or one file of several pages")
-    origin: Vector3 = Field(description="middle of the first slice's first pixel, unit")
-    spacing: Spacing = Field(description="width and height of a pixel, and distance of slices, unit")
-    values: tuple[Number, Number] = Field(description="what black and white stand for, 1/unit")
+    origin: Vector3 = Field(description="centre of the first pixel of the first slice, unit")
+    spacing: Spacing = Field(description="width and height of a pixel, and distance between slices, unit")
+    values: tuple[Number, Number] = Field(description="values of black and white, 1/unit")
 
 
 class ArraySpec(Section):
     """A three-dimensional NumPy array."""
 
     file: str = Field(description=".npy file of values [x, y, z]")
-    origin: Vector3 = Field(description="middle of the first voxel, unit")
+    origin: Vector3 = Field(description="centre of the first voxel, unit")
     spacing: Spacing = Field(description="distance between neighbouring values, unit")
 
 
 class FieldSpec(Choice):
-    """A coefficient that varies from place to place, from a file."""
+    """A coefficient that varies in space, read from a file."""
 
     volume: VolumeSpec | None = None
     images: ImagesSpec | None = None
@@ -52,22 +52,22 @@ class FieldSpec(Choice):
 
 
 class TwoTermSpec(Section):
-    """Two lobes, see `tetlux.fem.media.phase.two_term`."""
+    """Two Henyey-Greenstein lobes, see `tetlux.fem.media.phase.two_term`."""
 
     g1: Number
     g2: Number
-    share: Number = Field(description="of the first lobe")
+    share: Number = Field(description="weight of the first lobe")
 
 
 class TableSpec(Section):
-    """A table, see `tetlux.fem.media.phase.table`."""
+    """A tabulated phase function, see `tetlux.fem.media.phase.table`."""
 
     angles: Numbers = Field(description="degrees, ascending from 0 to 180")
     values: Numbers = Field(description="1/sr")
 
 
 class PhaseSpec(Choice):
-    """How scattering distributes light over angles."""
+    """The phase function of scattering."""
 
     henyey_greenstein: Number | None = Field(None, description="mean cosine of the scattering angle")
     two_term: TwoTermSpec | None = None
@@ -84,7 +84,7 @@ Coefficient = Annotated[
 
 
 class MediumSpec(Section):
-    """A medium by its coefficients; the rules between its keys are those of `tetlux.fem.Medium`."""
+    """A medium by its coefficients, combined as in `tetlux.fem.Medium`."""
 
     sigma_a: Coefficient = Field(description="absorption coefficient, 1/unit")
     eta: Each = Field(description="refractive index relative to the outside")

@@ -1,4 +1,4 @@
-"""What sections of the case file are made of: numbers, choices, and values that may differ by channel."""
+"""Building blocks of the schema: numbers, choices, and values that may differ by channel."""
 
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
@@ -6,22 +6,22 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.nearest import did_you_mean, nearest
+from tetlux.cases.hints import did_you_mean, nearest_word
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Vector3 = tuple[Number, Number, Number]
 Numbers = Annotated[list[Number], Field(min_length=1)]
-# Of channels, lights, regions and detectors: it becomes part of the names of values in files.
+# The name of a channel, light, region or detector, which becomes part of the names of arrays in files.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=60)]
 Encoding = Literal["srgb", "linear"]
 
-# Tags of alternatives begin with this, so that they can be left out of the keys that errors name.
+# Tags of alternatives begin with this, so that error messages can leave them out of keys.
 TAG = "?"
 
 
 def shape_of(value: Any) -> str:
-    """The tag of a value by its shape: list, mapping, or one."""
+    """The tag of a value by its form: list, mapping, or a single value."""
     if isinstance(value, list | tuple):
         return TAG + "list"
     return TAG + ("mapping" if isinstance(value, dict | BaseModel) else "one")
@@ -43,7 +43,7 @@ Spacing = Annotated[
 
 
 class Section(BaseModel):
-    """A mapping of the case file, which holds no other keys than these."""
+    """A mapping of the case file that allows no other keys than its fields."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -64,19 +64,19 @@ class Section(BaseModel):
 
     @classmethod
     def _hint(cls, key: str, data: dict[Any, Any]) -> str:
-        """What an unknown key was probably meant to be, or where it belongs."""
-        homes = [name for name, field in cls.model_fields.items() if key in _keys_within(field.annotation)]
-        # Of several kinds of light, or of shape, the one that is given.
-        homes = [name for name in homes if name in data] or homes
-        if len(homes) == 1:
-            return f'it belongs in "{homes[0]}"; '
-        found = nearest(key, cls.model_fields)
+        """The clause about an unknown key: which section it belongs in, or which key was probably meant."""
+        sections = [name for name, field in cls.model_fields.items() if key in _keys_within(field.annotation)]
+        # Of several kinds of light or shape, prefer the one that is given.
+        sections = [name for name in sections if name in data] or sections
+        if len(sections) == 1:
+            return f'it belongs in "{sections[0]}"; '
+        found = nearest_word(key, cls.model_fields)
         meaning = cls.model_fields[found].description if found else None
         return did_you_mean(key, cls.model_fields, meaning or "")
 
 
 def _keys_within(annotation: Any) -> Iterator[str]:
-    """Keys of the sections that a value may be made of."""
+    """The keys of all sections within the type of a value."""
     if isinstance(annotation, type) and issubclass(annotation, Section):
         yield from annotation.model_fields
     for part in get_args(annotation):
@@ -100,7 +100,7 @@ class Choice(Section):
 
     @classmethod
     def kinds(cls) -> list[str]:
-        """The keys of which one is given."""
+        """The keys of which exactly one is given."""
         return [name for name, field in cls.model_fields.items() if field.default is None]
 
     @property

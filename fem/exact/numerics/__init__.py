@@ -1,1 +1,1 @@
-"""What the closed forms are computed with: quadrature, Bessel and Legendre functions, the field between planes."""
+"""Numerical methods of the closed forms: quadrature, Bessel and Legendre functions, the field between planes."""

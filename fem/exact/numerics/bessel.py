@@ -1,7 +1,8 @@
 """Ratios of modified Bessel functions, which neither overflow nor underflow at any order.
 
-The recurrences hold for ``I_nu`` and ``K_nu`` with ``nu = l + half``: `half` is 1/2 for the spherical
-functions ``i_l`` and ``k_l``, and 0 for the cylindrical ones (DLMF 10.29.1, 10.51.4).
+The recurrences hold for ``I_nu`` and ``K_nu`` with ``nu = l + half`` (DLMF 10.29.1, 10.51.4). `half` is SPHERICAL for
+``i_l`` and ``k_l``, which are ``I_nu`` and ``K_nu`` but for a power of the argument, and CYLINDRICAL for ``I_l`` and
+``K_l``.
 """
 
 from dataclasses import dataclass
@@ -11,10 +12,14 @@ from scipy import special
 
 from tetlux.meshing.arrays import FloatArray
 
+SPHERICAL, CYLINDRICAL = 0.5, 0.0
+# Numbers in one table of ratios: 32 MB.
+TABLE_SIZE = 4_000_000
+
 
 @dataclass(frozen=True)
 class WallRates:
-    """Logarithmic derivatives at the wall, for the orders 0, 1, 2, ...
+    """Logarithmic derivatives of both solutions at the wall, of the orders 0, 1, 2, ...
 
     Attributes
     ----------
@@ -29,11 +34,11 @@ class WallRates:
     decay: FloatArray
 
 
-def successive(order: int, x: FloatArray, half: float) -> FloatArray:
+def ratios_of_orders(order: int, x: FloatArray, half: float) -> FloatArray:
     """``H_l = I_{nu+1}(x)/(x I_nu(x))`` for l = 0..order, by the downward continued fraction.
 
-    Downward recurrence is the stable direction; the error of its start falls by a factor of 6 a step once the order
-    exceeds x. At x = 0 the value is ``1/(2 nu + 2)``.
+    Downward recurrence is stable: in each step at an order above x, the error of the initial value falls by a factor of
+    6. At x = 0 the value is ``1/(2 nu + 2)``.
 
     Parameters
     ----------
@@ -42,7 +47,7 @@ def successive(order: int, x: FloatArray, half: float) -> FloatArray:
     x : (...) ndarray
         Arguments, not negative.
     half : float
-        0.5 for spherical functions, 0 for cylindrical ones.
+        SPHERICAL or CYLINDRICAL.
 
     Returns
     -------
@@ -63,8 +68,8 @@ def successive(order: int, x: FloatArray, half: float) -> FloatArray:
 def wall_rates(order: int, x: FloatArray, half: float) -> WallRates:
     """Logarithmic derivatives of both solutions at argument `x`, for l = 0..order.
 
-    The decaying solution is computed by upward recurrence, its stable direction. The cylindrical rate of order 0
-    vanishes like ``1/log(1/x)`` at x = 0.
+    Upward recurrence is stable for the decaying solution. The cylindrical decay of order 0 vanishes like
+    ``1/log(1/x)`` at x = 0.
 
     Parameters
     ----------
@@ -73,7 +78,7 @@ def wall_rates(order: int, x: FloatArray, half: float) -> WallRates:
     x : (...) ndarray
         Arguments, not negative.
     half : float
-        0.5 for spherical functions, 0 for cylindrical ones.
+        SPHERICAL or CYLINDRICAL.
 
     Returns
     -------
@@ -81,7 +86,7 @@ def wall_rates(order: int, x: FloatArray, half: float) -> WallRates:
         With arrays of shape (order + 1, ...).
     """
     orders = np.arange(order + 1, dtype=float).reshape(-1, *(1,) * x.ndim)
-    growth = orders + x**2 * successive(order, x, half)
+    growth = orders + x**2 * ratios_of_orders(order, x, half)
     # s_l = x k_{l-1}(x)/k_l(x)
     decay = np.empty((order + 1, *x.shape))
     if half:
@@ -108,7 +113,7 @@ def inner_ratios(order: int, x: float | FloatArray, fraction: FloatArray, half: 
     fraction : (...) ndarray
         ``t``, from 0 to 1.
     half : float
-        0.5 for spherical functions, 0 for cylindrical ones.
+        SPHERICAL or CYLINDRICAL.
 
     Returns
     -------
@@ -120,36 +125,36 @@ def inner_ratios(order: int, x: float | FloatArray, fraction: FloatArray, half: 
     inner = wall * fraction
     start = _sinhc_scaled if half else special.i0e
     first = start(inner) / start(wall)
-    step = fraction * successive(order, inner, half)[:-1] / successive(order, wall, half)[:-1]
+    step = fraction * ratios_of_orders(order, inner, half)[:-1] / ratios_of_orders(order, wall, half)[:-1]
     result = np.empty((order + 1, *inner.shape))
     result[0] = first * np.exp(inner - wall)
     result[1:] = step
-    # High orders underflow to 0, which is their value to rounding.
+    # High orders underflow to 0, which is correct to rounding.
     with np.errstate(under="ignore"):
         return np.cumprod(result, axis=0, out=result)
 
 
 def order_needed(x: float, fraction: float, half: float, digits: float) -> int:
-    """Order at which ``i_l(x t)/i_l(x)`` has fallen to ``exp(-digits)`` of its value at order 0.
+    """The order at which ``i_l(x t)/i_l(x)`` has fallen to ``exp(-digits)`` of its value at order 0.
 
-    From the leading term of the uniform expansion of ``I_nu(nu z)`` (DLMF 10.41.3).
+    It follows from the leading term of the uniform expansion of ``I_nu(nu z)`` (DLMF 10.41.3).
     """
     if fraction <= 0.0:
         return 1
 
-    def fallen(l: float) -> float:  # noqa: E741
+    def decay(l: float) -> float:  # noqa: E741
         nu = l + half
         outer, inner = np.hypot(nu, x), np.hypot(nu, x * fraction)
         rise = nu * np.log((nu + inner) / (fraction * (nu + outer))) if nu else 0.0
         return float(outer - inner + rise - x * (1.0 - fraction))
 
     high = 1
-    while fallen(high) < digits and high < 2**40:
+    while decay(high) < digits and high < 2**40:
         high *= 2
     low = high // 2
     while high - low > max(1, high // 64):
         middle = (low + high) // 2
-        low, high = (middle, high) if fallen(middle) < digits else (low, middle)
+        low, high = (middle, high) if decay(middle) < digits else (low, middle)
     return high + 2
 
 

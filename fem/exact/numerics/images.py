@@ -1,8 +1,8 @@
-"""Fields of the mirror images of a point source in a plane: a point, and a line of sinks behind it."""
+"""Fields of the mirror image of a point source in a plane with a Robin boundary: a point, and a line of sinks."""
 
 import numpy as np
 
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, compute_in_chunks, graded_rule
 from tetlux.meshing.arrays import FloatArray
 
 
@@ -16,7 +16,7 @@ def sink_line(k: float, zb: float, rho: FloatArray, height: FloatArray) -> Float
     def integral(part: FloatArray, above: FloatArray) -> FloatArray:
         return np.asarray((CUTOFF * zb * weights) @ (np.exp(-l / zb) * mirror_flux(k, part, above + l)))
 
-    return in_chunks(integral, rho, height)
+    return compute_in_chunks(integral, rho, height)
 
 
 def mirror_flux(k: float, rho: FloatArray, w: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 from scipy import special
 
 from tetlux.fem.exact.numerics.images import mirror_flux, sink_line
-from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule, in_chunks
+from tetlux.fem.exact.numerics.quadrature import CUTOFF, compute_in_chunks, graded_rule
 from tetlux.meshing.arrays import FloatArray
 
 
@@ -51,12 +51,12 @@ class Layer:
         (n,) ndarray
             1/unit; infinite at the source.
         """
-        return in_chunks(lambda d, r: self._field(d, z0, r), z, rho)
+        return compute_in_chunks(lambda d, r: self._field(d, z0, r), z, rho)
 
     def slope(self, z: FloatArray, z0: float, rho: FloatArray) -> FloatArray:
         """``4 pi D dphi/dz``, for ``zb = 0`` alone; otherwise as `field`."""
         assert self.zb == 0.0
-        return in_chunks(lambda d, r: self._slope(d, z0, r), z, rho)
+        return compute_in_chunks(lambda d, r: self._slope(d, z0, r), z, rho)
 
     def _field(self, z: FloatArray, z0: float, rho: FloatArray) -> FloatArray:
         result = np.empty_like(rho)
@@ -87,7 +87,7 @@ class Layer:
         return result
 
     def _reflections(self, z: FloatArray, z0: float, rho: FloatArray, *, slope: bool) -> FloatArray:
-        """Add up the reflections between both planes by a Hankel integral over ``mu = sqrt(k² + q²)``.
+        """Sum the multiple reflections between both planes by a Hankel integral over ``mu = sqrt(k² + q²)``.
 
         A plane reflects ``e^{-mu z}`` by ``G = (zb mu - 1)/(zb mu + 1)``, and the reflections form a geometric
         series in ``G² e^{-2 mu L}``.
@@ -96,14 +96,14 @@ class Layer:
         nodes, weights = graded_rule(30, 20)
         mu = (k + CUTOFF / thickness * nodes)[:, None]
         reflection = (zb * mu - 1.0) / (zb * mu + 1.0)
-        # 1 - G² e^{-2 mu L}, exactly for small mu
-        lost = 4.0 * zb * mu / (1.0 + zb * mu) ** 2 - reflection**2 * np.expm1(-2.0 * mu * thickness)
-        there, back = (-mu, mu) if slope else (1.0, 1.0)
-        # Upwards in z, and downwards; both after at least one return.
+        # 1 - G² e^{-2 mu L}, without cancellation at small mu.
+        denominator = 4.0 * zb * mu / (1.0 + zb * mu) ** 2 - reflection**2 * np.expm1(-2.0 * mu * thickness)
+        up_factor, down_factor = (-mu, mu) if slope else (1.0, 1.0)
+        # Waves towards larger and smaller z, after a reflection at each plane.
         up = reflection * np.exp(-mu * (2.0 * thickness + z + z0)) + np.exp(-mu * (2.0 * thickness + z - z0))
         down = reflection * np.exp(-mu * (4.0 * thickness - z - z0)) + np.exp(-mu * (2.0 * thickness - z + z0))
         radial = special.j0(np.sqrt(mu**2 - k**2) * rho)
-        integrand = reflection**2 / lost * (there * up + back * down) * radial
+        integrand = reflection**2 / denominator * (up_factor * up + down_factor * down) * radial
         return np.asarray((CUTOFF / thickness * weights) @ integrand)
 
     def _modes(self, z: FloatArray, z0: float, rho: FloatArray, *, slope: bool) -> FloatArray:
@@ -119,9 +119,9 @@ class Layer:
 
 
 def _wavenumbers(zb: float, thickness: float, count: int) -> FloatArray:
-    """Return the first roots of ``b L + 2 atan(zb b) = n pi``, by Newton's method.
+    """The first `count` positive roots of ``b L + 2 atan(zb b) = n pi``, by Newton's method.
 
-    The left side is concave, so from below the root every step stays below it, and none is skipped.
+    The left side is concave, so Newton's method from below a root remains below it, and no root is skipped.
     """
     target = math.pi * np.arange(1, count + 1)
     b = (target - math.pi) / thickness

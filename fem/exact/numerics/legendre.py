@@ -8,13 +8,13 @@ from tetlux.meshing.arrays import FloatArray
 def legendre_sum(coefficients: FloatArray, gamma: FloatArray) -> FloatArray:
     """``sum_l c_l P_l(cos gamma)``.
 
-    The recurrence runs over the differences ``P_{l+1} - P_l`` with ``1 - cos gamma = 2 sin²(gamma/2)``, which
-    keeps small angles exact at orders where ``cos gamma`` itself has lost them.
+    The recurrence is that of the differences ``P_{l+1} - P_l`` with ``1 - cos gamma = 2 sin²(gamma/2)``: at high orders
+    and small angles, ``cos gamma`` has too few digits.
 
     Parameters
     ----------
     coefficients : (orders,) or (orders, n) ndarray
-        One series for all angles, or one for each.
+        One series for all angles, or one for each angle.
     gamma : (n,) ndarray
         Angles, radians.
 

@@ -1,4 +1,4 @@
-"""Quadrature for integrands with a boundary layer at one end, of any width."""
+"""Quadrature for integrands with a boundary layer of any width at one end."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 
-# exp(-CUTOFF) is below the rounding of a double: integrals end where a factor has fallen that far.
+# Integrals and sums end where a factor has fallen to exp(-CUTOFF), which is below the rounding of a double.
 CUTOFF = 40.0
 
 
@@ -35,16 +35,16 @@ def composite_rule(edges: FloatArray, order: int) -> tuple[FloatArray, FloatArra
     return nodes.ravel(), np.asarray(0.5 * length * w).ravel()
 
 
-def two_decays(s: FloatArray, first: float, second: float) -> FloatArray:
-    """``∫0..s e^{-first t} e^{-second (s - t)} dt``, also where both rates are equal."""
+def convolve_decays(s: FloatArray, first: float, second: float) -> FloatArray:
+    """``∫0..s e^{-first t} e^{-second (s - t)} dt``, also if both rates are equal."""
     slow, difference = min(first, second), abs(first - second)
     if difference == 0.0:
         return np.asarray(s * np.exp(-slow * s))
     return np.asarray(np.exp(-slow * s) * -np.expm1(-difference * s) / difference)
 
 
-def in_chunks(compute: Callable[..., FloatArray], *arrays: FloatArray, size: int = 4096) -> FloatArray:
-    """``compute(*arrays)`` over `size` entries at a time, which bounds the tables of nodes times points."""
+def compute_in_chunks(compute: Callable[..., FloatArray], *arrays: FloatArray, size: int = 4096) -> FloatArray:
+    """``compute(*arrays)``, of `size` entries at a time, which bounds the memory for tables of nodes times points."""
     total = arrays[0].size
     if total <= size:
         return compute(*arrays)

@@ -1,4 +1,4 @@
-"""Cross-sections of beams, one a file."""
+"""Cross-sections of collimated beams, one a file."""
 
 from tetlux.fem.lights.spots.disc import Disc
 from tetlux.fem.lights.spots.gaussian import Gaussian
@@ -6,7 +6,7 @@ from tetlux.fem.lights.spots.image import Image
 from tetlux.fem.lights.spots.rectangle import Rectangle
 from tetlux.fem.lights.spots.spot import Spot
 
-# Spots that stay what they are, so that what they light may be remembered.
-UNCHANGING = (Disc, Gaussian, Rectangle, Image)
+# The rays of an immutable spot on a mesh are kept with the mesh; a spot of the user's own may change in between.
+IMMUTABLE_SPOTS = (Disc, Gaussian, Rectangle, Image)
 
-__all__ = ["UNCHANGING", "Disc", "Gaussian", "Image", "Rectangle", "Spot"]
+__all__ = ["IMMUTABLE_SPOTS", "Disc", "Gaussian", "Image", "Rectangle", "Spot"]

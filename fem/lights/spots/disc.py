@@ -1,19 +1,19 @@
-"""An even, round spot."""
+"""A uniform, round spot."""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import beyond, squared, sunflower, with_middle
-from tetlux.fem.lights.spots.spot import EDGE, check_length
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.fem.lights.spots.plane import squared_distances
+from tetlux.fem.lights.spots.round import RoundSpot
+from tetlux.fem.lights.spots.spot import EDGE_SHARE
+from tetlux.meshing.arrays import FloatArray
 
 
 @dataclass(frozen=True)
-class Disc:
-    """An even, round spot.
+class Disc(RoundSpot):
+    """A uniform, round spot.
 
     Parameters
     ----------
@@ -21,14 +21,19 @@ class Disc:
         A point on the beam's axis, unit.
     radius : float
         unit.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or a length not positive.
+
+    Examples
+    --------
+    >>> from tetlux.fem import CollimatedBeam
+    >>> beam = CollimatedBeam(direction=(0.0, 0.0, -1.0), spot=Disc(center=(0.0, 0.0, 20.0), radius=2.0))
+    >>> round(beam.spot.area, 4)  # unit², power over irradiance
+    12.5664
     """
-
-    center: Vector
-    radius: float
-
-    def __post_init__(self) -> None:
-        as_vector(self.center, "center")
-        check_length(self.radius, "radius")
 
     @property
     def reach(self) -> float:
@@ -41,9 +46,9 @@ class Disc:
         return self.radius / 2.0
 
     @property
-    def edge(self) -> float:
+    def edge_size(self) -> float:
         """See `Spot`."""
-        return 2.0 * EDGE * self.radius
+        return 2.0 * EDGE_SHARE * self.radius
 
     @property
     def area(self) -> float:
@@ -52,12 +57,4 @@ class Disc:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return np.where(squared(offsets, direction) <= self.radius**2, 1.0, 0.0)
-
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """See `Spot`."""
-        return beyond(offsets, direction, self.reach)
-
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
-        """See `Spot`."""
-        return with_middle(sunflower(count, self.reach, direction))
+        return np.where(squared_distances(offsets, direction) <= self.radius**2, 1.0, 0.0)

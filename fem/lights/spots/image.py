@@ -7,18 +7,23 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import axes, outside, scattered
-from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.fem.lights.spots.plane import distances_to_rectangle, low_discrepancy, right_and_up
+from tetlux.fem.lights.spots.spot import EDGE_SHARE, check_length
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
-# Details finer than this share of an image are averaged: light that diffuses does not show them.
-FINEST = 1.0 / 128.0
+# Pixels along each side of an image, at most; finer ones are averaged, since diffusion blurs them.
+MOST_PIXELS = 128
 
 
 def check_pixels(pixels: FloatArray) -> None:
-    """Refuse what is no image of brightness, or one that is black all over."""
+    """Refuse an array that is no image of brightness, or black all over.
+
+    Raises
+    ------
+    InputError
+    """
     if pixels.ndim != 2 or min(pixels.shape) < 1:
         raise InputError(f"the image has the shape {pixels.shape}; give rows and columns of brightness.")
     if not np.isfinite(pixels).all() or (pixels < 0).any():
@@ -29,25 +34,33 @@ def check_pixels(pixels: FloatArray) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A spot whose irradiance is an image, as a projector casts it: its upper edge towards `up`.
+    """A spot whose irradiance is an image, as from a projector.
 
-    Who looks along the beam sees the image as it is. Details finer than a 128th of it are averaged.
+    Seen along the beam, the image is not mirrored. Details finer than a 128th of it are averaged.
 
     Parameters
     ----------
     center : (3,) floats
-        A point on the beam's axis, where the image's middle goes, unit.
+        Middle of the image, on the axis of the beam, unit.
     width : float
         unit; the height follows from the image.
     pixels : (rows, columns) ndarray
         Brightness from 0 to 1, linear, the upper row first.
     up : (3,) floats
-        The direction that is up on it, not along the beam.
+        Direction of the upper edge; its component along the beam does not count.
 
     Raises
     ------
     InputError
-        If the pixels are no image or all dark.
+        If a coordinate is not finite, the width not positive, or the pixels no image or all dark; and, when solved, if
+        `up` is along the beam.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> stripes = Image(center=(0.0, 0.0, 20.0), width=4.0, pixels=np.array([[1.0, 0.0], [1.0, 0.0]]))
+    >>> stripes.height, stripes.area
+    (4.0, 8.0)
     """
 
     center: Vector
@@ -57,17 +70,17 @@ class Image:
 
     def __post_init__(self) -> None:
         for name in ("center", "up"):
-            # Nobody can change them afterwards.
+            # As tuples, they cannot be changed later.
             object.__setattr__(self, name, tuple(as_vector(getattr(self, name), name).tolist()))
         check_length(self.width, "width")
         check_pixels(self.pixels)
 
     @cached_property
     def _coarse(self) -> FloatArray:
-        """The image with what is finer than `FINEST` averaged."""
+        """The image, of at most `MOST_PIXELS` rows and columns."""
         pixels = self.pixels
         for axis in (0, 1):
-            count = min(pixels.shape[axis], round(1.0 / FINEST))
+            count = min(pixels.shape[axis], MOST_PIXELS)
             places = np.arange(pixels.shape[axis]) * count // pixels.shape[axis]
             sizes = np.bincount(places)
             sums = np.add.reduceat(pixels, np.searchsorted(places, np.arange(count)), axis=axis)
@@ -76,7 +89,7 @@ class Image:
 
     @property
     def height(self) -> float:
-        """Unit."""
+        """Height of the image, unit."""
         return float(self.width * self.pixels.shape[0] / self.pixels.shape[1])
 
     @property
@@ -91,9 +104,9 @@ class Image:
         return float(min(self.height / max(rows, 4), self.width / max(columns, 4)))
 
     @property
-    def edge(self) -> float:
+    def edge_size(self) -> float:
         """See `Spot`."""
-        return EDGE * min(self.width, self.height)
+        return EDGE_SHARE * min(self.width, self.height)
 
     @property
     def area(self) -> float:
@@ -102,7 +115,7 @@ class Image:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        right, up = axes(direction, self.up)
+        right, up = right_and_up(direction, self.up)
         rows, columns = self._coarse.shape
         row = np.floor((0.5 - (offsets @ up) / self.height) * rows).astype(np.int64)
         column = np.floor(((offsets @ right) / self.width + 0.5) * columns).astype(np.int64)
@@ -111,18 +124,18 @@ class Image:
         shares[inside] = self._coarse[row[inside], column[inside]]
         return shares
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return outside(offsets, axes(direction, self.up), (self.width, self.height))
+        return distances_to_rectangle(offsets, right_and_up(direction, self.up), (self.width, self.height))
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
         rows, columns = self._coarse.shape
         bright = np.flatnonzero(self._coarse.ravel() > 0)
-        # In every bright pixel if there are few, else in some of each row.
+        # Points in every bright pixel, or in some of each row if there are more pixels than points.
         row, column = np.divmod(bright[np.arange(count) * len(bright) // count], columns)
-        within = scattered(count)
+        within = low_discrepancy(count)
         places = np.column_stack([(column + within[:, 0]) / columns - 0.5, 0.5 - (row + within[:, 1]) / rows])
-        return np.asarray(places * [self.width, self.height] @ np.stack(axes(direction, self.up)))
+        return np.asarray(places * [self.width, self.height] @ np.stack(right_and_up(direction, self.up)))
 
     __repr__ = one_line

@@ -1,4 +1,4 @@
-"""An even, rectangular spot."""
+"""A uniform, rectangular spot."""
 
 import math
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.lights.spots.plane import axes, outside, scattered, with_middle
-from tetlux.fem.lights.spots.spot import EDGE, check_length
+from tetlux.fem.lights.spots.plane import distances_to_rectangle, low_discrepancy, prepend_center, right_and_up
+from tetlux.fem.lights.spots.spot import EDGE_SHARE, check_length
 from tetlux.meshing.arrays import FloatArray, Vector
 
 
 @dataclass(frozen=True)
 class Rectangle:
-    """An even, rectangular spot.
+    """A uniform, rectangular spot.
 
     Parameters
     ----------
@@ -22,7 +22,17 @@ class Rectangle:
     width, height : float
         Across and along `up`, unit.
     up : (3,) floats
-        The direction that is up on it, not along the beam.
+        Direction of the height; its component along the beam does not count.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is not finite or a length not positive; and, when solved, if `up` is along the beam.
+
+    Examples
+    --------
+    >>> Rectangle(center=(0.0, 0.0, 20.0), width=4.0, height=1.0).area
+    4.0
     """
 
     center: Vector
@@ -46,9 +56,9 @@ class Rectangle:
         return 0.5 * min(self.width, self.height)
 
     @property
-    def edge(self) -> float:
+    def edge_size(self) -> float:
         """See `Spot`."""
-        return EDGE * min(self.width, self.height)
+        return EDGE_SHARE * min(self.width, self.height)
 
     @property
     def area(self) -> float:
@@ -57,15 +67,15 @@ class Rectangle:
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        right, up = axes(direction, self.up)
+        right, up = right_and_up(direction, self.up)
         inside = (np.abs(offsets @ right) <= 0.5 * self.width) & (np.abs(offsets @ up) <= 0.5 * self.height)
         return np.where(inside, 1.0, 0.0)
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        return outside(offsets, axes(direction, self.up), (self.width, self.height))
+        return distances_to_rectangle(offsets, right_and_up(direction, self.up), (self.width, self.height))
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
         """See `Spot`."""
-        places = (scattered(count) - 0.5) * [self.width, self.height]
-        return with_middle(places @ np.stack(axes(direction, self.up)))
+        places = (low_discrepancy(count) - 0.5) * [self.width, self.height]
+        return prepend_center(places @ np.stack(right_and_up(direction, self.up)))

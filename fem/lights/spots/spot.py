@@ -1,4 +1,4 @@
-"""`Spot`: what a beam's cross-section says of itself."""
+"""`Spot`: the cross-section of a collimated beam."""
 
 import math
 from typing import Protocol
@@ -6,53 +6,102 @@ from typing import Protocol
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 
-# Parts of facets that an edge crosses are as small as this share of a spot's width. With the samples that
-# `CollimatedBeam` takes in each, the power of a spot on a flat face is right to 0.2 %.
-EDGE = 1.0 / 8.0
+# Pieces of facets across the sharp edge of a spot are at most this share of the spot's width. With the samples that
+# are taken in each piece (`triangles.SAMPLES`) the power of a spot on a flat face is right to 0.2 %.
+EDGE_SHARE = 1.0 / 8.0
 
 
 class Spot(Protocol):
-    """A pattern on the plane across a beam."""
+    """An irradiance pattern on the plane across a beam.
+
+    Offsets (q, 3) are places relative to the center of the spot, unit. Their component along the beam's `direction`, a
+    unit vector (3,), does not count.
+    """
 
     @property
     def center(self) -> Vector:
-        """A point on the beam's axis, unit."""
+        """A point on the axis of the beam, (3,), unit."""
         ...
 
     @property
     def reach(self) -> float:
-        """Distance from the middle beyond which it is dark, unit."""
+        """Distance from the axis beyond which it is dark everywhere, unit."""
         ...
 
     @property
     def detail(self) -> float:
-        """Length over which it changes, unit."""
+        """Length over which the irradiance varies, unit."""
         ...
 
     @property
-    def edge(self) -> float:
-        """Size of the parts that are still told apart where it has a sharp edge, unit; inf where it has none."""
+    def edge_size(self) -> float:
+        """Largest size of a facet's piece that a sharp edge of the spot may cross, unit; inf without sharp edges."""
         ...
 
     @property
     def area(self) -> float:
-        """Integral of `brightness` over the plane, unit²: power over irradiance."""
+        """Integral of `brightness` over the plane, unit²: power over the irradiance where it is brightest."""
         ...
 
     def brightness(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """Share of the full irradiance at offsets (q, 3) from the middle, across `direction`, (q,)."""
+        """Compute the irradiance relative to that of the beam.
+
+        Parameters
+        ----------
+        offsets : (q, 3) ndarray
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q,) ndarray
+            0 where it is dark.
+        """
         ...
 
-    def away(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
-        """How far from the lit area these offsets (q, 3) are at least, across `direction`, (q,), unit."""
+    def distances(self, offsets: FloatArray, direction: FloatArray) -> FloatArray:
+        """Bound the distances to the bright part of the plane from below.
+
+        Parameters
+        ----------
+        offsets : (q, 3) ndarray
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q,) ndarray
+            0 within it, unit.
+        """
         ...
 
-    def looks(self, count: int, direction: FloatArray) -> FloatArray:
-        """Offsets (q, 3) of some bright places of it, its middle first if that is bright, across `direction`."""
+    def samples(self, count: int, direction: FloatArray) -> FloatArray:
+        """Choose bright places.
+
+        Parameters
+        ----------
+        count : int
+            About how many.
+        direction : (3,) ndarray
+
+        Returns
+        -------
+        (q, 3) ndarray
+            Offsets, that of the center first if it is bright.
+        """
         ...
 
 
 def check_length(value: float, name: str) -> None:
-    """Refuse what is no length of a spot."""
+    """Refuse a length of a spot that is not positive and finite.
+
+    Parameters
+    ----------
+    value : float
+    name : str
+        What the message calls it.
+
+    Raises
+    ------
+    InputError
+    """
     if not 0 < value < math.inf:
         raise InputError(f"{name} of the spot is {value:g}; give a length greater than 0.", field=name)

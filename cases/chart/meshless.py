@@ -15,16 +15,16 @@ from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Slab, Sphere
 
-# Monte Carlo counts in this many rings round the light, the first one this share of the source's depth wide.
+# Monte Carlo scores in this many rings around the light; the first is this share of the source's depth wide.
 RINGS, FIRST_RING = 60, 0.1
 
 
-def _of_half_space(
+def _half_space_method(
     exitance: Callable[[Medium, float, FloatArray], FloatArray],
 ) -> Callable[[Benchmark, float], Outcome]:
-    """Take the surface for its tangent plane nearest to each source, and distances from there for distances on it."""
+    """Make a run of a closed form of the half-space, by distances from the surface point nearest to each source."""
 
-    def once(benchmark: Benchmark) -> Outcome:
+    def run(benchmark: Benchmark) -> Outcome:
         surface, medium, points = benchmark.case.surface, benchmark.case.medium, benchmark.samples.points
         started = time.perf_counter()
         total = np.zeros(len(points))
@@ -34,11 +34,11 @@ def _of_half_space(
             total += power * exitance(medium, depth, rho)
         return Outcome(total, time.perf_counter() - started)
 
-    return lambda benchmark, _: fastest_run(benchmark, lambda: once(benchmark))
+    return lambda benchmark, _: fastest_run(benchmark, lambda: run(benchmark))
 
 
 def _monte_carlo(benchmark: Benchmark, photons: float) -> Outcome:
-    """Radiative transfer from the same sources: isotropic points."""
+    """Solve radiative transfer from the same sources, isotropic points."""
     started, shape = time.perf_counter(), benchmark.shape
     total = np.zeros(len(benchmark.samples.points))
     for source, power in benchmark.sources:
@@ -75,33 +75,33 @@ def _monte_carlo_in_slab(benchmark: Benchmark, shape: Slab, source: FloatArray, 
 
 def _monte_carlo_fits(benchmark: Benchmark) -> bool:
     known = benchmark.reference.kind == "closed form" and isinstance(benchmark.shape, Sphere | Slab)
-    return known and benchmark.in_points
+    return known and benchmark.has_point_sources
 
 
 def _compile_monte_carlo(benchmark: Benchmark) -> Outcome:
-    """Have numba compile it, with one photon."""
+    """Trace one photon, so that numba compiles."""
     return _monte_carlo(benchmark, 1.0)
 
 
-def monte_carlo_installed() -> bool:
-    """Whether numba is."""
+def has_monte_carlo() -> bool:
+    """Whether numba, which Monte Carlo needs, is installed."""
     return importlib.util.find_spec("numba") is not None
 
 
-MODELS = (
+MESHLESS = (
     Method(
         "dipole alone",
         "",
         (0.0,),
-        _of_half_space(lambda medium, depth, rho: dipole.flux(medium, depth=depth, rho=rho)),
-        lambda benchmark: benchmark.in_points,
+        _half_space_method(lambda medium, depth, rho: dipole.flux(medium, depth=depth, rho=rho)),
+        lambda benchmark: benchmark.has_point_sources,
     ),
     Method(
         "half-space alone",
         "",
         (0.0,),
-        _of_half_space(lambda medium, depth, rho: half_space.point_exitance(medium, depth=depth, rho=rho)),
-        lambda benchmark: benchmark.in_points,
+        _half_space_method(lambda medium, depth, rho: half_space.point_exitance(medium, depth=depth, rho=rho)),
+        lambda benchmark: benchmark.has_point_sources,
     ),
 )
 MONTE_CARLO = Method(

@@ -1,4 +1,4 @@
-"""The case as it ran: what a summary repeats is a case file of that run."""
+"""The record of a run in its summary is a case file of that run."""
 
 import json
 from dataclasses import replace
@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from tests.conftest import block
-from tetlux.cases.file.case import Case, load_cases
+from tetlux.cases.file.case import Case
+from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder
 from tetlux.cases.write.media_rows import coefficients, media_rows
-from tetlux.cases.write.ran import as_ran
+from tetlux.cases.write.run_record import describe_run
 
 SWEPT = """\
 unit: cm
@@ -28,7 +29,7 @@ def again(case: Case, folder: Path) -> Case:
     """The case that is read from what was written of one."""
     (folder / "elsewhere").mkdir(exist_ok=True)
     file = folder / "elsewhere" / "again.json"
-    file.write_text(json.dumps(as_ran(case)["scene"], allow_nan=False), encoding="utf-8")
+    file.write_text(json.dumps(describe_run(case)["scene"], allow_nan=False), encoding="utf-8")
     (one,) = load_cases(file)
     return one
 
@@ -38,7 +39,7 @@ def test_what_is_written_of_a_case_makes_the_same_case(name: str, tmp_path: Path
     (case,) = load_cases(library_folder() / f"{name}.yaml")
     repeated = again(case, tmp_path)
     assert repeated.name == case.name
-    assert as_ran(repeated)["scene"] == as_ran(case)["scene"]
+    assert describe_run(repeated)["scene"] == describe_run(case)["scene"]
     assert [coefficients(channel.medium) for channel in repeated.channels] == [
         coefficients(channel.medium) for channel in case.channels
     ]
@@ -49,13 +50,13 @@ def test_what_is_written_of_a_case_makes_the_same_case(name: str, tmp_path: Path
 def test_a_run_of_a_sweep_has_its_values_put_in(tmp_path: Path) -> None:
     (tmp_path / "swept.yaml").write_text(SWEPT)
     cases = load_cases(tmp_path / "swept.yaml")
-    told = as_ran(cases[3])
-    assert told["source"] == str(tmp_path / "swept.yaml")
-    assert told["sweep"] == {"medium.sigma_a": 1e-3, "lights.0.point.power": 2}
-    assert "sweep" not in told["scene"]
-    assert told["scene"]["medium"]["sigma_a"] == 1e-3
-    assert told["scene"]["lights"] == [{"name": "point_1", "point": {"position": [0, 0, 0.8], "power": 2}}]
-    assert told["scene"]["regions"][0]["name"] == "region_1"
+    record = describe_run(cases[3])
+    assert record["source"] == str(tmp_path / "swept.yaml")
+    assert record["sweep"] == {"medium.sigma_a": 1e-3, "lights.0.point.power": 2}
+    assert "sweep" not in record["scene"]
+    assert record["scene"]["medium"]["sigma_a"] == 1e-3
+    assert record["scene"]["lights"] == [{"name": "point_1", "point": {"position": [0, 0, 0.8], "power": 2}}]
+    assert record["scene"]["regions"][0]["name"] == "region_1"
     cube = block((2, 2, 2), (1.0, 1.0, 1.0))
     ((body, inner),) = media_rows(cases[3], replace(cube, regions=np.arange(len(cube.tetrahedra)) % 2))
     assert body["name"] == "body"
@@ -77,8 +78,8 @@ def test_a_medium_of_a_file_is_told_by_its_path_and_its_means(tmp_path: Path) ->
         "  sigma_a: {array: {file: field.npy, origin: [-9, -9, -9], spacing: 18}}\n  sigma_s_prime: 1.0\n  eta: 1.4\n"
     )
     (case,) = load_cases(tmp_path / "varying.yaml")
-    told = as_ran(case)
-    assert told["scene"]["medium"]["sigma_a"]["array"]["file"] == str(tmp_path / "field.npy")
+    record = describe_run(case)
+    assert record["scene"]["medium"]["sigma_a"]["array"]["file"] == str(tmp_path / "field.npy")
     ((body,),) = media_rows(case, block((2, 2, 2), (1.0, 1.0, 1.0)))
     assert body["sigma_a"] == pytest.approx(0.02)
     assert body["varies"] == ["sigma_a"]

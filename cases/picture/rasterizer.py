@@ -1,4 +1,4 @@
-"""A drawer that needs no graphics library: triangles into pixels, the nearest one wins."""
+"""A software rasterizer with a depth buffer, for machines where PyVista cannot render."""
 
 import numpy as np
 
@@ -14,26 +14,26 @@ from tetlux.cases.picture.stage import (
 from tetlux.cases.picture.view import PANEL
 from tetlux.meshing.arrays import FloatArray, IntArray
 
-# Pairs of a pixel and a triangle looked at in one go; bounds the memory to about 100 MB.
+# Pairs of pixel and triangle tested at a time, which bounds the memory to about 100 MB.
 BATCH = 1_000_000
 
 
-def draw_plain(stage: Stage) -> Image:
-    """Draw the body and the arrows; (h, w, 3) at `OVERSAMPLING` times the panel's size."""
+def rasterize(stage: Stage) -> Image:
+    """Draw the body and the arrows, (h, w, 3) at `OVERSAMPLING` times the size of the panel."""
     corners = np.concatenate([stage.corners, stage.arrows])
     placed = stage.camera.project(corners.reshape(-1, 3)).reshape(-1, 3, 3) * OVERSAMPLING
     body = len(stage.corners)
     bare = nearest_triangles(placed[:body], closed=body)
-    under = _coloured(stage, placed, bare[0])
+    under = _shade(stage, placed, bare[0])
     if len(corners) == body:
         return under
     return see_through(
-        _coloured(stage, placed, nearest_triangles(placed, closed=body, behind=bare)[0]), under, stage.background
+        _shade(stage, placed, nearest_triangles(placed, closed=body, behind=bare)[0]), under, stage.background
     )
 
 
-def _coloured(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
-    """The colours of the triangles that are seen at each pixel (h, w), (h, w, 3)."""
+def _shade(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
+    """Colour each pixel by the triangle that is visible there (h, w), (h, w, 3)."""
     body = len(stage.corners)
     flat = owner.ravel()
     pixels = np.flatnonzero(flat >= 0)
@@ -52,7 +52,7 @@ def _coloured(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
     lamp, eye = (
         np.einsum("ij,ij->i", weights, (normals @ axis)[flat]) for axis in (stage.camera.lamp, stage.camera.toward)
     )
-    # As VTK does, a normal that points away from the eye is turned round.
+    # Like VTK, reverse a normal that points away from the eye.
     cosine = np.clip(np.where(eye < 0, -lamp, lamp), 0.0, 1.0)
     colors *= (SHADED + (FULL - SHADED) * cosine)[:, None]
     image = np.tile(np.round(255 * np.asarray(stage.background)).astype(np.uint8), (owner.size, 1))
@@ -63,25 +63,30 @@ def _coloured(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
 def nearest_triangles(
     placed: FloatArray, closed: int, behind: tuple[IntArray, FloatArray] | None = None
 ) -> tuple[IntArray, FloatArray]:
-    """Which triangle is seen at each pixel, or -1, and how near it is, both (h, w).
+    """Find the visible triangle of each pixel.
 
     Parameters
     ----------
     placed : (m, 3, 3) ndarray
         Corners of the triangles: column and row, in drawn pixels, and nearness.
     closed : int
-        Of the first so many triangles only the front is drawn.
+        How many triangles, from the first, belong to a closed surface, of which only front faces are drawn.
     behind : pair of (h, w) ndarray, optional
-        What was found of the first `closed` before, which are not looked at again.
+        The result for these `closed` triangles alone, if known; they are then not drawn again.
+
+    Returns
+    -------
+    owner, nearness : (h, w) ndarray
+        The triangle, -1 if none, and how near it is.
     """
     size = np.array([OVERSAMPLING * n for n in PANEL])
     a, b, c = (placed[:, i, :2] for i in range(3))
-    # Rows count downwards, so a triangle seen from its front runs clockwise.
+    # Rows count downwards, so that front faces run clockwise.
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
     drawn = np.flatnonzero((area < 0) | ((area > 0) & (np.arange(len(placed)) >= closed)))
     if behind is not None:
         drawn = drawn[drawn >= closed]
-    # The pixels whose middles, at n + 1/2, lie within a triangle's rectangle.
+    # The pixels whose centres, at n + 1/2, lie within the bounding rectangle of a triangle.
     low = np.maximum(np.ceil(placed[drawn, :, :2].min(axis=1) - 0.5).astype(int), 0)
     high = np.minimum(np.floor(placed[drawn, :, :2].max(axis=1) - 0.5).astype(int), size - 1)
     columns, rows = np.maximum(high - low + 1, 0).T
@@ -91,22 +96,22 @@ def nearest_triangles(
     else:
         owner, nearness = (array.copy() for array in behind)
     # One strip is one row of pixels of one triangle.
-    strip, row = np.repeat(np.arange(len(drawn)), rows), _counting(rows)
+    strip, row = np.repeat(np.arange(len(drawn)), rows), _concatenate_ranges(rows)
     ends = np.cumsum(columns[strip])
     cuts = np.searchsorted(ends, np.arange(BATCH, int(columns @ rows), BATCH))
     for part in np.split(np.arange(len(strip)), cuts):
         long = columns[strip[part]]
-        one = np.repeat(part, long)
-        first = low[strip[one]]
-        pixels = np.column_stack([first[:, 0] + _counting(long), first[:, 1] + row[one]])
-        _keep_nearest(owner, nearness, placed, drawn[strip[one]], pixels)
+        strips = np.repeat(part, long)
+        first = low[strip[strips]]
+        pixels = np.column_stack([first[:, 0] + _concatenate_ranges(long), first[:, 1] + row[strips]])
+        _keep_nearest(owner, nearness, placed, drawn[strip[strips]], pixels)
     return owner, nearness
 
 
 def _keep_nearest(
     owner: IntArray, nearness: FloatArray, placed: FloatArray, triangle: IntArray, pixels: IntArray
 ) -> None:
-    """Give each pixel (column, row) to the nearest triangle that covers its middle; changes the first two."""
+    """Give each pixel (column, row) to the nearest triangle that covers its centre; updates `owner` and `nearness`."""
     weights = _weights(placed[triangle, :, :2], *(pixels.T + 0.5))
     inside = (weights >= -1e-9).all(axis=1)
     triangle, column, row = triangle[inside], *pixels[inside].T
@@ -125,7 +130,7 @@ def _weights(corners: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     return np.column_stack([1.0 - second - third, second, third])
 
 
-def _counting(lengths: IntArray) -> IntArray:
-    """0, 1, ... up to each length, one after the other."""
+def _concatenate_ranges(lengths: IntArray) -> IntArray:
+    """The ranges 0, 1, ..., length - 1 of all lengths, one after the other."""
     starts = np.cumsum(lengths) - lengths
     return np.arange(int(lengths.sum())) - np.repeat(starts, lengths)

@@ -1,26 +1,26 @@
-"""`InChannel`: what the section of a light is told of the case when it makes the light of one channel."""
+"""`ChannelContext`: what the section of a light needs to know of its case to build the light of one channel."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tetlux.cases.file.images import of_channel
+from tetlux.cases.file.images import pixels_in_channel
 from tetlux.cases.file.schema.parts import Encoding
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
 
 @dataclass(frozen=True)
-class InChannel:
+class ChannelContext:
     """One channel of a case.
 
     Parameters
     ----------
     channel, count : int
-        Number of the channel, and of channels.
+        Number of this channel from 0, and how many there are.
     regions : mapping of str to int
-        Numbers of the regions, or labels, by name; None is the whole body.
+        Numbers of the regions, or labels, by name; None stands for the whole body.
     read_pixels : callable
-        Reads an image file of the case in linear light, (rows, columns, 3).
+        Reads an image file of the case as linear light, (rows, columns, 3).
     """
 
     channel: int
@@ -29,18 +29,18 @@ class InChannel:
     read_pixels: Callable[[str, Encoding], FloatArray]
 
     def pixels(self, file: str, encoding: Encoding) -> FloatArray | None:
-        """What the channel sees of an image, (rows, columns); None if it is black here and not in other channels."""
+        """The image as the channel sees it, (rows, columns); None if it is black in this channel and not in others."""
         colours = self.read_pixels(file, encoding)
-        pixels = of_channel(colours, self.channel, self.count)
+        pixels = pixels_in_channel(colours, self.channel, self.count)
         return None if not pixels.any() and colours.any() else pixels
 
     def region(self, name: str | int | None) -> int | None:
-        """Number of a region by its name.
+        """The number of a region by its name; None stands for the whole body.
 
         Raises
         ------
         InputError
-            If there is none of this name.
+            If no region has this name.
         """
         if name is None:
             return None

@@ -1,4 +1,4 @@
-"""Files that a case names, each read once for all runs of its sweep."""
+"""`Reader`: reads the files that a case names, each once for all runs of its sweep."""
 
 import time
 from dataclasses import dataclass, field, replace
@@ -21,14 +21,14 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 @dataclass
 class Reader:
-    """Reads and remembers.
+    """Reads surfaces, meshes, fields and images, and keeps what it has read.
 
     Attributes
     ----------
     folder : Path
-        That of the case file, to which names are relative.
+        The folder of the case file, to which file names are relative.
     seconds : float
-        Spent on reading and checking surfaces and meshes since this was set to 0.
+        Time spent on reading and checking surfaces and meshes since this was last set to 0.
     """
 
     folder: Path
@@ -39,7 +39,7 @@ class Reader:
     _pixels: dict[tuple[str, Encoding], FloatArray] = field(default_factory=dict)
 
     def surface(self, spec: SurfaceSpec, unit: str) -> Surface:
-        """A surface file or a built-in shape."""
+        """Read a surface file, or make a built-in shape."""
         label = spec.model_dump_json() + unit
         started = time.perf_counter()
         if label not in self._surfaces:
@@ -48,7 +48,7 @@ class Reader:
         return self._surfaces[label]
 
     def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
-        """Tetrahedra made elsewhere."""
+        """Read a volume mesh."""
         label = f"{spec.file} {spec.scale!r} {spec.array} {unit}"
         started = time.perf_counter()
         if label not in self._meshes:
@@ -58,14 +58,14 @@ class Reader:
         return self._meshes[label]
 
     def field(self, spec: FieldSpec) -> Field:
-        """A coefficient that varies."""
+        """Read a coefficient that varies in space."""
         label = spec.model_dump_json()
         if label not in self._fields:
             self._fields[label] = _field(spec, self.folder)
         return self._fields[label]
 
     def pixels(self, file: str, encoding: Encoding) -> FloatArray:
-        """An image, (rows, columns, 3)."""
+        """Read an image as linear light, (rows, columns, 3)."""
         label = file, encoding
         if label not in self._pixels:
             try:

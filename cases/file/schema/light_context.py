@@ -1,4 +1,4 @@
-"""`Place`: what the section of a light asks of the case when it makes the light of one channel."""
+"""`LightContext`: what the section of a light needs to know of its case to build the light of one channel."""
 
 from typing import Protocol
 
@@ -6,8 +6,8 @@ from tetlux.cases.file.schema.parts import Encoding
 from tetlux.meshing.arrays import FloatArray
 
 
-class Place(Protocol):
-    """One channel of a case; `tetlux.cases.file.in_channel.InChannel` is the one there is."""
+class LightContext(Protocol):
+    """One channel of a case, as `tetlux.cases.file.channel_context.ChannelContext` implements it."""
 
     @property
     def channel(self) -> int:
@@ -20,9 +20,9 @@ class Place(Protocol):
         ...
 
     def pixels(self, file: str, encoding: Encoding) -> FloatArray | None:
-        """What the channel sees of an image, (rows, columns); None if it is black here and not in other channels."""
+        """The image as the channel sees it, (rows, columns); None if it is black in this channel and not in others."""
         ...
 
     def region(self, name: str | int | None) -> int | None:
-        """Number of a region by its name; None is the whole body."""
+        """The number of a region by its name; None stands for the whole body."""
         ...

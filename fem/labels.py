@@ -1,4 +1,4 @@
-"""Meshes whose tetrahedra have labels, with a medium for each label, and what a user should know of them."""
+"""Media by label of a mesh: labels looked up by number or name, and warnings about labelled parts and cavities."""
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,17 +14,17 @@ from tetlux.fem.validity.notes import warning_for_part
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
-from tetlux.meshing.surface.surface import signed_volume, triangle_areas
+from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Media by label or by its name, of one channel or of several.
+# Media by number or name of a label, each for one channel or a list for several.
 GivenMedia = Mapping[Any, AnyMedium] | Mapping[Any, AnyMedium | Sequence[AnyMedium]]
-# Power that leaves into cavities is worth a sentence from this share of the incident power.
+# Power into cavities below this share of the incident power is called "next to none".
 NEGLIGIBLE = 1e-6
 
 
-def label_of(mesh: TetMesh, key: object) -> int:
-    """The label that a number or a name stands for.
+def find_label(mesh: TetMesh, key: object) -> int:
+    """Look up a label by its number or its name.
 
     Raises
     ------
@@ -49,8 +49,8 @@ def label_of(mesh: TetMesh, key: object) -> int:
     raise InputError(f"the mesh has no label {key}; {known}.")
 
 
-def channels_by_label(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -> list[MediaByLabel]:
-    """Media by label for each channel, the outermost label first.
+def resolve_media(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -> list[MediaByLabel]:
+    """Look up the labels of given media, and split lists into channels; the outermost label comes first.
 
     Parameters
     ----------
@@ -64,15 +64,13 @@ def channels_by_label(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -
         If labels and media do not go together, or lists differ in length.
     """
     if not isinstance(media, Mapping):
-        found = [each for one in media for each in channels_by_label(mesh, one)]
+        found = [by_label for channel in media for by_label in resolve_media(mesh, channel)]
         if len(found) != len(media):
-            raise InputError(
-                "media by label are given for each channel, so each label has one medium in it, not a list."
-            )
+            raise InputError("there are media by label for each channel; give each label one medium there, not a list.")
         return found
     named: dict[int, AnyMedium | Sequence[AnyMedium]] = {}
     for key, medium in media.items():
-        label = label_of(mesh, key)
+        label = find_label(mesh, key)
         if label in named:
             raise InputError(f"label {mesh.named([label])} is given a medium twice; give it one.")
         named[label] = medium
@@ -82,22 +80,22 @@ def channels_by_label(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -
     check_labels(mesh, named)
     counts = {label: len(each) for label, each in named.items() if not isinstance(each, AnyMedium)}
     count = next(iter(counts.values()), 1)
-    for label, own in counts.items():
-        if own != count or own == 0:
+    for label, media_given in counts.items():
+        if media_given != count or media_given == 0:
             raise InputError(
-                f"label {mesh.named([label])} has {own} media for {count} channels; give one, or one for each."
+                f"label {mesh.named([label])} has {media_given} media for {count} channels; give one, or one for each."
             )
-    order = outermost_first(mesh, named)
+    order = order_outermost_first(mesh, named)
     channels: list[MediaByLabel] = []
     for channel in range(count):
-        of_label = {label: named[label] for label in order}
-        channels.append({label: m if isinstance(m, AnyMedium) else m[channel] for label, m in of_label.items()})
-    for of_labels in channels:
-        _check_kinds(of_labels)
+        ordered = {label: named[label] for label in order}
+        channels.append({label: m if isinstance(m, AnyMedium) else m[channel] for label, m in ordered.items()})
+    for by_label in channels:
+        _check_types(by_label)
     return channels
 
 
-def one_label(mesh: TetMesh) -> None:
+def check_single_label(mesh: TetMesh) -> None:
     """Refuse a single medium for a mesh of several labels.
 
     Raises
@@ -113,21 +111,21 @@ def one_label(mesh: TetMesh) -> None:
         )
 
 
-def _check_kinds(media: MediaByLabel) -> None:
+def _check_types(media: MediaByLabel) -> None:
     for label, medium in media.items():
         if not isinstance(medium, AnyMedium):
             raise InputError(f"label {label} is given {medium!r}; give it a Medium.")
 
 
-def outermost_first(mesh: TetMesh, labels: Iterable[int]) -> list[int]:
-    """Labels in their order, but first the one that has the largest part of the boundary."""
-    there, place = np.unique(mesh.regions[mesh.boundary_cells], return_inverse=True)
-    outer = int(there[np.bincount(place, mesh.boundary_areas).argmax()])
+def order_outermost_first(mesh: TetMesh, labels: Iterable[int]) -> list[int]:
+    """Move the label with the largest part of the boundary to the front of some labels."""
+    at_boundary, position = np.unique(mesh.regions[mesh.boundary_cells], return_inverse=True)
+    outer = int(at_boundary[np.bincount(position, mesh.boundary_areas).argmax()])
     return [outer, *(label for label in labels if label != outer)]
 
 
 def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:
-    """What a user should know of the media of labels, as `warnings_for_regions` has it for regions."""
+    """Warn of labels whose parts are thin, or whose medium strains diffusion, as `warnings_for_regions` does."""
     outer = base_of(next(iter(media.values())))
     faces, pairs, _ = mesh.interfaces
     _, areas = triangle_areas(mesh.points, faces)
@@ -141,7 +139,7 @@ def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:
 
 
 def warnings_for_cavities(solution: Solution) -> list[str]:
-    """How much power leaves into cavities of a mesh, whose walls are boundaries to the outside."""
+    """Report the power that leaves into cavities of a mesh, whose walls count as boundary to the outside."""
     mesh = solution.mesh
     cavity = mesh.cache.get(warnings_for_cavities, lambda: _cavities(mesh))
     inside = np.flatnonzero(cavity >= 0)
@@ -165,7 +163,7 @@ def warnings_for_cavities(solution: Solution) -> list[str]:
 
 
 def _cavities(mesh: TetMesh) -> IntArray:
-    """The number of the cavity that each boundary triangle bounds, (f,), -1 for those to the outside."""
+    """For each boundary triangle the number of the cavity that it bounds, (f,); -1 on the outer boundary."""
     edges = mesh.boundary_edges
     count = len(edges)
     incidence = coo_array(
@@ -174,7 +172,7 @@ def _cavities(mesh: TetMesh) -> IntArray:
     parts, part = connected_components(incidence @ incidence.T, directed=False)
     if parts == 1:
         return np.full(count, -1)
-    # The divergence theorem: a wall seen from within has its normals towards the cavity.
+    # Signed volumes by the divergence theorem: the normals of a cavity's wall point into the cavity.
     a, b, c = np.moveaxis(mesh.points[mesh.boundary_faces] - mesh.points.mean(axis=0), 1, 0)
     volumes = np.bincount(part, np.einsum("ij,ij->i", a, np.cross(b, c)))
     number = np.full(parts, -1)

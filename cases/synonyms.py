@@ -1,12 +1,8 @@
-"""What a word that is not known here was probably meant to be: other names of the field, short forms, slips."""
+"""Other names of what a case file says: of keys and values, and of quantities that are no key."""
 
-import difflib
-import re
-from collections.abc import Iterable
-
-# What the keys and values of a case file are called elsewhere. Of several, the first that is known in the place counts.
+# Other names of the keys and values of a case file. Of several candidates the first that is known in its place counts.
 ALIASES: dict[str, tuple[str, ...]] = {
-    # Media. Names as of MCX, NIRFASTer, Redbird, ValoMC, PBRT and Mitsuba, after `_plain`.
+    # Media. Names as of MCX, NIRFASTer, Redbird, ValoMC, PBRT and Mitsuba, as `tetlux.cases.hints` normalizes them.
     "mu_a": ("sigma_a",),
     "mua": ("sigma_a",),
     "absorption": ("sigma_a",),
@@ -213,7 +209,7 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "inch": ("in",),
     "inches": ("in",),
 }
-# Words that stand for no key alone: what to do, where a key is known that says what is meant there.
+# Quantities that are no key themselves: the key that has to be known in this place, and what to give instead.
 REMEDIES: dict[str, tuple[str, str]] = {
     **dict.fromkeys(("sigma_t", "mu_t", "mut", "extinction"), ("sigma_s", "give its two parts, sigma_a and sigma_s; ")),
     **dict.fromkeys(
@@ -228,66 +224,3 @@ REMEDIES: dict[str, tuple[str, str]] = {
     "type": ("pencil", "write the kind of light as a key, as in pencil: {...}; "),
     "kind": ("pencil", "write the kind of light as a key, as in pencil: {...}; "),
 }
-GREEK = {"µ": "mu_", "μ": "mu_", "σ": "sigma_", "η": "eta", "'": "_prime", "’": "_prime", "′": "_prime"}
-
-
-def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The one of some known words that a word was probably meant to be, or None.
-
-    Parameters
-    ----------
-    word : str
-    known : iterable of str
-
-    Examples
-    --------
-    >>> nearest("mus'", ["sigma_a", "sigma_s", "sigma_s_prime"])
-    'sigma_s_prime'
-    """
-    words = list(known)
-    plain = _plain(word)
-    for one in (plain, plain.removesuffix("s")):
-        found = [key for key in words if _plain(key) == one]
-        found += [key for key in ALIASES.get(one, ()) if key in words]
-        if found:
-            return found[0]
-    short = [key for key in words if _is_short_for(plain, key)]
-    if len(short) == 1:
-        return short[0]
-    close = difflib.get_close_matches(plain, words, n=1)
-    return close[0] if close else None
-
-
-def did_you_mean(word: str, known: Iterable[str], meaning: str = "") -> str:
-    """A clause for a sentence about a word that is not known, or nothing where no known word is like it.
-
-    Parameters
-    ----------
-    word : str
-    known : iterable of str
-    meaning : str, optional
-        What the nearest word stands for.
-    """
-    words = list(known)
-    remedy = REMEDIES.get(_plain(word))
-    if remedy and remedy[0] in words:
-        return remedy[1]
-    found = nearest(word, words)
-    if found is None:
-        return ""
-    return f'did you mean "{found}"{f" ({meaning})" if meaning else ""}? '
-
-
-def _plain(word: str) -> str:
-    """In small letters, parts joined by one underscore, and without Greek letters and primes."""
-    text = word.strip()[:100]
-    for letter, name in GREEK.items():
-        text = text.replace(letter, name)
-    return re.sub(r"[\s_.-]+", "_", text.casefold()).strip("_")
-
-
-def _is_short_for(short: str, word: str) -> bool:
-    """Whether it is made of beginnings of all parts of a word, of three letters at least: sigma_sp, num_ap, tol."""
-    parts = word.split("_")
-    form = "_?".join("(?:".join(part) + ")?" * (len(part) - 1) for part in parts)
-    return len(short) >= 3 and re.fullmatch(form, short) is not None

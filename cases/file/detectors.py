@@ -1,4 +1,4 @@
-"""Detectors of a case: by name, and what they read."""
+"""Detectors of a case: built from the case file, read, and written as ``detectors.csv``."""
 
 import csv
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from tetlux.meshing.surface.surface import Surface
 
 
 @dataclass(frozen=True)
-class Sensor:
+class NamedDetector:
     """A detector with its name and kind."""
 
     name: str
@@ -22,13 +22,13 @@ class Sensor:
     detector: Detector
 
 
-def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
-    """A detector that is known to lie on the surface.
+def build_detector(spec: DetectorSpec, surface: Surface, medium: Medium) -> NamedDetector:
+    """Build a detector and check that it lies on the surface.
 
     Raises
     ------
     InputError
-        If it does not, or a number is wrong.
+        If it does not lie on the surface, or a number is out of range.
     """
     detector: Detector
     if spec.point is not None:
@@ -38,45 +38,48 @@ def sensor_of(spec: DetectorSpec, surface: Surface, medium: Medium) -> Sensor:
     else:
         assert spec.fibre is not None
         detector = FibreDetector(spec.fibre.center, spec.fibre.radius, spec.fibre.numerical_aperture)
-    # It is read once in the dark, so that what is wrong with its place is said before anything is solved.
+    # Reading a dark field checks the position before anything is solved.
     read(detector, Dark(surface, medium))
-    return Sensor(spec.name, spec.kind, detector)
+    return NamedDetector(spec.name, spec.kind, detector)
 
 
-def readings(sensors: Sequence[Sensor], solutions: Sequence[tuple[str, str, ExitanceField]]) -> list[dict[str, Any]]:
-    """What detectors read, a row for each of them and each solution.
+def read_detectors(
+    detectors: Sequence[NamedDetector], solutions: Sequence[tuple[str, str, ExitanceField]]
+) -> list[dict[str, Any]]:
+    """Read all detectors in all solutions.
 
     Parameters
     ----------
-    sensors : sequence of Sensor
+    detectors : sequence of NamedDetector
     solutions : sequence of (str, str, Solution or another ExitanceField)
-        With the names of channel and light.
+        Names of channel and light, and their solution.
 
     Returns
     -------
     list of dict
-        ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²) and ``power`` (W; None for a point).
+        A row for each detector and solution: ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²)
+        and ``power`` (W; None for a point).
     """
     rows = []
-    for sensor in sensors:
+    for entry in detectors:
         for channel, light, solution in solutions:
-            found = read(sensor.detector, solution)
+            reading = read(entry.detector, solution)
             rows.append(
                 {
-                    "name": sensor.name,
-                    "kind": sensor.kind,
+                    "name": entry.name,
+                    "kind": entry.kind,
                     "channel": channel,
                     "light": light,
-                    "position": list(found.position),
-                    "exitance": found.exitance,
-                    "power": found.power,
+                    "position": list(reading.position),
+                    "exitance": reading.exitance,
+                    "power": reading.power,
                 }
             )
     return rows
 
 
 def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> None:
-    """Write readings as a table, units in its head."""
+    """Write readings as CSV, with units in the header."""
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         axes = [f"{axis} [{unit}]" for axis in "xyz"]

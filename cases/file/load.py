@@ -1,0 +1,193 @@
+"""`load_cases`: from a case file to its runs, with all that can be checked before meshing."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from tetlux.cases.compare.comparison import Comparison, comparison_for
+from tetlux.cases.file.body import CaseBody, read_body
+from tetlux.cases.file.case import Case, Channel
+from tetlux.cases.file.channel_context import ChannelContext
+from tetlux.cases.file.channels import ALL, channel_names, check_unique_names
+from tetlux.cases.file.detectors import NamedDetector, build_detector
+from tetlux.cases.file.document import Document, Key, read_document
+from tetlux.cases.file.light_names import field_keys, light_names
+from tetlux.cases.file.reader import Reader
+from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.file.sweep import LONGEST_NAME, expand_sweep
+from tetlux.cases.file.validation import validate
+from tetlux.cases.picture.view import toward_camera
+from tetlux.fem.inputs import unit_vector
+from tetlux.fem.lights import Deposit, Light
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.solve import check_deposit, check_simple, even_medium
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface.surface import Surface
+
+
+def load_cases(path: Path) -> list[Case]:
+    """Read a case file and check all that can be checked before meshing.
+
+    That is keys and values, surfaces, the size of the body in mean free paths, and that lights meet the body.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    list of Case
+        One, or one for each run of the sweep.
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+
+    Examples
+    --------
+    >>> from tetlux.cases.shipped import find_case_file
+    >>> (case,) = load_cases(find_case_file("sphere"))
+    >>> case.name, case.channel_names, case.surface.unit
+    ('sphere', ('all',), 'mm')
+    """
+    document = read_document(path)
+    spec = validate(document, document.data)
+    reader = Reader(path.parent)
+    cases = []
+    for run in expand_sweep(document, spec):
+        of_run = document if run.label is None else Document(path, run.data, {**document.lines, **run.lines}, run.label)
+        spec_of_run = spec if run.label is None else validate(of_run, run.data)
+        name = spec_of_run.name or path.stem
+        if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
+            raise of_run.error(("name",), "this cannot be the name of a folder; give a short, printable name.")
+        folder = name if run.label is None else f"{name}/{run.label}"
+        cases.append(_build_case(of_run, spec_of_run, folder, reader, run.values))
+    return cases
+
+
+def _build_case(
+    document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]
+) -> Case:
+    reader.seconds = 0.0
+    channels = channel_names(document, spec)
+    body = read_body(document, spec, len(channels), reader)
+    if spec.model == "charges":
+        _check_for_charges(document, body)
+    names = light_names(spec)
+    check_unique_names(document, "lights", names)
+    _check_value_names(document, channels, names)
+    lights, deposits = _build_lights(document, spec, names, body, channels, reader)
+    return Case(
+        name=name,
+        source=document.path,
+        surface=body.surface,
+        channels=tuple(map(Channel, channels, body.media, lights, body.by_label or body.media)),
+        light_names=names,
+        regions=body.regions,
+        mesh=body.mesh,
+        tolerance=spec.tolerance,
+        outputs=tuple(dict.fromkeys(spec.outputs)),
+        spec=spec,
+        sweep_values=values,
+        detectors=_build_detectors(document, spec, body),
+        camera=spec.camera.position if spec.camera else None,
+        up=spec.up,
+        toward=_direction_to_camera(document, spec, body.surface),
+        reading_seconds=reader.seconds,
+        comparison=_build_comparison(document, spec, body, deposits),
+    )
+
+
+def _build_comparison(document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]) -> Comparison | None:
+    if not spec.compare:
+        return None
+    with document.at(("compare",)):
+        if len(body.media) > 1 or body.regions or not isinstance(body.media[0], Medium):
+            raise InputError("closed forms exist for one channel and one uniform medium only; leave compare out.")
+        return comparison_for(body.surface.shape, body.media[0], deposits, spec.compare)
+
+
+def _build_detectors(document: Document, spec: CaseSpec, body: CaseBody) -> tuple[NamedDetector, ...]:
+    check_unique_names(document, "detectors", [detector.name for detector in spec.detectors])
+    detectors = []
+    for i, detector in enumerate(spec.detectors):
+        with document.at(("detectors", i)):
+            detectors.append(build_detector(detector, body.surface, body.bodies[0].outer))
+    return tuple(detectors)
+
+
+def _direction_to_camera(document: Document, spec: CaseSpec, surface: Surface) -> FloatArray | None:
+    """Unit vector from the body to the eye; None if the light chooses it."""
+    with document.at(("up",)):
+        unit_vector(spec.up, "up")
+    with document.at(("camera", "position")):
+        return toward_camera(spec.camera, surface, spec.up) if spec.camera else None
+
+
+def _build_lights(
+    document: Document,
+    spec: CaseSpec,
+    names: tuple[str, ...],
+    body: CaseBody,
+    channels: tuple[str, ...],
+    reader: Reader,
+) -> tuple[list[dict[str, Light]], list[Deposit]]:
+    """Build the lights of each channel, by name, and the deposits of those of the first channel."""
+    bodies = body.bodies
+    lights: list[dict[str, Light]] = [{} for _ in bodies]
+    deposits = []
+    for i, light_spec in enumerate(spec.lights):
+        with document.at(("lights", i), field_keys(light_spec)):
+            for channel, body_in_channel in enumerate(bodies):
+                light = light_spec.light(ChannelContext(channel, len(bodies), body.parts, reader.pixels))
+                if light is None:
+                    continue
+                lights[channel][names[i]] = light
+                deposit = light.deposit_in(body_in_channel)
+                if spec.model == "charges":
+                    check_deposit(light, deposit, body_in_channel, [region.surface for region in body.regions])
+                if channel == 0:
+                    deposits.append(deposit)
+    if not all(lights):
+        dark = channels[[bool(lights_of_channel) for lights_of_channel in lights].index(False)]
+        raise document.error(
+            ("lights",),
+            f"all lights are dark in channel {dark}; give one of them power there, or drop the channel.",
+        )
+    return lights, deposits
+
+
+def _check_for_charges(document: Document, body: CaseBody) -> None:
+    """Refuse a body that charges cannot be fitted to.
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+    """
+    parts: list[tuple[Key, Surface]] = [((), body.surface)]
+    parts += [(("regions", i), region.surface) for i, region in enumerate(body.regions)]
+    for number, (key, surface) in enumerate(parts):
+        with document.at((*key, "surface")):
+            check_simple(surface)
+        with document.at((*key, "medium")):
+            for body_in_channel in body.bodies:
+                even_medium(body_in_channel.by_label[number])
+
+
+def _check_value_names(document: Document, channels: tuple[str, ...], lights: tuple[str, ...]) -> None:
+    """Refuse names of lights and channels that would give two arrays in a file one name.
+
+    Raises
+    ------
+    InputError
+    """
+    if ALL in lights:
+        raise document.error(("lights", lights.index(ALL)), f'"{ALL}" is the sum of all lights; give another name.')
+    names = [*channels, *lights, *(f"{light}_{channel}" for light in lights for channel in channels)]
+    twice = [name for i, name in enumerate(names) if name in names[:i]]
+    if twice:
+        raise document.error(
+            ("lights",), f'names of lights and channels make "{twice[0]}" twice; give one of them another name.'
+        )

@@ -1,0 +1,50 @@
+"""Areas, normals, volumes and barycentric coordinates of triangles."""
+
+import numpy as np
+
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.surface.subdivide import NEXT_CORNER
+
+
+def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Unit normals (m, 3) and areas (m,) of triangles; the normal of a degenerate one is zero."""
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
+
+
+def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Volume and area of each body, (b,), of either orientation; `body` (m,) is the body of each triangle, from 0."""
+    corners = points[faces]
+    count = int(body.max()) + 1
+    # Relative to its own centre, since a small body far from the origin would lose digits.
+    middle = np.column_stack([sum_by_index(body, x, count) for x in corners.mean(axis=1).T])
+    middle /= np.bincount(body, minlength=count)[:, None]
+    a, b, c = (corners[:, i] - middle[body] for i in range(3))
+    volume = np.abs(sum_by_index(body, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0, count))
+    return volume, sum_by_index(body, triangle_areas(points, faces)[1], count)
+
+
+def longest_sides(corners: FloatArray) -> FloatArray:
+    """Longest sides (f,) of triangles (f, 3, 3)."""
+    sides = corners - corners[:, NEXT_CORNER]
+    return np.asarray(np.sqrt(np.einsum("fij,fij->fi", sides, sides).max(axis=1, initial=0.0)))
+
+
+def signed_volume(points: FloatArray, faces: IntArray) -> float:
+    """Volume enclosed by outward oriented triangles (divergence theorem), negative if they face inward."""
+    origin = points.mean(axis=0)
+    a, b, c = (points[faces[:, i]] - origin for i in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def barycentric_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
+    """Barycentric coordinates (q, 3) of points (q, 3) on triangles (q, 3, 3)."""
+    u, v, w = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
+    normal = np.cross(u, v)
+    scale = np.einsum("ij,ij->i", normal, normal)
+    scale = np.where(scale > 0, scale, 1.0)
+    second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
+    third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
+    return np.column_stack([1.0 - second - third, second, third])
