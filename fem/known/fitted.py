@@ -125,7 +125,7 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     """Sources and charges as one sum."""
     field, sources = fitted.field, fitted.drive.points
     depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
-    heights = cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0]
+    heights = np.asarray(cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
