@@ -33,7 +33,7 @@ AROUND = 6
 # Beside finite elements: charges are enough when the estimate of theirs alone is this share of the tolerance, or at so
 # many, which take .2 s. The next fit has as many as it takes if the estimate falls with this power of their number, but
 # no less and no more than these factors. Where so many leave more than so many tolerances, they are no help.
-ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.4, 700, 2.0, 1.4, 2.2, 20.0
+ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.6, 600, 2.0, 1.4, 2.2, 20.0
 
 
 @dataclass(frozen=True, eq=False)
