@@ -21,7 +21,6 @@ from tetlux.fem import (
     read,
     solve,
 )
-from tetlux.fem.charges import ChargeSolution, solve_with_charges
 from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_charges
 from tetlux.fem.charges.check import norm, quality_of
 from tetlux.fem.charges.field import ChargeField
@@ -31,6 +30,7 @@ from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.charges.samples import Samples
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.meshless import ChargeSolution, solve_with_charges
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import InputError, Surface, box, read_surface, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray, Vector

@@ -29,9 +29,9 @@ from tetlux.fem.charges.places import distance_from
 from tetlux.fem.charges.places import scaled as scaled_spacing
 from tetlux.fem.charges.remainder import solve_remainder
 from tetlux.fem.charges.samples import cells_of, draw
-from tetlux.fem.charges.solution import Entry, charge_solution
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
+from tetlux.fem.meshless.solution import Entry, charge_solution
 from tetlux.meshing import Surface, box, cylinder, read_surface, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair.pipeline import surface_from_arrays
