@@ -32,8 +32,8 @@ POWER, ALIKE, NOISE = 0.5, 12, 2.0
 AROUND = 6
 # Beside finite elements: charges are enough when the estimate of theirs alone is this share of the tolerance, or at so
 # many, which take .2 s. The next fit has as many as it takes if the estimate falls with this power of their number, but
-# no less and no more than these factors. Where so many leave more than so many tolerances, they are no help.
-ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.6, 600, 2.0, 1.4, 2.2, 20.0
+# no less and no more than these factors. If they leave more than the last number, they are no help.
+ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.6, 600, 2.0, 1.4, 2.2, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +146,7 @@ def fit_within(surface: Surface, equation: Equation, drive: Drive, *, tolerance:
             best = fitted
         short = best.quality.estimate / (ENOUGH * tolerance)
         if short <= 1.0 or LEAST_GROWTH * count > MOST_BESIDE:
-            return best if best.quality.estimate <= HOPELESS * tolerance else None
+            return best if best.quality.estimate <= HOPELESS else None
         count = min(round(count * np.clip(short ** (1.0 / RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_BESIDE)
         height = HIGH if estimate <= SMOOTH else LOW
         spacing = _finer(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)

@@ -71,11 +71,5 @@ def factorise(table: NumberArray) -> Factors:
     turn, triangle, order = scipy.linalg.qr(first, mode="economic", pivoting=True, check_finite=False)
     pivots = np.abs(np.diag(triangle))
     rank = int((pivots > RCOND * pivots[0]).sum())
-    return Factors(
-        reflectors[:, : len(factors)],
-        factors,
-        turn[:, :rank],
-        triangle[:rank, :rank],
-        order[:rank].astype(np.int64),
-        scales,
-    )
+    reflectors, columns = reflectors[:, : len(factors)], order[:rank].astype(np.int64)
+    return Factors(reflectors, factors, turn[:, :rank], triangle[:rank, :rank], columns, scales)
