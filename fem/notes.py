@@ -106,7 +106,7 @@ def _on_power(solution: Solution) -> Iterator[Note]:
     if abs(power.exited) <= ROUNDING * power.incident:
         yield Note(
             "no-light-leaves",
-            "no diffuse light leaves the body: all light is reflected at its surface, passes through or is absorbed.",
+            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",
         )
 
 

@@ -16,6 +16,8 @@ from tetlux.fem.known.subtraction import Subtraction, subtract_on
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
+from tetlux.fem.models.diffusion import Diffusion
+from tetlux.fem.models.model import Model
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import fitting_of
 from tetlux.fem.operators.loads import Load, load_of
@@ -94,6 +96,11 @@ class System:
         """Those of its tetrahedra."""
         return coefficients_on(self.mesh, self.media)
 
+    @cached_property
+    def model(self) -> Model:
+        """The equation that is solved."""
+        return Diffusion(self.coefficients)
+
     @property
     def true_surface(self) -> Surface:
         """What the mesh stands for."""
@@ -102,7 +109,7 @@ class System:
     @cached_property
     def plain(self) -> Operator:
         """The operator for points and beams."""
-        return operator_of(self._assembly, self.coefficients, self.mass, self._loads_expected)
+        return operator_of(self._assembly, self.model, self.mass, self._loads_expected)
 
     @cached_property
     def fitted(self) -> Operator:
@@ -110,7 +117,7 @@ class System:
         fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
         if fitting is None:
             return self.plain
-        return operator_of(self._assembly, self.coefficients, self.mass, self._loads_expected, fitting)
+        return operator_of(self._assembly, self.model, self.mass, self._loads_expected, fitting)
 
     @cached_property
     def quadratic(self) -> QuadraticOperator:

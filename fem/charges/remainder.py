@@ -28,9 +28,9 @@ from scipy.spatial import cKDTree
 from tetlux.fem.charges.adapt import FittedCharges
 from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
-from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.linear.solver import solver_for
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.operators.assembly import Assembly
+from tetlux.fem.operators.assembly import system_matrix
 from tetlux.meshing.arrays import FloatArray, sum_by_index
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -89,5 +89,5 @@ def solve_remainder(mesh: TetMesh, surface: Surface, medium: Medium, fitted: Fit
     missing = points.areas * (fitted.drive.inflow.sum() - residual.sum(axis=1))
     _, face, weights = mesh.closest_boundary(points.points)
     load = sum_by_index(mesh.boundary_faces[face], missing[:, None] * weights, len(mesh.points))
-    solver = Assembly(mesh).solver(coefficients_of(medium), "consistent", 1)
+    solver = solver_for(system_matrix(mesh, medium, "consistent"))
     return Remainder(mesh, medium, fitted, solver.solve(load[:, None]).x[:, 0])

@@ -13,7 +13,7 @@ from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
@@ -220,9 +220,7 @@ def _unit_disc(normal: FloatArray) -> FloatArray:
     # Every other circle is turned, so that points do not line up.
     turn = 0.5 * (np.arange(CIRCLES) % 2)
     angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + turn[:, None])
-    across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across /= np.linalg.norm(across)
-    up = np.cross(normal, across)
+    across, up = perpendicular_axes(normal)
     spread = np.cos(angle)[:, :, None] * across + np.sin(angle)[:, :, None] * up
     return np.asarray((radius[:, None, None] * spread).reshape(-1, 3))
 

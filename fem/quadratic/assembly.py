@@ -16,7 +16,7 @@ BLOCK = 2048
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
     """The matrix of a space, (size, size), symmetric, by its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
-    escaping = coefficients.escape * face_matrices(space, faces)
+    escaping = coefficients.robin * face_matrices(space, faces)
     return csr_array(_scattered(space.cells, elements, space.size) + _scattered(faces, escaping, space.size))
 
 

@@ -70,7 +70,7 @@ def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
     squares = (SIZE * local) ** 2
     if not sight.inside:
         # Along the normal fluence changes by itself over the extrapolation length.
-        steepness = operator.coefficients.escape / at_cells(operator.coefficients.diffusion, seen.cells)
+        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, seen.cells)
         off = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
         squares[seen.cells[0]] += off**2
     return ReadingError(value, squares, SIZE * SUM * float(local.sum()))

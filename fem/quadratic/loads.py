@@ -132,9 +132,9 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     corners, on_boundary = mesh.tetrahedra[inside[cell, None], FACES[face]], neighbours.reshape(-1)[outer] < 0
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
     load = _product(operator.elements[inside], space.cells[inside], guess)
-    load += _product(coefficients.escape * face_matrices(space, leaving_faces), leaving_faces, guess)
+    load += _product(coefficients.robin * face_matrices(space, leaving_faces), leaving_faces, guess)
     value, flux = _integrals(space, faces, charges)
-    leaving = flux + (coefficients.escape * on_boundary)[:, None] * value
+    leaving = flux + (coefficients.robin * on_boundary)[:, None] * value
     load -= sum_by_index(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():

@@ -24,7 +24,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # so that it is off by about the product of the two.
 AIM = 1e-7
 # Columns that are iterated on side by side.
-TOGETHER = 4
+GROUP = 4
 # Of how many loads a solver of the linear part should think, roughly.
 EXPECTED = 10
 
@@ -76,7 +76,8 @@ class QuadraticOperator:
         The two parts meet at an angle that is the same however fine the mesh is (Yserentant 1986): 50 iterations.
         """
         nodes = len(self.mesh.points)
-        linear = Assembly(self.mesh).solver(self.coefficients, "lumped", EXPECTED).preconditioner
+        assembly = Assembly(self.mesh)
+        linear = assembly.solver(self.coefficients, assembly.of(self.coefficients), EXPECTED).preconditioner
         inverse = 1.0 / self.matrix.diagonal()[nodes:, None]
 
         def precondition(rest: FloatArray) -> FloatArray:
@@ -91,7 +92,7 @@ class QuadraticOperator:
         size = np.sqrt(dots(loads, loads)) * AIM / krylov.AIM
         size[size == 0] = 1.0
         scaled = loads / size
-        groups = [np.ascontiguousarray(scaled[:, i : i + TOGETHER]) for i in range(0, loads.shape[1], TOGETHER)]
+        groups = [np.ascontiguousarray(scaled[:, i : i + GROUP]) for i in range(0, loads.shape[1], GROUP)]
         found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 

@@ -46,7 +46,7 @@ class Sight:
         face, weights = space.on_boundary(self.points)
         mesh = space.mesh
         places, hats = space.faces(mesh.boundary_faces[face]), functions(weights, TRIANGLE_EDGES)
-        return Seen(self, space, coefficients.escape, mesh.boundary_cells[face], places, hats)
+        return Seen(self, space, coefficients.robin, mesh.boundary_cells[face], places, hats)
 
     __repr__ = one_line
 
