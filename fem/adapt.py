@@ -145,9 +145,10 @@ def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Repor
         mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
         if aims.readings is not None:
             seen = np.array([view.position for view in aims.views])
+            every, _ = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
-                    mesh, scenes.surface, scenes.inner, media, lit[0], seen, aims.readings, most_tetrahedra
+                    mesh, scenes.surface, scenes.inner, media, every, seen, aims.readings, most_tetrahedra
                 )
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh

@@ -18,8 +18,8 @@ from tetlux.meshing.tets.refine import refine
 # tolerance of .01: the error of quadratic elements goes with its fourth power. Off the straight way light gets fainter
 # by e^{-k excess}, with what its way is longer, and edges may be longer by the root of that.
 FADING, AT_TOLERANCE = 1.5, 0.01
-# Edges near a detector, where its dual solution is steep, are shorter by the first factor. At as many of these lengths
-# as the second number they are as everywhere.
+# Near a detector, where its dual solution is steep, edges are shorter by the first factor; from the second of these
+# distances on, in lengths of fading, they are as long as elsewhere.
 AT_DETECTOR, NEAR_DETECTOR = 0.4, 2.0
 # So many lit points are looked at.
 MOST_LIT = 32
