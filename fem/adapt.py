@@ -8,7 +8,7 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split
-from tetlux.fem.grading import grade_mesh, places_to_resolve
+from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
@@ -77,8 +77,10 @@ def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache:
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.not_fitted])
-        mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
+        for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
+            deposits = [deposit for sources in problem.sources for deposit in sources.deposits_if(fitted=fitted)]
+            lit = places_to_resolve(deposits)
+            mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, longest=longest, inner=scenes.inner)
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
