@@ -116,8 +116,8 @@ def test_what_cannot_be_fitted_has_the_half_space(ball: Surface, ball_mesh: TetM
     for beam in (wide, line):
         assert not is_fitted(solve(ball, TISSUE, [beam], mesh=ball_mesh))
     shallow = PointSource((0.0, 0.0, RADIUS - 1e-4))
-    for light, medium in ((shallow, TISSUE), (source, varying)):
-        assert not is_fitted(solve(ball, medium, [light], mesh=ball_mesh))
+    for point, medium in ((shallow, TISSUE), (source, varying)):
+        assert not is_fitted(solve(ball, medium, [point], mesh=ball_mesh))
     assert not is_fitted(solve(ball, TISSUE, [source], mesh=ball_mesh, subtract="half-space"))
     assert MOST_SOURCES < 127  # as many thin beams as a wide one is at least
 

@@ -58,10 +58,9 @@ class Sources:
         """What a user should know of the lights."""
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
-    @property
-    def not_fitted(self) -> list[Deposit]:
-        """Of the lights that are not fitted, which a mesh has to resolve."""
-        return [deposit for light, deposit in enumerate(self.deposits) if light not in self.fitted]
+    def deposits_if(self, *, fitted: bool) -> list[Deposit]:
+        """Of the lights that charges are fitted to, or of the others."""
+        return [deposit for light, deposit in enumerate(self.deposits) if (light in self.fitted) == fitted]
 
     @property
     def dips(self) -> bool:
