@@ -140,12 +140,12 @@ def _fitted(
         return None
     if kept is None:
         return fit_light(deposit, body.surface, medium, tolerance=tolerance)
-    chosen, places = kept.find(repr(light), deposit.hints.resolution)
-    if chosen and places is None:
+    chosen, like = kept.find(repr(light), deposit.hints.resolution)
+    if chosen and like is None:
         return None
-    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, places=places)
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, like=like)
     if not chosen:
-        kept.keep(repr(light), deposit.hints.resolution, None if found is None else found.places)
+        kept.keep(repr(light), deposit.hints.resolution, found)
     return found
 
 
