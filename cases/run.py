@@ -7,21 +7,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tetlux.cases.compare.differences import as_data, compare
 from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.detectors import read_detectors, write_readings
+from tetlux.cases.file.channels import ALL
+from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.picture.arrows import light_rays
 from tetlux.cases.picture.draw import PictureScene, RegionOutline, draw_picture
+from tetlux.cases.picture.readings import draw_readings
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
+from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.solve import solve, solve_each
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import add_prefix
@@ -31,10 +37,12 @@ FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.p
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
+# Drawn where there are so many detectors.
+READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), VTP, READINGS, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 def run_case(
@@ -89,7 +97,7 @@ def run_case(
         with claim_folder(out, case.name) as folder:
             solutions = _solve(case, report, cache=cache)
             try:
-                warnings = _write(collect_results(case, solutions), folder, started)
+                warnings, readings = _write(collect_results(case, solutions), folder, started)
                 publish(folder, target, ALL_FILES)
             except OSError as error:
                 raise write_error(target, error) from error
@@ -97,6 +105,8 @@ def run_case(
         if not memory_ran_out(error):
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
+    for line in describe_readings(readings, case.surface.unit):
+        report(line)
     for warning in warnings:
         if note is None:
             report(f"note: {warning}")
@@ -115,6 +125,8 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
         [list(channel.lights.values()) for channel in case.channels],
         regions=case.regions,
         tolerance=case.tolerance,
+        detectors=[entry.detector for entry in case.detectors],
+        detector_tolerance=case.detector_tolerance,
         cache=cache,
         report=report,
     )
@@ -123,6 +135,7 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     """Solve each channel by charges; the seconds of each solution are those of all channels together."""
     solutions = []
+    assert case.tolerance is not None
     media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
@@ -135,8 +148,8 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
-def _write(results: Results, folder: Path, started: float) -> list[str]:
-    """Write all files of a run into a folder, and return its warnings."""
+def _write(results: Results, folder: Path, started: float) -> tuple[list[str], list[dict[str, Any]]]:
+    """Write all files of a run into a folder, and return its warnings and readings."""
     writing = time.perf_counter()
     case, first = results.case, results.solutions[0]
     unit = case.surface.unit
@@ -150,6 +163,9 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         warnings += draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
     if readings:
         write_readings(readings, unit, folder / READINGS)
+        if len(case.detectors) >= ENOUGH_TO_DRAW:
+            whole = [row for row in readings if row["light"] == ALL]
+            draw_readings(whole, _places_lit(case), case.name, unit, folder / READINGS_PICTURE)
     compared = None
     if case.comparison is not None:
         compared = compare(case.comparison, results.mesh_solutions[0])
@@ -164,7 +180,14 @@ def _write(results: Results, folder: Path, started: float) -> list[str]:
         figures["compare"] = compared.differences
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
-    return warnings
+    return warnings, readings
+
+
+def _places_lit(case: Case) -> FloatArray:
+    """Where the lights of a case meet the body, or shine from, (p, 3)."""
+    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
+    places = [light.arrows(case.surface).places for light in lights.values() if isinstance(light, HasArrows)]
+    return np.vstack([np.zeros((0, 3)), *places])
 
 
 def _write_surface(results: Results, folder: Path) -> None:

@@ -1,23 +1,26 @@
 """Mesh a body, solve, estimate the error and refine, until the tolerance is met for every scene."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split
-from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_mesh, places_to_resolve
+from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
+from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.outcome.detectors import View
+from tetlux.fem.quadratic.error import ReadingError, read_with_error
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
+from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import refine
+from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
@@ -27,6 +30,67 @@ SLOW = 8.0
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
 SceneSolver = Callable[[int, Step | None], Step]
+
+
+@dataclass(frozen=True, eq=False)
+class Aims:
+    """What a mesh is refined for.
+
+    Attributes
+    ----------
+    exitance : float, optional
+        Wanted relative L2 error of the exitance.
+    readings : float, optional
+        Wanted relative error of what each detector reads.
+    views : tuple of View
+        The detectors.
+    """
+
+    exitance: float | None
+    readings: float | None = None
+    views: tuple[View, ...] = ()
+
+    def assess(self, steps: Sequence[Step]) -> "Assessment":
+        """Say how far steps on one mesh are from the aims."""
+        splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
+        error = max(step.estimate.error for step in steps)
+        worst, words = 0.0, f"estimated error {error:.2%}"
+        if self.exitance is not None:
+            worst = error / self.exitance
+            splits += cells_to_split((step.estimate for step in steps), self.exitance)
+        if self.readings is not None:
+            readings = [reading for step in steps for reading in self._read(step)]
+            of_readings = max((reading.relative for reading in readings), default=0.0)
+            worst = max(worst, of_readings / self.readings)
+            words += f", of readings {of_readings:.2%}"
+            splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
+        return Assessment(worst, splits, words)
+
+    def _read(self, step: Step) -> list[ReadingError]:
+        quadratic = step.solution.quadratic
+        assert quadratic is not None
+        # All duals at once.
+        quadratic.operator.duals([view.sight for view in self.views])
+        return [read_with_error(quadratic, view.sight) for view in self.views]
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """How far steps on one mesh are from what it is refined for.
+
+    Attributes
+    ----------
+    worst : float
+        The largest of their errors, by its tolerance.
+    splits : (m,) ndarray of int
+        How often to split each tetrahedron.
+    words : str
+        Their errors in words.
+    """
+
+    worst: float
+    splits: IntArray
+    words: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +135,8 @@ class Problem:
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
-def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
-    """The mesher's mesh of a body, refined towards its lights."""
+def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+    """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
@@ -81,6 +145,13 @@ def first_mesh(problem: Problem, most_tetrahedra: int, report: Report, *, cache:
             deposits = [deposit for sources in problem.sources for deposit in sources.deposits_if(fitted=fitted)]
             lit = places_to_resolve(deposits)
             mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, longest=longest, inner=scenes.inner)
+        if aims.readings is not None:
+            seen = np.array([view.position for view in aims.views])
+            every, _ = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])
+            for media in dict.fromkeys(problem.media):
+                mesh = grade_between(
+                    mesh, scenes.surface, scenes.inner, media, every, seen, aims.readings, most_tetrahedra
+                )
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
@@ -98,17 +169,15 @@ def _report_if_slow(report: Report) -> Iterator[None]:
         timer.cancel()
 
 
-def solve_and_refine(
-    mesh: TetMesh, problem: Problem, tolerance: float, most_tetrahedra: int, report: Report
-) -> list[Step]:
-    """Solve for all scenes on one mesh, refined until each meets the tolerance or the mesh is as large as it may be.
+def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report) -> list[Step]:
+    """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
 
     Parameters
     ----------
     mesh : TetMesh
         To begin with.
     problem : Problem
-    tolerance : float
+    aims : Aims
     most_tetrahedra : int
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
@@ -126,22 +195,23 @@ def solve_and_refine(
     steps = best = {first: solve_on(first, None)}
     least = np.inf
     while True:
-        worst = max(step.estimate.error for step in steps.values())
-        if worst < least:
-            best, least = steps, worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: estimated error {worst:.2%}")
-        marked = cells_to_split((step.estimate for step in steps.values()), tolerance)
-        fine_enough = not marked.any()
+        with problem.watch.stage("solve"):
+            found = aims.assess(list(steps.values()))
+        if found.worst < least:
+            best, least = steps, found.worst
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.words}")
+        fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = refine(mesh, marked, problem.scenes.surface, problem.scenes.inner)
+                scenes = problem.scenes
+                finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 mesh, solve_on = finer, problem.solver_on(finer)
                 steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
-            found = steps if fine_enough else best
-            return [found[scene] for scene in range(len(bodies))]
+            chosen = steps if fine_enough else best
+            return [chosen[scene] for scene in range(len(bodies))]
         steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least = [], np.inf

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
+from tetlux.fem.media.coefficients import AnyMedium, coefficients_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.blocks import THREADS
@@ -12,6 +14,15 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
+# Between light and detectors, edges are no longer than this times the length over which fluence fades to 1/e, for a
+# tolerance of .01: the error of quadratic elements goes with its fourth power. Off the straight way light gets fainter
+# by e^{-k excess}, with what its way is longer, and edges may be longer by the root of that.
+FADING, AT_TOLERANCE = 1.5, 0.01
+# Near a detector, where its dual solution is steep, edges are shorter by the first factor; from the second of these
+# distances on, in lengths of fading, they are as long as elsewhere.
+AT_DETECTOR, NEAR_DETECTOR = 0.4, 2.0
+# So many lit points are looked at.
+MOST_LIT = 32
 # Longest edge of a tetrahedron on the first mesh, relative to its distance from the nearest source, or to the length
 # to resolve there if that is larger. The error then is some per cent, and its estimate good to a factor of three.
 LONGEST_EDGE = 1.0
@@ -91,3 +102,58 @@ def grade_mesh(
         if len(finer.tetrahedra) > most:
             return mesh
         mesh = finer
+
+
+def grade_between(
+    mesh: TetMesh,
+    surface: Surface,
+    inner: Sequence[Surface],
+    media: Sequence[AnyMedium],
+    lit: FloatArray,
+    seen: FloatArray,
+    tolerance: float,
+    most: int,
+) -> TetMesh:
+    """Split tetrahedra that are too coarse for light that fades on its way to detectors.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    surface : Surface
+        New boundary nodes are moved onto it.
+    inner : sequence of Surface
+        Those of the mesh's regions.
+    media : sequence of medium
+        Of the body and of its regions.
+    lit, seen : (s, 3), (d, 3) ndarray
+        Where light is deposited, and where it is read.
+    tolerance : float
+        Of readings.
+    most : int
+        Tetrahedra at which it stops.
+
+    Returns
+    -------
+    TetMesh
+    """
+    some = lit[:: -(-len(lit) // MOST_LIT)] if len(lit) else lit
+    lengths = cdist(some, seen)
+    while len(some):
+        coefficients = coefficients_on(mesh, media)
+        decay = np.broadcast_to(np.sqrt(coefficients.sigma_a / coefficients.diffusion), len(mesh.tetrahedra))
+        middles = mesh.points[mesh.tetrahedra].mean(axis=1)
+        from_light, to_detector = cdist(middles, some), cdist(middles, seen)
+        excess = np.full(len(middles), np.inf)
+        for light, length in enumerate(lengths):
+            excess = np.minimum(excess, (from_light[:, [light]] + to_detector - length).min(axis=1))
+        wanted = FADING * (tolerance / AT_TOLERANCE) ** 0.25 * np.exp(0.25 * decay * excess)
+        near = decay * to_detector.min(axis=1) / NEAR_DETECTOR
+        wanted *= np.minimum(AT_DETECTOR + (1.0 - AT_DETECTOR) * near, 1.0)
+        marked = mesh.longest_edges * decay > wanted
+        if not marked.any():
+            break
+        finer = refine(mesh, marked, surface, inner)
+        if len(finer.tetrahedra) > most:
+            break
+        mesh = finer
+    return mesh

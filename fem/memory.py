@@ -31,9 +31,13 @@ IMPORTED = 80e6
 GIVEN, REFINED = 1000.0, 1600.0
 # Bytes a tetrahedron for each further medium (its matrix and solver), and for each light (its fluence and patch).
 MATRIX, LIGHT = 120.0, 20.0
+# Bytes a tetrahedron for quadratic elements, where detectors are read (74,000 tetrahedra).
+READING = 3750.0
 
 
-def estimate_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False) -> float:
+def estimate_memory(
+    tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False, reading: bool = False
+) -> float:
     """Estimate the memory that it takes to solve on a mesh and to estimate the error, bytes.
 
     Parameters
@@ -45,26 +49,29 @@ def estimate_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, refi
         How many lights all scenes have together.
     refined : bool
         Whether the mesh is made by refinement, which holds two meshes at a time.
+    reading : bool
+        Whether detectors are read.
 
     Returns
     -------
     float
     """
-    return IMPORTED + tetrahedra * _bytes_per_tetrahedron(matrices, lights, refined)
+    return IMPORTED + tetrahedra * _bytes_per_tetrahedron(matrices, lights, refined=refined, reading=reading)
 
 
-def _bytes_per_tetrahedron(matrices: int, lights: int, refined: bool) -> float:
-    return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights
+def _bytes_per_tetrahedron(matrices: int, lights: int, *, refined: bool, reading: bool) -> float:
+    of_readings = READING if reading else 0.0
+    return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights + of_readings
 
 
-def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
+def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> None:
     """Refuse a mesh that takes more memory than is available; see `estimate_memory`.
 
     Raises
     ------
     RunError
     """
-    needed, free = estimate_memory(tetrahedra, matrices, lights), available()
+    needed, free = estimate_memory(tetrahedra, matrices, lights, reading=reading), available()
     if needed > free:
         raise RunError(
             f"{tetrahedra:,} tetrahedra need about {gigabytes(needed)} GB of memory, and {gigabytes(free)} GB are "
@@ -72,10 +79,10 @@ def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1) -> None:
         )
 
 
-def affordable_tetrahedra(most: int, matrices: int = 1, lights: int = 1) -> tuple[int, str]:
+def affordable_tetrahedra(most: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> tuple[int, str]:
     """How many tetrahedra a mesh may be refined to, at most `most`, and a clause that says what sets the limit."""
     free = available()
-    affordable = max(0.0, free - IMPORTED) / _bytes_per_tetrahedron(matrices, lights, refined=True)
+    affordable = max(0.0, free - IMPORTED) / _bytes_per_tetrahedron(matrices, lights, refined=True, reading=reading)
     if affordable >= most:
         return most, f"at the limit of {most:,} tetrahedra"
     return int(affordable), f"at the {affordable:,.0f} tetrahedra that {gigabytes(free)} GB of memory suffice for"

@@ -1,12 +1,13 @@
 """Notes on a solution: each a sentence for the user with a stable code."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from tetlux.fem.error.estimate import ROUNDING
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.split import Sources
+from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warnings_for
 from tetlux.meshing.notes import Note
@@ -21,7 +22,7 @@ LARGEST_BULGE = 0.015
 SHALLOW = 0.1
 
 
-def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str) -> list[str]:
+def notes_on(solution: Solution, sources: Sources, tolerance: float | None, where: str) -> list[str]:
     """Collect the notes on a solution.
 
     Parameters
@@ -29,7 +30,8 @@ def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str)
     solution : Solution
     sources : Sources
         What the lights of the solution leave in the body.
-    tolerance : float
+    tolerance : float, optional
+        Of the exitance, if it has one.
     where : str
         Where refinement stopped, for the sentence that the tolerance was not met.
 
@@ -42,7 +44,8 @@ def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str)
     if solution.validity is not None:
         notes += warnings_for(solution.surface, solution.validity)
     notes += [*sources.warnings, *solution.warnings]
-    notes += _on_tolerance(solution, tolerance, where)
+    if tolerance is not None:
+        notes += _on_tolerance(solution, tolerance, where)
     notes += _on_bulge(solution)
     notes += _on_power(solution)
     notes += _on_fluence(solution, dips=sources.dips)
@@ -50,6 +53,26 @@ def notes_on(solution: Solution, sources: Sources, tolerance: float, where: str)
     notes += _on_shallow_sources(solution)
     notes += _on_exitance(solution)
     return list(dict.fromkeys(notes))
+
+
+def notes_on_readings(readings: Sequence[Reading], tolerance: float | None, where: str) -> list[Note]:
+    """A note on the readings that miss their tolerance, if there are any."""
+    errors = [reading.relative_error for reading in readings]
+    if tolerance is None:
+        return []
+    missed = [number for number, error in enumerate(errors, 1) if error is None or not error <= tolerance]
+    if not missed:
+        return []
+    worst = max((error for error in errors if error is not None), default=np.inf)
+    which = f"{'reading' if len(missed) == 1 else 'readings'} {', '.join(map(str, missed))}"
+    return [
+        Note(
+            "detector-tolerance-missed",
+            f"the tolerance of {tolerance:g} for detectors was not met by "
+            f"{which}: the largest estimated error is {worst:.2g}, {where}.",
+            value=float(worst),
+        )
+    ]
 
 
 def _on_tolerance(solution: Solution, tolerance: float, where: str) -> Iterator[Note]:
@@ -84,7 +107,7 @@ def _on_power(solution: Solution) -> Iterator[Note]:
     if abs(power.exited) <= ROUNDING * power.incident:
         yield Note(
             "no-light-leaves",
-            "no diffuse light leaves the body: all light is reflected at its surface, passes through or is absorbed.",
+            "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",
         )
 
 

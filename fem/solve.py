@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, overload
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Aims, Problem, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
 from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
@@ -14,8 +14,10 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
-from tetlux.fem.notes import notes_on
+from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.outcome.detectors import Detector, read_all, view_of
+from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes, media_by_channel
 from tetlux.fem.sources.light import Light
@@ -32,7 +34,9 @@ def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
+    detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
     mass: Mass = ...,
     subtract: Subtract = ...,
@@ -51,7 +55,9 @@ def solve(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
+    detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
     mass: Mass = ...,
     subtract: Subtract = ...,
@@ -81,7 +87,9 @@ def solve(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float = 0.02,
+    tolerance: float | None = 0.02,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
     subtract: Subtract = "fitted",
@@ -108,8 +116,12 @@ def solve(
         At least one; they add up.
     regions : sequence of Region
         Closed surfaces within the body, with media of their own.
-    tolerance : float
-        Wanted relative L2 error of the exitance over the surface.
+    tolerance : float, optional
+        Wanted relative L2 error of the exitance over the surface; None to refine for detectors alone.
+    detectors : sequence of detectors
+        What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
+    detector_tolerance : float, optional
+        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
@@ -167,7 +179,10 @@ def solve(
     if model not in ("full", "charges"):
         raise InputError(f'model is "{model}"; give "full" or "charges".')
     if model == "charges":
-        return solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
+        if tolerance is None:
+            raise InputError('model "charges" needs a tolerance of the exitance; give one.')
+        found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
+        return replace(found, readings=read_all(detectors, found))
     channels, several = media_by_channel(body, mesh, medium)
     solutions = solve_each(
         body,
@@ -175,6 +190,8 @@ def solve(
         [lights] * len(channels),
         regions=regions,
         tolerance=tolerance,
+        detectors=detectors,
+        detector_tolerance=detector_tolerance,
         mesh=mesh,
         mass=mass,
         subtract=subtract,
@@ -192,7 +209,9 @@ def solve_each(
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float = 0.02,
+    tolerance: float | None = 0.02,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
     subtract: Subtract = "fitted",
@@ -213,8 +232,12 @@ def solve_each(
         The lights of each scene, which add up.
     regions : sequence of Region
         Closed surfaces within the body; a region has one medium for all scenes, or one for each.
-    tolerance : float
-        Wanted relative L2 error of each scene's exitance over the surface.
+    tolerance : float, optional
+        Wanted relative L2 error of each scene's exitance over the surface; None to refine for detectors alone.
+    detectors : sequence of detectors
+        What is to be read in each scene.
+    detector_tolerance : float, optional
+        Wanted relative error of what each detector reads.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
@@ -257,7 +280,7 @@ def solve_each(
     >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
     (True, True)
     """
-    check_tolerance(tolerance)
+    _check_tolerances(tolerance, detectors, detector_tolerance)
     check_scenes(scenes)
     if isinstance(body, TetMesh):
         if mesh is not None:
@@ -270,21 +293,44 @@ def solve_each(
         if isinstance(body, TetMesh):
             subtract = without_fit(subtract)
         sources = [
-            sources_of(lights, each, subtract, tolerance=tolerance, kept=kept)
+            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
+        dark = Dark(checked.surface, checked.bodies[0].outer)
+        aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
     problem = Problem(checked, sources, mass, limit, watch)
-    given = mesh is not None
-    most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size)
+    given, reading = mesh is not None, len(detectors) > 0
+    most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
-        mesh = first_mesh(problem, most_tetrahedra, report, cache=cache)
-    check_memory(len(mesh.tetrahedra), *problem.size)
-    steps = solve_and_refine(mesh, problem, tolerance, 0 if given else most_tetrahedra, report)
+        mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
+    check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
+    steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
     keep_with(steps[0].solution.mesh, kept)
+    where = "on the mesh given" if given else where
     solutions = []
     for number, step in enumerate(steps):
-        notes = notes_on(step.solution, sources[number], tolerance, "on the mesh given" if given else where)
+        with watch.stage("solve"):
+            readings = read_all(detectors, step.solution)
+        notes = notes_on(step.solution, sources[number], tolerance, where)
+        notes += notes_on_readings(readings, detector_tolerance, where)
         notes += checked.warnings(number, step.solution, given=given)
-        solutions.append(replace(step.solution, warnings=list(dict.fromkeys(notes))))
+        solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
+    """Refuse tolerances that are not sensible or do not go with the detectors.
+
+    Raises
+    ------
+    InputError
+    """
+    if tolerance is not None:
+        check_tolerance(tolerance)
+    if detector_tolerance is not None:
+        check_tolerance(detector_tolerance, "detector_tolerance")
+        if len(detectors) == 0:
+            raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
+    elif tolerance is None:
+        raise InputError("there is no tolerance; give tolerance, or detectors and a detector_tolerance.")

@@ -17,12 +17,16 @@ from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
+from tetlux.fem.models.diffusion import Diffusion
+from tetlux.fem.models.model import Model
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import fitting_of
 from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
 from tetlux.fem.outcome.of_light import solution_of_light
 from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.solution import QuadraticLights, QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -93,6 +97,11 @@ class System:
         """Those of its tetrahedra."""
         return coefficients_on(self.mesh, self.media)
 
+    @cached_property
+    def model(self) -> Model:
+        """The equation that is solved."""
+        return Diffusion(self.coefficients)
+
     @property
     def true_surface(self) -> Surface:
         """What the mesh stands for."""
@@ -101,7 +110,7 @@ class System:
     @cached_property
     def plain(self) -> Operator:
         """The operator for points and beams."""
-        return operator_of(self._assembly, self.coefficients, self.mass, self._loads_expected)
+        return operator_of(self._assembly, self.model, self.mass, self._loads_expected)
 
     @cached_property
     def fitted(self) -> Operator:
@@ -109,7 +118,13 @@ class System:
         fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
         if fitting is None:
             return self.plain
-        return operator_of(self._assembly, self.coefficients, self.mass, self._loads_expected, fitting)
+        return operator_of(self._assembly, self.model, self.mass, self._loads_expected, fitting)
+
+    @cached_property
+    def quadratic(self) -> QuadraticOperator:
+        """The operator that detectors are read by."""
+        inner = tuple(region.surface for region in self.regions)
+        return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
 
     @cached_property
     def _assembly(self) -> Assembly:
@@ -184,7 +199,19 @@ class System:
             fluence = fluences[:, owners == light].sum(axis=1)
             own = [each for each in [*subtractions, *fitted] if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
-        return _Solved(loads, of_lights, self._sum(of_lights, loads, results, sources), good)
+        quadratic = QuadraticLights(
+            self.quadratic,
+            tuple(load.deposit for load in loads),
+            tuple(solution.patches for solution in of_lights),
+            tuple(solution.fluence for solution in of_lights),
+        )
+        of_lights = [
+            replace(solution, quadratic=QuadraticSolution(quadratic, (light,)))
+            for light, solution in enumerate(of_lights)
+        ]
+        whole = self._sum(of_lights, loads, results, sources)
+        whole = replace(whole, quadratic=QuadraticSolution(quadratic, tuple(range(len(loads)))))
+        return _Solved(loads, of_lights, whole, good)
 
     def _loads(self, sources: Sources) -> list[Load]:
         """The load of each light: with the fitted operator where it is spread evenly, else with the plain one."""

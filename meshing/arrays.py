@@ -1,9 +1,13 @@
-"""Array types of all signatures, sums by index, and evenly spaced indices."""
+"""Array types of all signatures, sums by index, evenly spaced indices, and perpendicular axes."""
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+# Real or complex numbers.
+NumberArray = npt.NDArray[Any]
 IntArray = npt.NDArray[np.int64]
 # Half the memory of an IntArray, for large tables.
 IndexArray = npt.NDArray[np.int32]
@@ -19,3 +23,10 @@ def sum_by_index(indices: npt.NDArray[np.integer], values: FloatArray, count: in
 def spread_indices(count: int, most: int) -> IntArray:
     """Evenly spaced indices below `count`, at most `most` of them."""
     return np.arange(min(count, most)) * count // max(min(count, most), 1)
+
+
+def perpendicular_axes(directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors perpendicular to each unit vector d, (..., 3) each: e and d x e."""
+    first = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=-1)])
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return first, np.cross(directions, first)

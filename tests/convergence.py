@@ -24,6 +24,7 @@ from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.linear.multigrid import multigrid
 from tetlux.fem.linear.solver import Solver
+from tetlux.fem.models.boundary import PartialCurrent
 from tetlux.fem.operators.assembly import system_matrix
 from tetlux.fem.solve import solve
 from tetlux.meshing import Surface, TetMesh, refine
@@ -170,7 +171,7 @@ class Body:
         if self.inflow is not None:
             load += integrals_with_hats(mesh.points, mesh.boundary_faces, mesh.boundary_areas, self.inflow)
         fluence = Solver(system_matrix(mesh, medium), [multigrid]).solve(load).x
-        return Solution(mesh, mesh.surface, medium, fluence, Power(1.0, 0.0, 0.0, 1.0, 0.0))
+        return Solution(mesh, mesh.surface, PartialCurrent(medium), fluence, Power(1.0, 0.0, 0.0, 1.0, 0.0))
 
     def measured(self, level: int) -> Row:
         """Errors of fluence in the volume and of exitance on the surface, each point held to the true one."""

@@ -60,7 +60,7 @@ def test_coefficients_may_differ_from_tetrahedron_to_tetrahedron(mass: Mass) -> 
     mesh = random_mesh(3)
     rng = np.random.default_rng(4)
     diffusion, sigma_a = rng.uniform(0.1, 9.0, (2, len(mesh.tetrahedra)))
-    escape = rng.uniform(0.1, 0.5, len(mesh.boundary_faces))
+    robin = rng.uniform(0.1, 0.5, len(mesh.boundary_faces))
     body = MeshTet1(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.tetrahedra.T))
     corners = (np.array([[0.0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), np.full(4, 1 / 24))
     rule = {"quadrature": corners} if mass == "lumped" else {"intorder": 2}
@@ -69,19 +69,44 @@ def test_coefficients_may_differ_from_tetrahedron_to_tetrahedron(mass: Mass) -> 
     values = {"D": constants.interpolate(diffusion), "sigma_a": constants.interpolate(sigma_a)}
     form = BilinearForm(lambda u, v, w: w.D * dot(grad(u), grad(v)) + w.sigma_a * u * v)
     expected = csr_array(form.assemble(inside, **values))
-    found = Assembly(mesh).matrix(diffusion, sigma_a, np.zeros(len(escape)), mass)
+    found = Assembly(mesh).matrix(diffusion, sigma_a, np.zeros(len(robin)), mass)
     assert gap(found, expected) < 1e-12
     # The boundary alone, triangle by triangle.
-    boundary = Assembly(mesh).matrix(np.zeros(len(diffusion)), 0.0, escape, mass).toarray()
+    boundary = Assembly(mesh).matrix(np.zeros(len(diffusion)), 0.0, robin, mass).toarray()
     triangle = np.eye(3) / 3.0 if mass == "lumped" else (np.ones((3, 3)) + np.eye(3)) / 12.0
     by_hand = np.zeros_like(boundary)
-    for face, area, value in zip(mesh.boundary_faces, mesh.boundary_areas, escape, strict=True):
+    for face, area, value in zip(mesh.boundary_faces, mesh.boundary_areas, robin, strict=True):
         by_hand[np.ix_(face, face)] += value * area * triangle
     assert np.abs(boundary - by_hand).max() < 1e-12 * by_hand.max()
     # A constant array and a number are the same thing.
     one = Assembly(mesh)
-    same = one.matrix(np.full(len(diffusion), 0.3), np.full(len(diffusion), 0.2), np.full(len(escape), 0.1), mass)
+    same = one.matrix(np.full(len(diffusion), 0.3), np.full(len(diffusion), 0.2), np.full(len(robin), 0.1), mass)
     assert gap(one.matrix(0.3, 0.2, 0.1, mass), same) < 1e-13
+
+
+@pytest.mark.parametrize("mass", MASSES)
+def test_a_shift_adds_to_the_absorption_coefficient(mass: Mass) -> None:
+    mesh = random_mesh(6)
+    sigma_a = np.random.default_rng(7).uniform(0.1, 9.0, len(mesh.tetrahedra))
+    assembly = Assembly(mesh)
+    terms = assembly.terms(0.3, sigma_a, 0.1, mass)
+    assert gap(terms.combine(2.5), assembly.matrix(0.3, sigma_a + 2.5, 0.1, mass)) < 1e-13
+    shifted = terms.combine(0.5 + 2.5j)
+    assert gap(shifted.real, assembly.matrix(0.3, sigma_a + 0.5, 0.1, mass)) < 1e-13
+    # Absorption alone, by scikit-fem: D next to nothing.
+    alone = weak_form_matrix(mesh, Medium(sigma_a=2.5, sigma_s_prime=1e30, eta=1.0), mass)
+    boundary = assembly.matrix(0.0, 0.0, 0.5, mass)
+    assert gap(csr_array(shifted.imag), csr_array(alone - boundary)) < 1e-13
+
+
+@pytest.mark.parametrize("mass", MASSES)
+def test_terms_say_what_is_absorbed_and_what_leaves(ball_mesh: TetMesh, mass: Mass) -> None:
+    sigma_a = np.linspace(0.1, 0.2, len(ball_mesh.tetrahedra))
+    terms = Assembly(ball_mesh).terms(0.3, sigma_a, 0.1, mass)
+    absorbed, leaving = terms.absorption.row_sums(ball_mesh), terms.boundary.row_sums(ball_mesh)
+    assert absorbed.sum() == pytest.approx(sigma_a @ ball_mesh.volumes, rel=1e-12)
+    assert leaving.sum() == pytest.approx(0.1 * ball_mesh.area, rel=1e-12)
+    assert np.abs(terms.stiffness.row_sums(ball_mesh)).max() < 1e-14
 
 
 @pytest.mark.parametrize("mass", MASSES)

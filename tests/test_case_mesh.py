@@ -59,7 +59,11 @@ def test_a_run_writes_everything(path: Path, capsys: pytest.CaptureFixture[str])
     assert not set(summary["repairs"]) & set(summary["warnings"])
     media = {3: Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4), 7: Medium(sigma_a=0.01, sigma_s_prime=2.0, eta=1.4)}
     expected = solve(read_mesh(path.parent / "turned.vtu"), media, [PointSource((10, 10, 12))], tolerance=0.9)
-    assert summary["channels"][0]["power"]["absorbed"] == pytest.approx(expected.power.absorbed, rel=1e-9)
+    (channel,) = summary["channels"]
+    assert channel["power"]["absorbed"] == pytest.approx(expected.power.absorbed, rel=1e-9)
+    # Both labels have the same share of the boundary, and the first one counts.
+    assert (channel["sigma_tr"], channel["albedo"]) == (media[3].sigma_tr, media[3].albedo)
+    assert [medium["sigma_tr"] for medium in channel["media"]] == [each.sigma_tr for each in media.values()]
     again = read_mesh(out / "case" / "volume.vtu")
     assert again.region_volumes == pytest.approx({3: 4000.0, 7: 4000.0})
     surface = meshio.read(out / "case" / "surface.ply")

@@ -58,10 +58,9 @@ def test_a_point_reads_the_exitance_there(ball: Surface, ball_solution: Solution
     assert reading.position == pytest.approx((0.0, 10.0, 0.0), abs=1e-3)
     assert reading.normal == pytest.approx((0.0, 1.0, 0.0), abs=1e-3)
     assert (reading.area, reading.power) == (None, None)
-    assert (
-        read(PointDetector((6.0, 0.0, 8.0)), ball_solution).exitance
-        == ball_solution.exitance_at(np.array([[6.0, 0.0, 8.0]]))[0]
-    )
+    # Of a solution it is that of quadratic elements; where it is bright, linear ones differ by little.
+    found = read(PointDetector((6.0, 0.0, 8.0)), ball_solution)
+    assert found.exitance == pytest.approx(ball_solution.exitance_at(np.array([[6.0, 0.0, 8.0]]))[0], rel=0.03)
 
 
 @pytest.mark.parametrize(("radius", "error"), [(0.1, 1e-5), (1.0, 1e-4), (4.0, 2e-4)])

@@ -10,12 +10,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 import meshio
 import pytest
 
 from tests.conftest import block
+from tests.elsewhere import start_elsewhere
 from tetlux.cases import run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
@@ -94,32 +96,37 @@ def wait_until(true: Callable[[], bool], seconds: float = 20.0) -> bool:
 
 
 @linux
-@pytest.mark.slow
 @pytest.mark.parametrize("notes", [False, True], ids=["alone", "beside notes"])
 def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
     """Every run has a power of its own, by which its files are known, and makes its own mesh."""
     out, temporary = tmp_path / "out", tmp_path / "tmp"
     temporary.mkdir()
-    environment = {**os.environ, "TMPDIR": str(temporary), "TETLUX_CACHE_DIR": str(tmp_path / "cache")}
+    environment = {"TMPDIR": str(temporary), "TETLUX_CACHE_DIR": str(tmp_path / "cache")}
     options = [str(tmp_path / "ball.yaml"), "--out", str(out)]
-    command = [sys.executable, "-m", "tetlux.cases", "run", *options, "--no-cache"]
 
-    def start(power: float) -> subprocess.Popen[str]:
+    def start(power: float) -> ForkServerProcess:
         written(tmp_path, power)
-        return subprocess.Popen(command, stdout=subprocess.DEVNULL, env=environment, text=True)
+        return start_elsewhere(["run", *options, "--no-cache"], tmp_path, environment)
 
-    started = time.monotonic()
-    assert start(1.0).wait() == 0
-    whole, power, killed = time.monotonic() - started, 1.0, 0
+    def run_to_the_end(power: float) -> float:
+        started, process = time.monotonic(), start(power)
+        process.join()
+        assert process.exitcode == 0
+        return time.monotonic() - started
+
+    # The first waits for imports too.
+    run_to_the_end(1.0)
+    whole, power, killed = run_to_the_end(2.0), 2.0, 0
     if notes:
         (out / "ball" / "notes.txt").write_text("mine")
     # Two tests of ten each.
     for moment in range(10):
         power += 1.0
-        with start(power) as process:
-            time.sleep(whole * (moment + (0.25 if notes else 0.75)) / 10.0)
-            process.kill()
-        killed += process.returncode == -signal.SIGKILL
+        process = start(power)
+        time.sleep(whole * (moment + (0.25 if notes else 0.75)) / 10.0)
+        process.kill()
+        process.join()
+        killed += process.exitcode == -signal.SIGKILL
         assert finished(out / "ball") in (power - 1.0, power)
         assert wait_until(lambda: not processes_in(temporary))
         # The next run, here, where everything is imported.
@@ -479,6 +486,7 @@ WRITER = """\
 import sys
 from pathlib import Path
 from tests.conftest import block
+from tests.elsewhere import start_elsewhere
 from tetlux.meshing.mesher.cache import store_cached_mesh
 
 while True:

@@ -113,8 +113,8 @@ def test_what_cannot_be_fitted_has_the_half_space(ball: Surface, ball_mesh: TetM
     assert not is_fitted(System(ball_mesh, TISSUE).solve([source]))
     assert is_fitted(System(ball_mesh, TISSUE, ball).solve([source]))
     assert not is_fitted(solve(ball, TISSUE, [source], regions=[core], tolerance=0.2))
-    for light in (wide, line):
-        assert not is_fitted(solve(ball, TISSUE, [light], mesh=ball_mesh))
+    for beam in (wide, line):
+        assert not is_fitted(solve(ball, TISSUE, [beam], mesh=ball_mesh))
     shallow = PointSource((0.0, 0.0, RADIUS - 1e-4))
     for point, medium in ((shallow, TISSUE), (source, varying)):
         assert not is_fitted(solve(ball, medium, [point], mesh=ball_mesh))

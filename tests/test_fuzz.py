@@ -8,6 +8,9 @@ import pytest
 from tests.fuzz.outcome import Outcome
 from tests.fuzz.runs import check_case_files, check_surfaces, check_volumes, in_a_folder, run_surfaces
 
+# To measure coverage here would more than double the time of the suite's longest tests.
+pytestmark = pytest.mark.no_cover
+
 
 def sound(outcomes: list[Outcome], *, least: int, refused: int) -> None:
     """Hold outcomes against what is promised; most of what is malformed has to be noticed."""

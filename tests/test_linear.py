@@ -307,9 +307,9 @@ def test_matrices_much_alike_share_what_is_prepared(monkeypatch: pytest.MonkeyPa
     # What is like one that only borrowed is not like what that was prepared for.
     for coefficients, anew in ((base, True), (near, False), (beyond, True), (far, True), (near, False)):
         prepared.clear()
-        solver = assembly.solver(coefficients, "lumped", 4)
-        assert (len(mesh.points) in prepared) == anew
         matrix = assembly.of(coefficients)
+        solver = assembly.solver(coefficients, matrix, 4)
+        assert (len(mesh.points) in prepared) == anew
         assert np.array_equal(solver.matrix.data, matrix.data)
         assert (np.linalg.norm(loads - matrix @ solver.solve(loads).x, axis=0) < 2e-11).all()
         assert solver.note == ""

@@ -216,6 +216,36 @@ def test_two_halves_are_two_regions(name: str) -> None:
     assert abs(alone.power.exited / of_regions.power.exited - 1.0) > 0.05
 
 
+ABOVE = PointSource((0.3, 0.2, -1.5))
+
+
+def test_a_source_is_subtracted_where_a_medium_that_varies_is_the_same() -> None:
+    """The tetrahedra of the source's own medium, whether it is a region, a field, or the whole body."""
+    light: list[Light] = [ABOVE]
+    mesh, varying, regions = halves()
+    of_regions = System(mesh, FORWARD, regions=regions).solve(light)
+    of_field = System(mesh, varying).solve(light)
+    assert of_field.exitance == pytest.approx(of_regions.exitance, rel=1e-9)
+    for solution in (of_regions, of_field):
+        (patch,) = solution.patches
+        assert patch.cells.any()
+        assert (mesh.regions[patch.cells] == 0).all()
+    plain = System(mesh, varying).solve(light, subtract="nothing")
+    assert plain.exitance != pytest.approx(of_field.exitance, rel=0.05)
+    even = VaryingMedium(base=FORWARD, sigma_a=lambda p: np.full(len(p), FORWARD.sigma_a))
+    one, other = System(mesh, FORWARD).solve(light), System(mesh, even).solve(light)
+    assert other.exitance == pytest.approx(one.exitance, rel=1e-9)
+
+
+def test_what_changes_everywhere_is_not_subtracted() -> None:
+    medium = VaryingMedium(base=FORWARD, sigma_a=lambda p: 0.02 + 0.001 * p[:, 0])
+    system = System(CUBE, medium)
+    known, plain = (system.solve([ABOVE], subtract=subtract) for subtract in ("half-space", "nothing"))
+    assert known.exitance == pytest.approx(plain.exitance, rel=1e-9)
+    # Each of its many thin beams is in another medium.
+    assert system.solve([PencilBeam((0.3, 0.2, 4.0), (0.0, 0.0, -1.0), radius=0.5)]).patches == ()
+
+
 def test_a_mesh_that_does_not_fit_the_interface_is_nearly_as_good() -> None:
     """Seven layers of elements for two halves: measured .4 % of the power; an even mixture is off by 16 %."""
     mesh, varying, regions = halves()

@@ -137,6 +137,69 @@ def test_a_two_sided_export_is_one_body(arrays: Arrays) -> None:
     assert surface.warnings == ()
 
 
+def _other_diagonals(cube: Surface) -> list[tuple[int, int, int]]:
+    """The sides of a cube, each cut along its other diagonal, oriented outward."""
+    found = []
+    for normal in np.unique(np.round(cube.normals), axis=0):
+        one, two = cube.faces[(np.round(cube.normals) == normal).all(axis=1)].tolist()
+        first = next(i for i in range(3) if one[i] not in two)
+        apex, start, end = (one[(first + i) % 3] for i in range(3))
+        across = next(i for i in two if i not in one)
+        found += [(apex, start, across), (apex, across, end)]
+    return found
+
+
+CUBE = box((10.0, 10.0, 10.0))
+# The other diagonals of its sides.
+OTHER = np.array([[a, b, c] for a, b, c in _other_diagonals(CUBE)])
+
+
+@pytest.mark.parametrize("turn", [-1, 1], ids=["turned over", "the same way round"])
+def test_two_sides_of_different_triangles_are_one_body(turn: int) -> None:
+    for arrays in (
+        (CUBE.points, np.vstack([CUBE.faces, OTHER[:, ::turn]])),
+        together((CUBE.points, CUBE.faces), (CUBE.points, OTHER[:, ::turn])),
+        together((CUBE.points, OTHER[:, ::turn]), (CUBE.points, CUBE.faces)),
+    ):
+        surface = surface_from_arrays(*arrays)
+        assert surface.volume == pytest.approx(1000.0)
+        assert len(surface.faces) == 12
+        assert "kept one side of a two-sided surface, and removed the 12 triangles of the other." in surface.repairs
+        assert surface.warnings == ()
+
+
+def test_of_two_sides_the_finer_is_kept() -> None:
+    for arrays in (
+        together((POINTS, FACES), (FINE.points, turned_over(FINE.faces))),
+        together((FINE.points, FINE.faces), (POINTS, turned_over(FACES))),
+    ):
+        surface = surface_from_arrays(*arrays)
+        assert surface.volume == pytest.approx(FINE.volume)
+        assert "kept one side of a two-sided surface, and removed the 320 triangles of the other." in surface.repairs
+
+
+def test_an_open_body_whose_sides_differ_is_capped_as_one() -> None:
+    top = CUBE.points[:, 2].max()
+    sides = [faces[(CUBE.points[faces][:, :, 2] < top).any(axis=1)] for faces in (CUBE.faces, OTHER)]
+    surface = surface_from_arrays(CUBE.points, np.vstack([sides[0], turned_over(sides[1])]), holes="close")
+    assert surface.volume == pytest.approx(1000.0)
+    assert surface.repairs[0] == "kept one side of a two-sided surface, and removed the 10 triangles of the other."
+
+
+def test_a_wall_whose_sides_differ_goes_and_a_thin_body_stays() -> None:
+    core, shell = 0.3 * CUBE.points, (POINTS, FACES)
+    surface = surface_from_arrays(*together(shell, (core, turned_over(CUBE.faces)), (core, OTHER)))
+    assert surface.volume == pytest.approx(BALL.volume)
+    assert surface.repairs[-1] == "removed 24 triangles of a wall inside the body."
+    corners = np.array([[0.0, 0, 0], [1, 0, 0.01], [1, 1, 0], [0, 1, 0.01]])
+    flat = surface_from_arrays(corners, [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    assert len(flat.faces) == 4
+    octahedron = np.vstack([np.eye(3), -np.eye(3)])
+    inscribed = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    cavity = together((FINE.points, FINE.faces), (10.0 * octahedron, turned_over(inscribed)))
+    assert len(surface_from_arrays(*cavity).faces) == len(FINE.faces) + 8
+
+
 def test_two_sides_of_several_bodies_and_of_one_with_a_hole() -> None:
     two = together((POINTS, FACES), (POINTS + 30.0, FACES))
     both = two[0], np.vstack([two[1], turned_over(two[1])])
@@ -229,9 +292,11 @@ def test_a_tube_gets_a_cap_at_each_end() -> None:
 
 def test_the_largest_of_several_holes_is_named() -> None:
     height = heights(FINE)
-    arrays = cut(FINE, (height < 9.0) & (height > -5.0))
-    with pytest.raises(InputError, match=r"a hole of 92 edges, 24\.\d+ wide around .*-5.*\), the largest of 2; cap it"):
-        surface_from_arrays(*arrays)
+    points, faces = cut(FINE, (height < 9.0) & (height > -5.0))
+    words = r"a hole of 92 edges, 24\.\d+ wide around .*-5.*\), the largest of 2; cap it"
+    for arrays in ((points, faces), (points, faces[::-1])):
+        with pytest.raises(InputError, match=words):
+            surface_from_arrays(*arrays)
     with pytest.raises(InputError, match='holes is "maybe"; give one of small, close, refuse'):
         surface_from_arrays(*arrays, holes="maybe")  # type: ignore[arg-type]
 
@@ -265,6 +330,33 @@ def test_a_hollow_rim_is_covered_once(count: int) -> None:
     twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
     assert twice.sum() / 2 == pytest.approx(normal)
     assert np.abs(twice).sum() / 2 == pytest.approx(normal, rel=1e-9 if count < 300 else 1e-3)
+
+
+def outline(corners: list[tuple[float, float]], count: int) -> FloatArray:
+    """A flat polygon whose edges are cut into `count` pieces."""
+    start = np.array([(x, y, 0.0) for x, y in corners])
+    shares = np.arange(count)[:, None] / count
+    return np.vstack([a + shares * (b - a) for a, b in zip(start, np.roll(start, -1, axis=0), strict=True)])
+
+
+TEETH = [point for i in range(4) for point in ((8 - 2 * i, 5), (7 - 2 * i, 5), (7 - 2 * i, 1), (6 - 2 * i, 1))]
+CONCAVE = {
+    "L": [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)],
+    "comb": [(0, 0), (8, 0), *TEETH],
+    "star": [((1 + i % 2) * np.cos(0.5 * i), (1 + i % 2) * np.sin(0.5 * i)) for i in range(12)],
+}
+
+
+@pytest.mark.parametrize("count", [1, 10, 40])
+@pytest.mark.parametrize("name", CONCAVE)
+def test_the_cap_of_a_concave_flat_rim_does_not_leave_it(name: str, count: int) -> None:
+    rim = outline(CONCAVE[name], count)
+    inner, faces = cap(rim, np.arange(len(rim)), len(rim))
+    points = np.vstack([rim, inner])
+    twice = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+    area = np.cross(rim, np.roll(rim, -1, axis=0)).sum(axis=0)[2] / 2
+    assert np.linalg.norm(twice, axis=1).sum() / 2 == pytest.approx(area, rel=1e-9)
+    assert np.abs(twice.sum(axis=0) / 2) == pytest.approx([0, 0, area], rel=1e-9)
 
 
 def test_holes_are_closed_by_the_case_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

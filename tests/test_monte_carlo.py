@@ -14,7 +14,7 @@ import pytest
 
 from tetlux.fem import Medium
 from tetlux.fem.exact import monte_carlo
-from tetlux.fem.exact.monte_carlo import Estimate, Ledger
+from tetlux.fem.exact.monte_carlo import Ledger, SampleMean
 from tetlux.fem.exact.transfer import photons
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.meshing.errors import InputError
@@ -32,7 +32,7 @@ class Scene:
 
     medium: Medium
     radius: float
-    light: monte_carlo.Light
+    light: monte_carlo.LightKind
     photons: int
     bins: tuple[tuple[int, float, float], ...]
     specular: float
@@ -121,7 +121,7 @@ SCENES = {
 }
 
 
-def agree(found: Estimate, expected: float, error: float = 0.0) -> bool:
+def agree(found: SampleMean, expected: float, error: float = 0.0) -> bool:
     return abs(found.value - expected) <= SIGMAS * math.hypot(found.standard_error, error)
 
 
@@ -140,7 +140,7 @@ def test_scattering_has_the_mean_cosine_it_should(g: float) -> None:
     start = (0.6, -0.64, 0.48)
     cosines = np.empty(20_000)
     for i in range(len(cosines)):
-        cosine = photons.henyey_greenstein(rng, g)
+        cosine = photons.sample_henyey_greenstein(rng, g)
         way = photons.rotate(start, cosine, 2.0 * math.pi * rng.random())
         assert math.hypot(*way) == pytest.approx(1.0, abs=1e-12)
         cosines[i] = np.dot(start, way)
@@ -178,7 +178,7 @@ def test_two_monte_carlos_agree(name: str) -> None:
     squares = []
     for start, exitance, error in scene.bins:
         index = start // 10
-        found = Estimate(run.exitance[index], run.standard_error[index])
+        found = SampleMean(run.exitance[index], run.standard_error[index])
         assert agree(found, exitance, error), (start, found, exitance, error)
         squares.append((found.value - exitance) ** 2 / (found.standard_error**2 + error**2))
     # A common factor in all bins would hide below four standard errors of each.
@@ -363,4 +363,4 @@ def test_no_folder_for_the_machine_code_is_no_error(monkeypatch: pytest.MonkeyPa
         return decorate
 
     monkeypatch.setattr(numba, "njit", refuse)
-    assert photons.compiled(lambda: 3)() == 3
+    assert photons.compile_function(lambda: 3)() == 3

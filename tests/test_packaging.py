@@ -1,10 +1,12 @@
 """The package as it is installed."""
 
+import ast
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from graphlib import TopologicalSorter
 from importlib.metadata import version
 from pathlib import Path
@@ -133,6 +135,36 @@ def test_rooms_that_measure_lead_nowhere_back() -> None:
     assert not any(name.startswith(("tetlux.cases.stress", "tetlux.cases.compare")) for name in chart)
     solver = [path for path in (ROOT / "fem").rglob("*.py") if "exact" not in path.relative_to(ROOT).parts]
     assert not any(name.startswith("tetlux.fem.exact") for name in imports_of(*solver))
+
+
+def modules() -> list[Path]:
+    """Every module of the package, tests aside."""
+    return [path for top in ("meshing", "fem", "cases") for path in sorted((ROOT / top).rglob("*.py"))]
+
+
+def lines_of_body(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines between the docstring, or the signature, and the end of a function."""
+    first, *rest = function.body
+    is_docstring = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    before = first.end_lineno if is_docstring and rest else first.lineno - 1
+    assert function.end_lineno is not None
+    assert before is not None
+    return function.end_lineno - before
+
+
+def test_files_functions_and_folders_stay_small() -> None:
+    """At most 300 lines in a file, 45 in the body of a function, and 15 modules in a folder."""
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in modules()}
+    assert {name: size for name, text in texts.items() if (size := len(text.splitlines())) > 300} == {}
+    functions = {
+        f"{name}: {node.name}": lines_of_body(node)
+        for name, text in texts.items()
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+    assert {name: size for name, size in functions.items() if size > 45} == {}
+    folders = Counter(path.parent for path in modules() if path.name != "__init__.py")
+    assert {folder.relative_to(ROOT).as_posix(): count for folder, count in folders.items() if count > 15} == {}
 
 
 def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:

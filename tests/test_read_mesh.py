@@ -6,11 +6,12 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import InputError, TetMesh, read_mesh
-from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.files.meshes import write_mesh
 
 POINTS, TETRAHEDRA, PLACES = cube_of_cubes(2, 1.0)
@@ -260,15 +261,46 @@ def test_other_cells(tmp_path: Path) -> None:
         read_mesh(path)
 
 
-def test_curved_tetrahedra_are_taken_by_their_corners(tmp_path: Path) -> None:
+def second_order() -> tuple[FloatArray, IntArray]:
+    """The cube's nodes with the midpoints of edges, and its tetrahedra of ten nodes."""
     middles = [POINTS[TETRAHEDRA[:, [i, j]]].mean(axis=1) for i, j in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))]
     new = len(POINTS) + np.arange(6 * len(TETRAHEDRA)).reshape(6, -1).T
-    blocks = [("tetra10", np.hstack([TETRAHEDRA, new]))]
-    meshio.Mesh(np.vstack([POINTS, *middles]), blocks, cell_data={"region": [LABELS]}).write(tmp_path / "a.vtu")
+    return np.vstack([POINTS, *middles]), np.hstack([TETRAHEDRA, new])
+
+
+def rows(values: npt.NDArray[np.generic]) -> str:
+    return "".join(" ".join(map(str, row)) + "\n" for row in values.tolist())
+
+
+def test_curved_tetrahedra_are_taken_by_their_corners(tmp_path: Path) -> None:
+    points, cells = second_order()
+    meshio.Mesh(points, [("tetra10", cells)], cell_data={"region": [LABELS]}).write(tmp_path / "a.vtu")
     mesh = read_mesh(tmp_path / "a.vtu")
     assert halves(mesh)
     assert len(mesh.points) == len(POINTS)
     assert mesh.repairs == ("48 tetrahedra of higher order were taken by their corners, with straight edges.",)
+
+
+def test_second_order_tetrahedra_of_medit_and_su2(tmp_path: Path) -> None:
+    points, cells = second_order()
+    labels, beside = LABELS[:, None], np.zeros((len(points), 1), dtype=int)
+    medit = f"MeshVersionFormatted 2\nDimension 3\nVertices\n{len(points)}\n" + rows(np.hstack([points, beside]))
+    medit += f"TrianglesP2\n1\n1 2 4 5 6 7 1\nTetrahedraP2\n{len(cells)}\n" + rows(np.hstack([cells + 1, labels]))
+    path = tmp_path / "a.mesh"
+    path.write_text(medit + "End\n")
+    mesh = read_mesh(path)
+    assert halves(mesh)
+    assert mesh.warnings == ("48 tetrahedra of higher order were taken by their corners, with straight edges.",)
+    path.write_text(medit[:-60])
+    with pytest.raises(InputError, match=r"a\.mesh is not a readable MESH mesh"):
+        read_mesh(path)
+    numbers = np.arange(len(cells))[:, None]
+    su2 = f"NDIME= 3\nNELEM= {len(cells)}\n" + rows(np.hstack([np.full_like(numbers, 24), cells, numbers]))
+    su2 += f"NPOIN= {len(points)}\n" + rows(points) + "NMARK= 1\nMARKER_TAG= side\nMARKER_ELEMS= 1\n22 0 1 3 4 5 6\n"
+    (tmp_path / "a.su2").write_text(su2)
+    mesh = read_mesh(tmp_path / "a.su2")
+    assert mesh.volume == pytest.approx(8.0)
+    assert (len(mesh.tetrahedra), len(mesh.warnings)) == (48, 1)
 
 
 def test_paths_that_are_no_mesh(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

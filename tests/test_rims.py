@@ -50,6 +50,25 @@ def test_several_bores_and_a_rod_in_one_of_them() -> None:
     assert closed.volume == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_bores_anywhere_leave_flat_rings(seed: int) -> None:
+    """A plate with four bores of different size and shape: no cap overlaps itself, or a bore."""
+    random = np.random.default_rng(seed)
+    parts, area = [wall(20.0, 5 + 20 * seed, 6.0)], disc(20.0, 5 + 20 * seed)
+    for quadrant in range(4):
+        radius, count = random.uniform(1.0, 4.0), int(random.integers(3, 16))
+        place = np.array([5.5 * (-1) ** quadrant, 5.5 * (-1) ** (quadrant // 2), 0.0])
+        points, faces = wall(radius, count, 6.0)
+        parts.append((points + place + [*random.uniform(-0.5, 0.5, 2), 0.0], faces))
+        area -= disc(radius, count)
+    closed = surface_from_arrays(*join_arrays(*parts), holes="close")
+    ends = np.abs(closed.normals[:, 2]) > 0.5
+    corners = closed.points[closed.faces[ends]]
+    caps = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    assert caps.sum() == pytest.approx(2.0 * area, rel=1e-9)
+    assert closed.volume == pytest.approx(6.0 * area, rel=1e-9)
+
+
 @pytest.mark.parametrize(("top", "height"), [(9.0, 1.0), (5.0, 1.0), (9.0, 0.2)])
 def test_a_shallow_funnel_gets_two_discs(top: float, height: float) -> None:
     closed = surface_from_arrays(*wall(10.0, 60, height, top), holes="close")

@@ -103,6 +103,7 @@ def test_bad_tetrahedra_and_hard_shapes_are_among_them() -> None:
     assert {DEFAULT.name, NOT_REFINED.name, CONSISTENT.name, NOTHING.name} <= variants
 
 
+@pytest.mark.slow
 def test_every_panel_makes_its_scenes() -> None:
     """The first of each; those that are refused are refused when they are solved."""
     for one in PANELS:
@@ -159,7 +160,7 @@ def test_residuals_are_those_of_the_solution(monkeypatch: pytest.MonkeyPatch) ->
 
         return solve_once
 
-    for module in ("operators.assembly", "system"):
+    for module in ("operators.assembly", "operators.operator"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", lambda matrix, *_: linear.Solver(matrix, [sloppy]))
     monkeypatch.setattr(linear, "REFUSED", 1e-3)
     diagnostics = measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT)
@@ -181,7 +182,7 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     def iterate(matrix: Any, *_: Any) -> linear.Solver:
         return linear.Solver(matrix, [krylov.jacobi])
 
-    for module in ("operators.assembly", "system"):
+    for module in ("operators.assembly", "operators.operator"):
         monkeypatch.setattr(f"tetlux.fem.{module}.solver_for", iterate)
     assert 5 < measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
 
@@ -271,6 +272,7 @@ def test_a_map_is_written_whole(tmp_path: Path, capsys: pytest.CaptureFixture[st
         picture.load()
 
 
+@pytest.mark.slow
 def test_violations_crashes_and_hangs_fail_the_command_and_end_nothing_else(tmp_path: Path) -> None:
     grid = [
         panel(ctypes.string_at, 1, 8, name="segfault"),

@@ -71,6 +71,7 @@ def test_readers_agree_with_a_second_one(suffix: str, tmp_path: Path) -> None:
         pytest.param(CUBE + QUADS.replace(b"f 1 2 4 3\n", b"f 1 2 4\nf 1 4 3\n"), id="triangles and quads"),
         pytest.param(CUBE + QUADS + b"f 1 2\nf 3\n", id="edges"),
         pytest.param(CUBE.replace(b"2", b"2.0e0") + QUADS, id="exponents"),
+        pytest.param((CUBE + QUADS).upper() + b"VT 0 0\nVN 0 0 1\n", id="capitals"),
     ],
 )
 def test_obj_in_every_spelling(data: bytes) -> None:
@@ -141,9 +142,28 @@ def test_stl_in_every_spelling(data: bytes) -> None:
     assert volume(read_stl(data)) == pytest.approx(BALL.volume, rel=1e-6)
 
 
-def test_stl_that_claims_nothing_says_so() -> None:
-    with pytest.raises(InputError, match="claims no triangles and holds 16,000 bytes of them"):
-        read_stl(binary_stl(claimed=0))
+@pytest.mark.parametrize("claimed", [0, 1, 100, 319])
+def test_stl_that_claims_too_few_triangles_is_read_whole(claimed: int) -> None:
+    assert volume(read_stl(binary_stl(claimed=claimed))) == pytest.approx(BALL.volume, rel=1e-6)
+
+
+@pytest.mark.parametrize("extra", [b"x" * 50, b"\0" * 100, b"\0\0\x80\x3f" * 25, np.full(25, np.nan, "<f4").tobytes()])
+def test_stl_records_that_are_no_triangles_are_ignored(extra: bytes) -> None:
+    assert len(read_stl(binary_stl(extra))[1]) == len(BALL.faces)
+    with pytest.raises(InputError, match="claims no triangles and holds 100 bytes of something else"):
+        read_stl(b"\0" * 84 + b"x" * 100)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("suffix", ["obj", "stl", "ply", "off"])
+def test_text_in_utf_16_is_read(suffix: str, encoding: str, tmp_path: Path) -> None:
+    kind, options = ("stl_ascii", {}) if suffix == "stl" else (suffix, {"encoding": "ascii"} if suffix == "ply" else {})
+    data = trimesh.Trimesh(BALL.points, BALL.faces, process=False).export(file_type=kind, **options)
+    assert isinstance(data, str | bytes)
+    text = data.decode() if isinstance(data, bytes) else data
+    path = tmp_path / f"ball.{suffix}"
+    path.write_bytes(text.encode(encoding))
+    assert read_surface(path).volume == pytest.approx(BALL.volume, rel=1e-4)
 
 
 def test_3mf_in_another_unit_says_so(tmp_path: Path) -> None:

@@ -140,6 +140,7 @@ def test_far_from_the_light_absorption_counts(ball: Surface, ball_mesh: TetMesh)
         assert validity_of(ball_mesh, medium, source, lamp, surface=ball).at(poles)[1] == pytest.approx(near)
 
 
+@pytest.mark.slow
 def test_thickness_of_simple_bodies(ball_mesh: TetMesh) -> None:
     # Facets of the ball lie up to 0.2 inside of it.
     assert thickness(ball_mesh) == pytest.approx(20.0, rel=0.03)

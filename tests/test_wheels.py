@@ -52,6 +52,7 @@ def figures() -> dict[str, Any]:
     }
 
 
+@pytest.mark.slow
 @needs("embreex", "pyamg")
 def test_a_given_mesh_is_solved_without_them() -> None:
     hide = "import sys; sys.modules.update(dict.fromkeys(['embreex', 'pyamg', 'pytetwild']))"

@@ -59,9 +59,12 @@ class Case:
         The names of all lights, in the order of the case file.
     regions : tuple of Region
         Each with a medium for each channel; the name of its surface is that of the region.
-    tolerance : float
+    tolerance : float, optional
+        Of the exitance.
     outputs : tuple of str
     detectors : tuple of NamedDetector
+    detector_tolerance : float, optional
+        Of what the detectors read.
     camera : (3,) floats, optional
         Where the picture is taken from and radiance is computed, unit.
     up : (3,) floats
@@ -86,11 +89,12 @@ class Case:
     channels: tuple[Channel, ...]
     light_names: tuple[str, ...]
     regions: tuple[Region, ...]
-    tolerance: float
+    tolerance: float | None
     outputs: tuple[str, ...]
     spec: CaseSpec
     sweep_values: Mapping[str, float | str]
     detectors: tuple[NamedDetector, ...] = ()
+    detector_tolerance: float | None = None
     camera: Vector | None = None
     up: Vector = UPRIGHT
     toward: FloatArray | None = None

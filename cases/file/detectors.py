@@ -1,16 +1,23 @@
 """Detectors of a case: built from the case file, read, and written as ``detectors.csv``."""
 
 import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.schema.lights import DetectorSpec
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read, read_all
 from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
 from tetlux.meshing.surface.surface import Surface
+
+# Columns of errors of a reading, relative.
+ERRORS = ("relative_error", "model_error")
+# Readings that are printed at the end of a run.
+MOST_LINES = 20
 
 
 @dataclass(frozen=True)
@@ -57,13 +64,15 @@ def read_detectors(
     Returns
     -------
     list of dict
-        A row for each detector and solution: ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²)
-        and ``power`` (W; None for a point).
+        A row for each detector and solution: ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²),
+        ``power`` (W; None for a point), ``relative_error`` and ``model_error`` (None where they are not known).
     """
     rows = []
-    for entry in detectors:
-        for channel, light, solution in solutions:
-            reading = read(entry.detector, solution)
+    plain = [entry.detector for entry in detectors]
+    by_solution = [read_all(plain, solution) for _, _, solution in solutions]
+    for number, entry in enumerate(detectors):
+        for (channel, light, _), readings in zip(solutions, by_solution, strict=True):
+            reading = readings[number]
             rows.append(
                 {
                     "name": entry.name,
@@ -73,9 +82,31 @@ def read_detectors(
                     "position": list(reading.position),
                     "exitance": reading.exitance,
                     "power": reading.power,
+                    "relative_error": _finite(reading.relative_error),
+                    "model_error": _finite(reading.model_error),
                 }
             )
     return rows
+
+
+def _finite(value: float | None) -> float | None:
+    return value if value is not None and math.isfinite(value) else None
+
+
+def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
+    """Lines on what is read of all lights together, for the terminal."""
+    whole = [row for row in rows if row["light"] == ALL]
+    several = len({row["channel"] for row in whole}) > 1
+    lines = []
+    for row in whole[:MOST_LINES]:
+        value, what = (row["exitance"], f"W/{unit}²") if row["power"] is None else (row["power"], "W")
+        name = f"{row['name']}, {row['channel']}" if several else row["name"]
+        error = "" if row["relative_error"] is None else f" ± {row['relative_error']:.2g} of it"
+        model = "" if row["model_error"] is None else f" (diffusion itself: ± {row['model_error']:.2g})"
+        lines.append(f"{name}: {value:.5g} {what}{error}{model}")
+    if len(whole) > MOST_LINES:
+        lines.append(f"and {len(whole) - MOST_LINES} more readings")
+    return lines
 
 
 def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> None:
@@ -83,9 +114,10 @@ def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> Non
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         axes = [f"{axis} [{unit}]" for axis in "xyz"]
-        writer.writerow(["name", "kind", "channel", "light", *axes, f"exitance [W/{unit}²]", "power [W]"])
+        writer.writerow(["name", "kind", "channel", "light", *axes, f"exitance [W/{unit}²]", "power [W]", *ERRORS])
         for row in rows:
             power = "" if row["power"] is None else repr(row["power"])
             names = [row[key] for key in ("name", "kind", "channel", "light")]
             places = [f"{value:.9g}" for value in row["position"]]
-            writer.writerow([*names, *places, row["exitance"], power])
+            errors = ["" if row[key] is None else f"{row[key]:.3g}" for key in ERRORS]
+            writer.writerow([*names, *places, row["exitance"], power, *errors])

@@ -66,7 +66,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh"):
+    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance"):
         return f"{text}."
     if key[:1] == ("sweep",) and kind == "float_type":
         text = "expected a number or a word"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.cases.picture.view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
@@ -190,9 +190,9 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
 def _arrow(tail: FloatArray, tip: FloatArray, radius: float, sides: int = 24) -> tuple[FloatArray, FloatArray]:
     """Corners and normals (k, 3, 3) of an arrow with a shaft and a head that ends at `tip`."""
     axis = unit(tip - tail)
-    across = unit(np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))]))
+    across, up = perpendicular_axes(axis)
     angle = np.linspace(0.0, 2.0 * np.pi, sides + 1)
-    spoke = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * np.cross(axis, across)
+    spoke = np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up
     neck, head = tip - 7.0 * radius * axis, 2.6 * radius
     rings = [tail, tail + radius * spoke, neck + radius * spoke, neck + head * spoke, tip]
     slant = unit(spoke + head / (7.0 * radius) * axis)

@@ -59,6 +59,7 @@ def summarize(
         "unit": case.surface.unit,
         "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
+        **({"detector_tolerance": case.detector_tolerance} if case.detector_tolerance else {}),
         "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,

@@ -1,6 +1,7 @@
 """Strengths of charges by least squares on what they violate at the surface."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -47,7 +48,8 @@ class Factors:
     def _project(self, right: NumberArray) -> NumberArray:
         """The conjugate transpose of Q1 times right sides (m, s), (k, s)."""
         values = np.asarray(right, dtype=np.result_type(self.reflectors, right), order="F")
-        multiply = scipy.linalg.get_lapack_funcs("ormqr", (self.reflectors, values))
+        functions: Any = scipy.linalg.get_lapack_funcs(("ormqr",), (self.reflectors, values))
+        multiply = functions[0]
         way = "C" if np.iscomplexobj(self.reflectors) else "T"
         lengths = multiply("L", way, self.reflectors, self.factors, values, -1)[1]
         product = multiply("L", way, self.reflectors, self.factors, values, int(lengths[0].real))[0]

@@ -131,7 +131,7 @@ def _dual_loads(
 ) -> FloatArray:
     """Loads of the two duals (n, 2): of the exitance, by its L2 norm, and of all that leaves, by its integral."""
     loads = np.zeros((len(mesh.points), 2))
-    robin, areas = coefficients.escape, mesh.boundary_node_areas
+    robin, areas = coefficients.robin, mesh.boundary_node_areas
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     return loads
@@ -168,5 +168,5 @@ def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatAr
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     corners = (mesh.tetrahedra[cells][:, None, :] == faces[:, :, None]).argmax(axis=2)
     on_faces = lumping_error(np.take_along_axis(smooth[cells], corners, axis=1), dual[faces])
-    weights = coefficients.escape * mesh.boundary_areas * on_faces
+    weights = coefficients.robin * mesh.boundary_areas * on_faces
     return np.asarray(np.bincount(cells, weights, minlength=len(mesh.tetrahedra)), dtype=np.float64)

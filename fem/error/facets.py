@@ -59,7 +59,7 @@ def boundary_facets(
     product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
     outflow = np.abs(leaving[faces].mean(axis=1) * dual[faces].mean(axis=1))
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
-    extrapolation = diffusion / coefficients.escape
+    extrapolation = diffusion / coefficients.robin
     scale = at_cells(absorption_scale, cells)
     along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma_a * product
     corners = mesh.points[faces]

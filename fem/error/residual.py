@@ -91,7 +91,7 @@ def ripple(mesh: TetMesh, coefficients: Coefficients, load: FloatArray, size: fl
     density = (np.abs(load) / mesh.node_volumes)[mesh.tetrahedra[cells]].min(axis=1)
     # The edge of a regular tetrahedron of this volume, squared.
     square = (6.0 * np.sqrt(2.0) * mesh.volumes[cells]) ** (2.0 / 3.0)
-    height = RIPPLE * square * density * coefficients.escape / at_cells(coefficients.diffusion, cells)
+    height = RIPPLE * square * density * coefficients.robin / at_cells(coefficients.diffusion, cells)
     shares = np.bincount(cells, mesh.boundary_areas * height**2, minlength=len(mesh.tetrahedra))
     total = float(np.sqrt(shares.sum()))
     return np.asarray(shares / (total * size if total > 0 else 1.0), dtype=np.float64)

@@ -1,11 +1,12 @@
-"""The tolerance of the exitance: its range, and which tetrahedra to split to meet it."""
+"""Tolerances of the exitance and of readings: their range, and which tetrahedra to split to meet them."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
-from tetlux.meshing.arrays import BoolArray
+from tetlux.fem.quadratic.error import ReadingError
+from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 
 # Splitting tetrahedra removes the share GAIN of their error. Split those that hold enough of it to reach the aim, but
@@ -17,7 +18,13 @@ SAFETY, POWER_SAFETY = 0.65, 0.4
 WORTH_A_MESH = 1.05
 
 
-def check_tolerance(tolerance: float) -> None:
+# The aim of refinement for readings, as a share of the tolerance, leaves room for errors of more than the bar. There
+# errors add up by their squares: splitting a tetrahedron leaves this share of its square. It is split this often at
+# most before the next solution.
+READING_SAFETY, LEFT, MOST_SPLITS = 0.55, 0.15, 3
+
+
+def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
     """Refuse a tolerance that is no sensible relative error.
 
     Raises
@@ -25,7 +32,7 @@ def check_tolerance(tolerance: float) -> None:
     InputError
     """
     if not 1e-4 <= tolerance < 1:
-        raise InputError(f"tolerance is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
+        raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
 def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray:
@@ -45,3 +52,23 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray
         reached = np.cumsum(shares[order])
         marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
     return marked
+
+
+def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
+    """How often to split each of so many tetrahedra, (m,), to bring every reading to its aim.
+
+    Tetrahedra are split until none adds more than a level to the square of the error, at which these sum to the aim.
+    """
+    splits = np.zeros(cells, dtype=np.int64)
+    for reading in readings:
+        aim = READING_SAFETY * tolerance * abs(reading.value)
+        if not reading.error > WORTH_A_MESH * aim:
+            continue
+        ascending = np.sort(reading.squares)
+        # What all sum to if the level is the square of each tetrahedron in turn.
+        sums = np.cumsum(ascending) + ascending * np.arange(cells - 1, -1, -1)
+        level = ascending[max(int(np.searchsorted(sums, aim**2)) - 1, 0)]
+        level = max(float(level), aim**2 / cells)
+        over = np.maximum(reading.squares / level, 1.0)
+        splits = np.maximum(splits, np.ceil(np.log(over) / np.log(1.0 / LEFT)).astype(np.int64))
+    return np.minimum(splits, MOST_SPLITS)

@@ -1,7 +1,7 @@
-"""Closed forms to check the solver against, one module for each body; `registry` looks them up by shape and light.
+"""Closed forms to verify the solver, one module for each body; `registry` looks them up by shape and light.
 
-Every function takes a `Medium` and returns the result for unit power, or unit irradiance. Exitance is
-``M = phi/(2A)``, W/unit², unless the function says otherwise.
+Each function takes a `Medium` and returns the result for unit power or unit irradiance. Exitance is ``M = phi/(2A)``,
+W/unit², unless the function says otherwise.
 """
 
 from tetlux.fem.exact import (

@@ -194,7 +194,7 @@ def point_exitance(
     count = int(reach(k, a, t) / step) + 2
     if order * count > POINT_TERMS:
         raise InputError(
-            f"the sum for source_radius {source_radius:g} and z up to {np.max(np.abs(heights)):g} is too long; use "
+            f"source_radius {source_radius:g} with z up to {np.max(np.abs(heights)):g} needs too long a sum; use "
             "half_space for a source close below the surface, or a smaller z."
         )
     waves = np.cos(np.outer(angles, np.arange(order + 1))) * multiplicity(order)

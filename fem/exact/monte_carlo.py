@@ -1,13 +1,12 @@
-"""Radiative transfer by Monte Carlo in a ball and in a slab: what diffusion approximates.
+"""Monte Carlo solutions of the radiative transfer equation, which diffusion approximates, in a ball and in a slab.
 
-Packets of light scatter by Henyey and Greenstein's phase function and obey Fresnel's and Snell's laws at every
-crossing of the surface, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). A share of a packet is
-absorbed at each collision; faint packets play Russian roulette. Needs numba:
-``pip install "tetlux[montecarlo]"``.
+Photon packets scatter by the Henyey-Greenstein phase function, and reflect and refract at the surface by Fresnel's and
+Snell's laws, from outside and from inside (Wang, Jacques and Zheng 1995, MCML). A share of a packet is absorbed at each
+collision; packets of low weight are ended by Russian roulette. It needs numba: ``pip install "tetlux[montecarlo]"``.
 
-A medium given by sigma_s' alone scatters isotropically. Every run is made of `BATCHES` independent ones with
-random numbers of their own, so that a seed gives the same result on any number of cores; standard errors are
-those of the mean of the batches.
+If only sigma_s' is given, a medium scatters isotropically. A run consists of `BATCHES` independent batches, each with
+its own random numbers, so that a seed gives the same result on any number of cores. Standard errors are those of the
+mean over the batches.
 """
 
 import math
@@ -17,50 +16,51 @@ import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.exact import checks
-from tetlux.fem.exact.transfer.batches import BATCHES, Batches, Estimate, Light, estimate, mean_and_error
+from tetlux.fem.exact.transfer.batches import BATCHES, Batches, LightKind, SampleMean, estimate, mean_and_error
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-__all__ = ["BATCHES", "Estimate", "Ledger", "Light", "SlabResult", "SphereResult", "slab", "sphere"]
+__all__ = ["BATCHES", "Ledger", "LightKind", "SampleMean", "SlabResult", "SphereResult", "slab", "sphere"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ledger:
-    """Where the light went, in shares of what came in: the four add up to 1 but for rounding.
+    """The power balance: four shares of the incident power, which sum to 1 up to rounding.
 
     Attributes
     ----------
     photons : int
-        Packets that were followed.
-    specular : Estimate
-        Reflected where it first met the surface.
-    absorbed : Estimate
-    exited : Estimate
-        Left after at least one scattering; of a point source, all that left.
-    ballistic : Estimate
-        Left without having been scattered, through whichever face, after any reflections inside.
+        Number of packets.
+    specular : SampleMean
+        Share reflected at the first incidence on the surface.
+    absorbed : SampleMean
+        Share absorbed.
+    exited : SampleMean
+        Share that leaves after at least one scattering event; for a point source, all that leaves.
+    ballistic : SampleMean
+        Share that leaves unscattered, through any face and after any internal reflections.
     """
 
     photons: int
-    specular: Estimate
-    absorbed: Estimate
-    exited: Estimate
-    ballistic: Estimate
+    specular: SampleMean
+    absorbed: SampleMean
+    exited: SampleMean
+    ballistic: SampleMean
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SphereResult(Ledger):
-    """What left a ball, by the polar angle from the pole.
+    """The power balance and the exitance of a ball, in bins of the polar angle.
 
     Attributes
     ----------
     edges : (b + 1,) ndarray
-        Angles between the bins, radians.
+        Polar angles that bound the bins, radians.
     exitance : (b,) ndarray
-        Mean over each bin, W/unit² for 1 W, or for 1 W/unit² of a wide beam; without the ballistic light.
+        Mean over each bin, W/unit² for 1 W, or for 1 W/unit² of a wide beam, without ballistic light.
     standard_error : (b,) ndarray
-        Of `exitance`, the same unit.
+        Standard error of `exitance`, W/unit².
     """
 
     edges: FloatArray
@@ -70,22 +70,22 @@ class SphereResult(Ledger):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SlabResult(Ledger):
-    """What left a slab through either face, by distance from the axis of the light.
+    """The power balance and the exitance of both faces of a slab, in rings around the axis of the light.
 
     Attributes
     ----------
-    reflectance, transmittance : Estimate
-        Parts of `exited` through the front z = 0 and the back z = L, without specular and ballistic light.
+    reflectance, transmittance : SampleMean
+        The parts of `exited` through the front z = 0 and the back z = L, without specular and ballistic light.
     edges : (b + 1,) ndarray
-        Radii between the rings, unit; for a wide beam the one ring is the whole face.
+        Radii that bound the rings, unit; for a wide beam one ring, the whole face.
     front, back : (b,) ndarray
-        Exitance, mean over each ring, W/unit² for 1 W, or for 1 W/unit² of a wide beam.
+        Mean exitance over each ring, W/unit² for 1 W, or for 1 W/unit² of a wide beam.
     front_error, back_error : (b,) ndarray
-        Their standard errors.
+        Standard errors of `front` and `back`, W/unit².
     """
 
-    reflectance: Estimate
-    transmittance: Estimate
+    reflectance: SampleMean
+    transmittance: SampleMean
     edges: FloatArray
     front: FloatArray
     back: FloatArray
@@ -97,13 +97,13 @@ def sphere(
     medium: Medium,
     *,
     radius: float,
-    light: Light,
+    light: LightKind,
     depth: float | None = None,
     edges: npt.ArrayLike | None = None,
     photons: int = 200_000,
     seed: int = 0,
 ) -> SphereResult:
-    """Give the exitance of a ball by radiative transfer.
+    """Exitance of a ball by radiative transfer.
 
     Parameters
     ----------
@@ -112,16 +112,16 @@ def sphere(
     radius : float
         Radius of the ball, unit.
     light : {"pencil", "beam", "point"}
-        A beam without width that enters at the pole at right angles; a beam along -z, of even irradiance, that
-        covers the ball and refracts on it; an isotropic point of 1 W below the pole.
+        A beam of no width that enters at the pole along the normal; a uniform beam along -z that covers the ball and
+        is refracted at its surface; an isotropic point source of 1 W below the pole.
     depth : float, optional
-        Of the point below the pole, unit; for ``light="point"`` alone, which needs it.
+        Depth of the point source below the pole, unit; required for ``light="point"``, not allowed otherwise.
     edges : (b + 1,) array_like, optional
-        Ascending polar angles from 0 to pi that bound the bins, radians; every 10 degrees if left out.
+        Ascending polar angles from 0 to pi that bound the bins, radians; every 10 degrees if not given.
     photons : int
-        Packets to follow, rounded up to a multiple of `BATCHES`.
+        Number of packets, rounded up to a multiple of `BATCHES`.
     seed : int
-        Of the random numbers, 0 or more.
+        Seed of the random numbers, 0 or more.
 
     Returns
     -------
@@ -130,14 +130,14 @@ def sphere(
     Raises
     ------
     InputError
-        If the radius is not positive, the point not inside, the bins or `photons` make no sense, or numba is
-        not installed.
+        If the radius is not positive, the point source is not inside, an argument is out of range, or numba is not
+        installed.
     """
     a = checks.positive_number("radius", radius)
-    bounds = _edges(np.linspace(0.0, math.pi, 19) if edges is None else edges, high=math.pi)
-    depth_of_point = _depth(light, depth, 2.0 * a, "ball")
+    bounds = _check_edges(np.linspace(0.0, math.pi, 19) if edges is None else edges, high=math.pi)
+    depth_of_point = _check_depth(light, depth, 2.0 * a, "ball")
     shares = Batches(medium, True, a, light, depth_of_point, bounds, photons, seed).run()
-    # A wide beam of unit irradiance brings pi a².
+    # The incident power of a wide beam of unit irradiance is pi a².
     incident = math.pi * a**2 if light == "beam" else 1.0
     area = 2.0 * math.pi * a**2 * -np.diff(np.cos(bounds))
     mean, error = mean_and_error(incident * shares.front[:, :-1] / area)
@@ -148,15 +148,15 @@ def slab(
     medium: Medium,
     *,
     thickness: float,
-    light: Light,
+    light: LightKind,
     depth: float | None = None,
     edges: npt.ArrayLike | None = None,
     photons: int = 200_000,
     seed: int = 0,
 ) -> SlabResult:
-    """Give the reflectance and transmittance of an infinite slab 0 <= z <= L by radiative transfer.
+    """Reflectance, transmittance and exitance of an infinite slab 0 <= z <= L by radiative transfer.
 
-    A half-space is a slab so thick that nothing comes through.
+    A slab so thick that no light crosses it is a half-space.
 
     Parameters
     ----------
@@ -165,15 +165,17 @@ def slab(
     thickness : float
         L, unit.
     light : {"pencil", "beam", "point"}
-        A beam without width that enters at the origin along z; a beam along z that covers the front evenly; an
-        isotropic point of 1 W on the z axis.
+        A beam of no width that enters at the origin along z; a uniform beam along z on the whole front; an isotropic
+        point source of 1 W on the z axis.
     depth : float, optional
-        Of the point, unit; for ``light="point"`` alone, which needs it.
+        Depth of the point source, unit; required for ``light="point"``, not allowed otherwise.
     edges : (b + 1,) array_like, optional
-        Ascending radii that bound the rings, unit; ten rings of one mean free path ``1/sigma_t'`` if left
-        out. A wide beam has none.
-    photons, seed
-        As in `sphere`.
+        Ascending radii that bound the rings, unit; ten rings of one mean free path ``1/sigma_t'`` if not given. Not
+        allowed for a wide beam.
+    photons : int
+        Number of packets, rounded up to a multiple of `BATCHES`.
+    seed : int
+        Seed of the random numbers, 0 or more.
 
     Returns
     -------
@@ -182,18 +184,18 @@ def slab(
     Raises
     ------
     InputError
-        If the thickness is not positive, the point not inside, the rings or `photons` make no sense, or numba
-        is not installed.
+        If the thickness is not positive, the point source is not inside, an argument is out of range, or numba is not
+        installed.
     """
     length = checks.positive_number("thickness", thickness)
     if light == "beam":
         if edges is not None:
-            raise InputError("edges are given with a wide beam, which lights a slab evenly; leave them out.")
+            raise InputError("edges are given with a wide beam, whose exitance is uniform; leave them out.")
         bounds, area = np.array([0.0, math.inf]), np.ones(1)
     else:
-        bounds = _edges(np.arange(11) * medium.mean_free_path if edges is None else edges, high=math.inf)
+        bounds = _check_edges(np.arange(11) * medium.mean_free_path if edges is None else edges, high=math.inf)
         area = math.pi * np.diff(bounds**2)
-    depth_of_point = _depth(light, depth, length, "slab")
+    depth_of_point = _check_depth(light, depth, length, "slab")
     shares = Batches(medium, False, length, light, depth_of_point, bounds, photons, seed).run()
     front, front_error = mean_and_error(shares.front[:, :-1] / area)
     back, back_error = mean_and_error(shares.back[:, :-1] / area)
@@ -209,7 +211,7 @@ def slab(
     )
 
 
-def _depth(light: Light, depth: float | None, high: float, body: str) -> float:
+def _check_depth(light: LightKind, depth: float | None, high: float, body: str) -> float:
     if light not in ("pencil", "beam", "point"):
         raise InputError(f'light is "{light}"; it is "pencil", "beam" or "point".')
     if (light == "point") != (depth is not None):
@@ -217,7 +219,7 @@ def _depth(light: Light, depth: float | None, high: float, body: str) -> float:
     return 0.0 if depth is None else checks.number_within("depth", depth, 0.0, high, body)
 
 
-def _edges(values: npt.ArrayLike, high: float) -> FloatArray:
+def _check_edges(values: npt.ArrayLike, high: float) -> FloatArray:
     array = checks.numbers("edges", values, low=0.0, high=high)
     if array.ndim != 1 or array.size < 2 or np.any(np.diff(array) <= 0):
         raise InputError("edges do not ascend; give at least two numbers, each greater than the one before.")

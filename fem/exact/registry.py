@@ -1,7 +1,7 @@
 """Closed forms of the exitance, looked up by the shape of a body, its medium, and the light in it.
 
-To add one: write a function that takes the shape, the medium and the sources, and enter it in `FACTORIES`. Whoever
-compares with closed forms (`compare:` in a case file, ``tetlux chart``, ``tetlux stress``) then finds it here.
+To add one, write a function of the shape, the medium and the sources, and enter it in `FACTORIES`. `compare:` in a case
+file, ``tetlux chart`` and ``tetlux stress`` look closed forms up here.
 """
 
 import math
@@ -17,13 +17,13 @@ from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere
 
-# A closed form of an infinite body holds this many decay lengths of its slowest mode away from the ends of a finite
-# one: what the end changes has faded by exp(-4) on the way there and back.
+# The closed form of an infinite body holds in a finite one at points farther from the ends than this many decay lengths
+# of the slowest mode: the influence of an end falls by exp(-4) on the way there and back.
 DECAY_LENGTHS = 2.0
-# First zero of J_0: the slowest mode across a cylinder.
+# First zero of J_0, which gives the slowest mode of a cylinder.
 FIRST_ZERO = 2.405
 
-Field = Callable[[FloatArray], FloatArray]
+SurfaceField = Callable[[FloatArray], FloatArray]
 Mask = Callable[[FloatArray], BoolArray]
 
 
@@ -37,30 +37,30 @@ class ClosedForm:
     exitance : callable
         Exitance (n,) at points (n, 3) of the surface, W/unit².
     holds_at : callable
-        Whether the closed form holds there, (n,): far enough from the ends of a body that it takes for infinite.
+        Whether the closed form holds at points (n, 3), (n,): far from the ends of a body that it takes for infinite.
     same_model : bool
-        Whether it solves the equation and the boundary condition that the solver has, so that a difference between
-        the two is discretisation.
+        Whether it solves the solver's equation with the solver's boundary condition, so that their difference is the
+        discretisation error.
     """
 
     name: str
-    exitance: Field
+    exitance: SurfaceField
     holds_at: Mask
     same_model: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class IdealSources:
-    """Sources that closed forms are known for.
+    """Sources for which closed forms are known.
 
     Attributes
     ----------
     positions, powers : (p, 3), (p,) ndarray
-        Isotropic points, unit, and their powers, W.
+        Isotropic point sources, unit, and their powers, W.
     transmitted_irradiance : float
-        Uniform diffuse light that passes into the body, W/unit².
+        Uniform diffuse light that enters the body, W/unit².
     emission : float
-        Emitted throughout the volume, W/unit³.
+        Uniform emission of the volume, W/unit³.
     """
 
     positions: FloatArray
@@ -70,11 +70,11 @@ class IdealSources:
 
     @property
     def are_points(self) -> bool:
-        """Whether there are points and nothing else."""
+        """Whether all sources are points."""
         return len(self.powers) > 0 and self.transmitted_irradiance == 0 and self.emission == 0
 
     def sum_of_points(self, exitance: Callable[[FloatArray], FloatArray], count: int) -> FloatArray:
-        """Add up what each point gives at `count` places, by the exitance (n,) for unit power at a position (3,)."""
+        """Sum the exitance (n,) of all points, given the function from a position (3,) to that of unit power."""
         total = np.zeros(count)
         for position, power in zip(self.positions, self.powers, strict=True):
             total += power * exitance(position)
@@ -105,20 +105,20 @@ def closed_forms(shape: Shape | None, medium: Medium, deposits: Sequence[Deposit
     shape : Sphere, Slab, Cylinder or another, optional
         ``surface.shape`` of the body.
     medium : Medium
-        Of the whole body.
+        The medium of the whole body.
     deposits : sequence of Deposit
-        What all lights leave in it.
+        The deposits of all lights.
 
     Returns
     -------
     dict of str to ClosedForm
-        Those of the solver's own model first; empty if none is known.
+        Closed forms of the solver's model first; empty if none is known.
 
     Raises
     ------
     InputError
-        If there are some, but a source lies too near to the surface for a series, or to the end of a body that the
-        closed form takes for infinite.
+        If a source is too close to the surface for a series, or to the end of a body that the closed form takes for
+        infinite.
 
     Examples
     --------
@@ -145,7 +145,7 @@ def polar_angle(points: FloatArray, pole: FloatArray, center: FloatArray) -> Flo
     """Angle (n,) at the centre between points (n, 3) and a pole (3,), radians, accurate near 0 and pi too."""
     axis = pole - center
     length = float(np.linalg.norm(axis))
-    # A pole in the centre has no direction; whatever is measured from it is the same everywhere.
+    # A source at the centre has no direction, and any direction will do.
     axis = axis / length if length > 0 else np.array([0.0, 0.0, 1.0])
     directions = points - center
     directions = directions / np.linalg.norm(directions, axis=1)[:, None]
@@ -163,13 +163,13 @@ def _in_sphere(shape: Sphere, medium: Medium, sources: IdealSources) -> list[Clo
 
     def series(points: FloatArray) -> FloatArray:
         def of_unit_power(position: FloatArray) -> FloatArray:
-            away, gamma = float(np.linalg.norm(position - center)), polar_angle(points, position, center)
-            return sphere.point_exitance(medium, radius=radius, source_radius=away, gamma=gamma)
+            distance, gamma = float(np.linalg.norm(position - center)), polar_angle(points, position, center)
+            return sphere.point_exitance(medium, radius=radius, source_radius=distance, gamma=gamma)
 
         return sources.sum_of_points(of_unit_power, len(points)) + uniform
 
     form = ClosedForm("series", series, lambda points: np.ones(len(points), dtype=bool))
-    return _tried([form], center + np.array([radius, 0.0, 0.0]))
+    return _check_forms([form], center + np.array([radius, 0.0, 0.0]))
 
 
 def _in_slab(shape: Slab, medium: Medium, sources: IdealSources) -> list[ClosedForm]:
@@ -185,7 +185,7 @@ def _in_slab(shape: Slab, medium: Medium, sources: IdealSources) -> list[ClosedF
     def on_top(points: FloatArray) -> BoolArray:
         return np.asarray(points[:, 2] > -1e-9 * shape.width)
 
-    def on_both_faces(exitance: Callable[..., FloatArray]) -> Field:
+    def on_both_faces(exitance: Callable[..., FloatArray]) -> SurfaceField:
         def at(points: FloatArray) -> FloatArray:
             top = points[:, 2] > -0.5 * shape.depth
 
@@ -212,7 +212,7 @@ def _in_slab(shape: Slab, medium: Medium, sources: IdealSources) -> list[ClosedF
         ClosedForm("images", on_both_faces(slab.extrapolated_flux), away_from_rim, same_model=False),
         ClosedForm("dipole", of_dipole, lambda points: away_from_rim(points) & on_top(points), same_model=False),
     ]
-    return _tried(forms, np.zeros(3))
+    return _check_forms(forms, np.zeros(3))
 
 
 def _in_cylinder(shape: Cylinder, medium: Medium, sources: IdealSources) -> list[ClosedForm]:
@@ -228,8 +228,8 @@ def _in_cylinder(shape: Cylinder, medium: Medium, sources: IdealSources) -> list
         def of_unit_power(position: FloatArray) -> FloatArray:
             source = position - center
             theta = np.arctan2(x[:, 1], x[:, 0]) - math.atan2(source[1], source[0])
-            away, z = float(np.hypot(source[0], source[1])), x[:, 2] - source[2]
-            return cylinder.point_exitance(medium, radius=radius, source_radius=away, theta=theta, z=z)
+            distance, z = float(np.hypot(source[0], source[1])), x[:, 2] - source[2]
+            return cylinder.point_exitance(medium, radius=radius, source_radius=distance, theta=theta, z=z)
 
         return sources.sum_of_points(of_unit_power, len(points))
 
@@ -237,10 +237,10 @@ def _in_cylinder(shape: Cylinder, medium: Medium, sources: IdealSources) -> list
         x = points - center
         return np.asarray((np.abs(x[:, 2]) < 0.5 * shape.height - end) & (np.hypot(x[:, 0], x[:, 1]) > 0.98 * radius))
 
-    return _tried([ClosedForm("series", series, on_side)], center + np.array([radius, 0.0, 0.0]))
+    return _check_forms([ClosedForm("series", series, on_side)], center + np.array([radius, 0.0, 0.0]))
 
 
-# By shape: what makes the closed forms of a body.
+# The functions that make the closed forms of a body, by its shape.
 FACTORIES: dict[type, Callable[..., list[ClosedForm]]] = {
     Sphere: _in_sphere,
     Slab: _in_slab,
@@ -249,17 +249,17 @@ FACTORIES: dict[type, Callable[..., list[ClosedForm]]] = {
 
 
 def _check_room(side: str, room: float, farthest: float, margin: float) -> None:
-    """Refuse a source so near to the end of a body that the infinite body of the closed form is another one."""
+    """Refuse a source so close to the end of a body that the closed form of the infinite body does not hold."""
     if farthest > room:
         raise InputError(
-            f"the light is deposited less than {margin:.3g} from the body's {side}, where the endless one of the "
-            "closed form is another",
+            f"the light is deposited less than {margin:.3g} from the body's {side}, where the closed form, which is "
+            "that of an infinite body, does not hold",
             remedy="move the light or make the body larger",
         )
 
 
-def _tried(forms: list[ClosedForm], place: FloatArray) -> list[ClosedForm]:
-    """Evaluate each once, so that one that cannot be had for these sources says so at once."""
+def _check_forms(forms: list[ClosedForm], place: FloatArray) -> list[ClosedForm]:
+    """Evaluate each closed form once, so that one that does not exist for these sources raises its error at once."""
     for form in forms:
         form.exitance(place[None])
     return forms

@@ -66,7 +66,7 @@ def beam_reflectance(medium: Medium, *, thickness: float, source: Source = "delt
     >>> round(beam_reflectance(medium, thickness=5.0), 6), round(beam_transmittance(medium, thickness=5.0), 6)
     (0.577633, 0.249017)
     """
-    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, far=False)
+    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, transmitted=False)
 
 
 def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
@@ -91,7 +91,7 @@ def beam_transmittance(medium: Medium, *, thickness: float, source: Source = "de
     InputError
         If the thickness is not positive.
     """
-    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, far=True)
+    return _beam_exit(medium, checks.positive_number("thickness", thickness), source, transmitted=True)
 
 
 def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source = "delta-eddington") -> float:
@@ -120,14 +120,14 @@ def ballistic_transmittance(medium: Medium, *, thickness: float, source: Source 
     return float(np.exp(-beam.extinction * checks.positive_number("thickness", thickness)))
 
 
-def _beam_exit(medium: Medium, thickness: float, source: Source, *, far: bool) -> float:
+def _beam_exit(medium: Medium, thickness: float, source: Source, *, transmitted: bool) -> float:
     """Integrate `escape_front` f over the beam: ``∫ e^{-sigma z}(q0 f + q1 f') dz``, the second term by parts."""
     beam = beam_source(medium, source)
     reach = min(thickness, CUTOFF / beam.extinction)
     z, weights = composite_rule(np.linspace(0.0, reach, 9), 16)
 
     def escape(depth: FloatArray) -> FloatArray:
-        return escape_front(medium, thickness, thickness - depth if far else depth)
+        return escape_front(medium, thickness, thickness - depth if transmitted else depth)
 
     inside = beam.volume * float((weights * np.exp(-beam.extinction * z)) @ escape(z))
     ends = escape(np.array([0.0, thickness]))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import run_in_blocks
@@ -30,6 +31,8 @@ class Charges:
     medium : Medium
     region : int, optional
         The region that the sources lie in, if the body has several media.
+    field : VaryingMedium, optional
+        The medium of that region if it varies; `medium` is what it is at the sources.
     """
 
     positions: FloatArray
@@ -38,6 +41,7 @@ class Charges:
     closest: float
     medium: Medium
     region: int | None = None
+    field: VaryingMedium | None = None
 
     @property
     def dips(self) -> bool:

@@ -4,6 +4,7 @@ import numpy as np
 
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -29,6 +30,7 @@ def charges_of(
     images: bool | BoolArray,
     most: int = MOST_CHARGES,
     region: int | None = None,
+    field: VaryingMedium | None = None,
 ) -> Charges | None:
     """Charges of point sources, each with its images in the tangent plane at the nearest point of the surface.
 
@@ -46,6 +48,8 @@ def charges_of(
         Largest number of charges.
     region : int, optional
         The region that the sources lie in, if the body has several media.
+    field : VaryingMedium, optional
+        The medium of that region if it varies; `medium` is what it is at the sources.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def charges_of(
     if count > most:
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
-    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium, region)
+    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium, region, field)
 
 
 def _image_line(depth: float, zb: float) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.media.coefficients import WITHIN
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.rays import OFFSET
@@ -22,6 +25,8 @@ RESOLVED = 3e-4
 COARSEST_INNER = 1.5
 # The charges are a good guess where they differ from the fluence by at most this share of themselves.
 GOOD_GUESS = 0.5
+# Coefficients of a medium that varies are those at the source if they differ by less than this share.
+SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +79,22 @@ def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatAr
     cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
     if charges.region is not None:
         cells &= mesh.regions == charges.region
+    if charges.field is not None:
+        cells[cells] = _has_medium(mesh.points[mesh.tetrahedra[cells]], charges.medium, charges.field)
     patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
     return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
+
+
+def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> BoolArray:
+    """Whether a medium that varies is one medium throughout each of some tetrahedra (m, 4, 3), (m,).
+
+    The charges solve the equation of that medium only. The points are those by which the tetrahedra get their
+    coefficients.
+    """
+    sigma_a, reduced = field.at((WITHIN @ corners).reshape(-1, 3))
+    same = np.abs(sigma_a - medium.sigma_a) <= SAME * medium.sigma_a
+    same &= np.abs(reduced - medium.reduced_scattering) <= SAME * medium.reduced_scattering
+    return np.asarray(same.reshape(-1, 4).all(axis=1))
 
 
 def _is_sound(patch: Patch) -> bool:

@@ -12,13 +12,17 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight, fit_light
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.known.kept import KeptPlaces
+from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
+
+# Points in more different media than this stay on the mesh, since each medium takes a solution of its own.
+MOST_MEDIA = 4
 
 Subtract = Literal["fitted", "half-space", "free-space", "nothing"]
 # Fitted charges of all lights; lights that come later are left to the half-space.
@@ -202,10 +206,10 @@ def _charges_in_one_medium(
 def _charges_in_several(
     deposit: Deposit, body: Body, *, images: bool, most: int
 ) -> tuple[Deposit, Deposit, list[Charges]]:
-    """The same for points in regions, each within its own region; where the medium varies, they stay on the mesh.
+    """The same for points in regions, each within its own region and, where the medium varies, where it is the same.
 
-    What is subtracted solves the equation of the region's medium and no other, so it ends where the region does. Images
-    serve where that region is also what bounds the body nearest to the source.
+    What is subtracted solves the equation of one medium and no other, so it ends where that medium does. Images serve
+    where the region is also what bounds the body nearest to the source.
     """
     points, powers = deposit.terms.points, deposit.terms.powers
     if len(points) == 0:
@@ -214,8 +218,10 @@ def _charges_in_several(
     outermost = body.region_at(body.just_inside(points)) == places
     found, rest = [], np.ones(len(places), dtype=bool)
     for region in np.unique(places).tolist():
-        medium, inside = body.by_label[region], places == region
-        if isinstance(medium, Medium) and most > 0:
+        of_region = body.by_label[region]
+        for medium, inside in _media_at(of_region, points, np.flatnonzero(places == region)):
+            if most <= 0:
+                break
             some = charges_of(
                 points[inside],
                 powers[inside],
@@ -223,13 +229,31 @@ def _charges_in_several(
                 medium,
                 images=images & outermost[inside],
                 most=most,
-                region=region,
+                region=region if len(body.media) > 1 else None,
+                field=None if isinstance(of_region, Medium) else of_region,
             )
             if some is not None:
                 most -= len(some.positions)
-                rest &= ~inside
+                rest[inside] = False
                 found.append(some)
     return deposit, _keep_points(deposit, rest), found
+
+
+def _media_at(medium: AnyMedium, points: FloatArray, some: IntArray) -> list[tuple[Medium, IntArray]]:
+    """What a region's medium is at some of the points (n, 3), and which of these it is at; none if it is too many."""
+    if isinstance(medium, Medium):
+        return [(medium, some)]
+    values, kind = np.unique(np.column_stack(medium.at(points[some])), axis=0, return_inverse=True)
+    if len(values) > MOST_MEDIA:
+        return []
+    base = medium.base
+    return [
+        (
+            Medium(sigma_a=sigma_a, sigma_s_prime=reduced, eta=base.eta, boundary=base.boundary),
+            some[kind.reshape(-1) == i],
+        )
+        for i, (sigma_a, reduced) in enumerate(values.tolist())
+    ]
 
 
 def _without_points(deposit: Deposit) -> Deposit:

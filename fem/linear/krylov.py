@@ -1,4 +1,8 @@
-"""Preconditioned conjugate gradients, for many right-hand sides at once and on all cores."""
+"""Preconditioned conjugate gradients, for many right-hand sides at once and on all cores.
+
+For a complex symmetric matrix ``A + i beta M`` they are COCG, conjugate orthogonal conjugate gradients (van der Vorst &
+Melissen 1990): the same recurrences with dot products that conjugate nothing.
+"""
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -7,22 +11,23 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.host.blocks import THREADS, map_in_threads
 
 # Relative residual at which the iteration stops.
 AIM = 1e-11
 ITERATIONS = 1000
-# Right-hand sides that are iterated on together where every core has so many: each pass over the matrix then serves all
-# of them. Fewer are quicker one by one, for SciPy's products with two or three columns.
-TOGETHER = 8
+# Right-hand sides that share one iteration where every core has so many: each pass over the matrix then serves all of
+# them. Fewer are quicker one by one, since SciPy's products with two or three columns are slow.
+GROUP = 8
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000
 
-# From residuals (n, k) to rough corrections of the solution, (n, k).
+# From residuals (n, k) to rough corrections of the solution, (n, k), real.
 Preconditioner = Callable[[FloatArray], FloatArray]
 # From residuals (n, k) to corrections (n, k), and the most iterations that a column took, 0 of a direct method.
-Method = Callable[[FloatArray], tuple[FloatArray, int]]
+# Complex where the matrix is.
+Method = Callable[[NumberArray], tuple[NumberArray, int]]
 
 
 class Product:
@@ -47,11 +52,16 @@ class Product:
         """Whether one product has all cores at work."""
         return self._pool is not None
 
-    def __call__(self, x: FloatArray) -> FloatArray:
+    @property
+    def is_complex(self) -> bool:
+        """Whether the matrix is complex."""
+        return np.iscomplexobj(self.matrix)
+
+    def __call__(self, x: NumberArray) -> NumberArray:
         """``matrix @ x``."""
         if self._pool is None:
             return np.asarray(self.matrix @ x)
-        result = np.empty((self.matrix.shape[0], *x.shape[1:]))
+        result = np.empty((self.matrix.shape[0], *x.shape[1:]), np.result_type(self.matrix.dtype, x.dtype))
 
         def multiply(index: int) -> None:
             result[self._rows[index]] = self._blocks[index] @ x
@@ -73,58 +83,88 @@ def _rows_of(matrix: csr_array, rows: slice) -> csr_array:
 
 
 def jacobi(product: Product) -> Method:
-    """Conjugate gradients, preconditioned by the diagonal."""
-    inverse = 1.0 / product.matrix.diagonal()[:, None]
-    return preconditioned(product, lambda rest: inverse * rest)
+    """Conjugate gradients, preconditioned by the diagonal; by its modulus where it is complex."""
+    inverse = 1.0 / abs(product.matrix.diagonal())[:, None]
+    return preconditioned(product, lambda residuals: inverse * residuals)
 
 
 def preconditioned(product: Product, precondition: Preconditioner) -> Method:
     """Conjugate gradients on one or a few columns at a time, a core each, unless one product keeps all cores busy."""
 
-    def iterate(rest: FloatArray) -> tuple[FloatArray, int]:
-        return conjugate_gradients(product, precondition, rest)
+    def iterate(loads: NumberArray) -> tuple[NumberArray, int]:
+        return conjugate_gradients(product, precondition, loads)
 
-    def iterate_on_groups(rest: FloatArray) -> tuple[FloatArray, int]:
-        count = rest.shape[1]
-        size = TOGETHER if count >= TOGETHER * THREADS and not product.on_all_cores else 1
-        groups = [np.ascontiguousarray(rest[:, start : start + size]) for start in range(0, count, size)]
-        found = [iterate(group) for group in groups] if product.on_all_cores else map_in_threads(iterate, groups)
-        return np.hstack([x for x, _ in found]), max(iterations for _, iterations in found)
+    def iterate_on_groups(loads: NumberArray) -> tuple[NumberArray, int]:
+        count = loads.shape[1]
+        size = GROUP if count >= GROUP * THREADS and not product.on_all_cores else 1
+        groups = [np.ascontiguousarray(loads[:, start : start + size]) for start in range(0, count, size)]
+        solved = [iterate(group) for group in groups] if product.on_all_cores else map_in_threads(iterate, groups)
+        return np.hstack([x for x, _ in solved]), max(iterations for _, iterations in solved)
 
     return iterate_on_groups
 
 
-def conjugate_gradients(product: Product, precondition: Preconditioner, loads: FloatArray) -> tuple[FloatArray, int]:
+def real_bound(matrix: csr_array) -> csr_array:
+    """The real matrix ``A + |B|``, by which a complex symmetric matrix ``A + i B`` is preconditioned.
+
+    With A positive definite and B or -B positive semidefinite, eigenvalues of the preconditioned matrix are
+    ``(1 ± i t)/(1 + t)`` with t >= 0: of a modulus between .7 and 1, at most 45 degrees from the real axis.
+    """
+    return csr_array(matrix.real + abs(matrix.imag))
+
+
+def as_parts(values: NumberArray) -> FloatArray:
+    """Real and imaginary parts of complex columns (n, k), as the real columns (n, 2k)."""
+    return np.ascontiguousarray(values).view(np.float64)
+
+
+def from_parts(parts: FloatArray) -> NumberArray:
+    """The complex columns (n, k) of given real and imaginary parts (n, 2k)."""
+    return np.ascontiguousarray(parts).view(np.complex128)
+
+
+def on_parts(function: Preconditioner, values: NumberArray) -> NumberArray:
+    """Apply a real linear function of columns to real or complex columns (n, k)."""
+    return from_parts(function(as_parts(values))) if np.iscomplexobj(values) else function(values)
+
+
+def conjugate_gradients(product: Product, precondition: Preconditioner, loads: NumberArray) -> tuple[NumberArray, int]:
     """Preconditioned conjugate gradients (Saad 2003, algorithm 9.1) on all columns of (n, k) loads side by side.
 
     They stop when the norms of all residuals are below `AIM`, or after `ITERATIONS`. The second result is how many
-    there were.
+    there were. For complex columns this is COCG, with the same real preconditioner.
     """
-    result, rest = np.zeros_like(loads), loads.copy()
-    step = precondition(rest)
-    size = dots(rest, step)
+    solution, residuals = np.zeros_like(loads), loads.copy()
+    direction = on_parts(precondition, residuals)
+    product_of_residuals = dots(residuals, direction)
     iterations = 0
     while iterations < ITERATIONS:
         iterations += 1
-        image = product(step)
-        length = _ratio(size, dots(step, image))
-        result += length * step
-        rest -= length * image
-        if np.sqrt(dots(rest, rest).max(initial=0.0)) <= 0.5 * AIM:
+        image = product(direction)
+        length = _ratio(product_of_residuals, dots(direction, image))
+        solution += length * direction
+        residuals -= length * image
+        if norms(residuals).max(initial=0.0) <= 0.5 * AIM:
             break
-        towards = precondition(rest)
-        before, size = size, dots(rest, towards)
-        step *= _ratio(size, before)
-        step += towards
-    return result, iterations
+        corrections = on_parts(precondition, residuals)
+        before, product_of_residuals = product_of_residuals, dots(residuals, corrections)
+        direction *= _ratio(product_of_residuals, before)
+        direction += corrections
+    return solution, iterations
 
 
-def dots(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Dot products (k,) of the columns of (n, k) arrays."""
+def dots(a: NumberArray, b: NumberArray) -> NumberArray:
+    """Dot products (k,) of the columns of (n, k) arrays; nothing is conjugated."""
     # Not by BLAS: its threads wait for each other, and for whatever else the machine is doing.
     return np.asarray(np.einsum("ij,ij->j", a, b))
 
 
-def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
-    """``a/b``, and 0 where a column has nothing left to do."""
+def norms(columns: NumberArray) -> FloatArray:
+    """Euclidean norms (k,) of the columns of an (n, k) array."""
+    squares = dots(columns, columns) if not np.iscomplexobj(columns) else dots(columns, columns.conj()).real
+    return np.asarray(np.sqrt(squares))
+
+
+def _ratio(a: NumberArray, b: NumberArray) -> NumberArray:
+    """``a/b``, and 0 where b is 0: of a column that is solved, or where COCG breaks down."""
     return np.divide(a, b, out=np.zeros_like(a), where=b != 0)

@@ -6,9 +6,9 @@ from importlib.util import find_spec
 import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
-from tetlux.fem.linear.direct import direct
-from tetlux.fem.linear.krylov import Preconditioner, Product, dots, preconditioned
-from tetlux.meshing.arrays import FloatArray
+from tetlux.fem.linear.direct import factors_of
+from tetlux.fem.linear.krylov import Preconditioner, Product, dots, preconditioned, real_bound
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 
 # PyAMG finds the aggregates, and has no wheel for Linux on ARM.
@@ -20,33 +20,41 @@ POWER_STEPS = 8
 
 @dataclass(frozen=True, eq=False)
 class Multigrid:
-    """Conjugate gradients, preconditioned by a cycle through a hierarchy of matrices: this one's or one's like it."""
+    """Conjugate gradients, preconditioned by a cycle through a hierarchy of real matrices.
+
+    The hierarchy is that of the matrix itself, of one like it, or of one that a complex matrix is a shift of.
+    """
 
     product: Product
     cycle: Preconditioner
 
-    def __call__(self, rest: FloatArray) -> tuple[FloatArray, int]:
+    def __call__(self, loads: NumberArray) -> tuple[NumberArray, int]:
         """See `tetlux.fem.linear.krylov.Method`."""
-        return preconditioned(self.product, self.cycle)(rest)
+        return preconditioned(self.product, self.cycle)(loads)
 
     __repr__ = one_line
 
 
 def multigrid(product: Product) -> Multigrid:
-    """Conjugate gradients, preconditioned by smoothed aggregation (Vaněk, Mandel & Brezina 1996)."""
+    """Conjugate gradients, preconditioned by smoothed aggregation (Vaněk, Mandel & Brezina 1996).
+
+    For a complex matrix the hierarchy is that of its `real_bound`.
+    """
     finest, levels = product, list[_Level]()
+    if product.is_complex:
+        product = Product(real_bound(product.matrix))
     while product.matrix.shape[0] > COARSEST and (level := _level(product)) is not None:
         levels.append(level)
         product = Product(csr_array(level.down.matrix @ (product.matrix @ level.up.matrix)))
-    coarsest = direct(product)
+    coarsest = factors_of(product.matrix)
 
-    def cycle(rest: FloatArray, depth: int = 0) -> FloatArray:
+    def cycle(residuals: FloatArray, depth: int = 0) -> FloatArray:
         if depth == len(levels):
-            return coarsest(rest)[0]
+            return coarsest(residuals)
         level = levels[depth]
-        result = level.smoother * rest
-        result += level.up(cycle(level.down(rest - level.product(result)), depth + 1))
-        result += level.smoother * (rest - level.product(result))
+        result = level.smoother * residuals
+        result += level.up(cycle(level.down(residuals - level.product(result)), depth + 1))
+        result += level.smoother * (residuals - level.product(result))
         return result
 
     return Multigrid(finest, cycle)

@@ -1,16 +1,16 @@
 """Solve the system with the method that is quickest for its size, and check the residual."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.direct import direct
-from tetlux.fem.linear.krylov import TOGETHER, Method, Preconditioner, Product, dots, jacobi
+from tetlux.fem.linear.krylov import GROUP, Method, Preconditioner, Product, as_parts, from_parts, jacobi, norms
 from tetlux.fem.linear.multigrid import HAS_PYAMG, Multigrid, multigrid
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.notes import Note
@@ -32,15 +32,16 @@ class LinearResult:
     Attributes
     ----------
     x : (n,) or (n, k) ndarray
+        Complex if the matrix or a right-hand side is.
     residual : float
         Largest relative residual of a right-hand side, computed anew from its solution.
     iterations : int
-        Most that one took, of all methods together; 0 of the direct method.
+        Most that one right-hand side took, of all methods together; 0 of the direct method.
     method : str
         The last method that was needed.
     """
 
-    x: FloatArray
+    x: NumberArray
     residual: float
     iterations: int
     method: str
@@ -52,7 +53,8 @@ class Solver:
     Parameters
     ----------
     matrix : (n, n) csr_array
-        Symmetric, positive definite.
+        Real, symmetric, positive definite; or complex and symmetric, with a real part that is positive definite:
+        ``A + i beta M``.
     methods : sequence of callables
         `jacobi`, `multigrid`, `direct`. The first is prepared at once, the next ones only when those before leave
         too large a residual.
@@ -67,22 +69,34 @@ class Solver:
         self.matrix = matrix
         self._product = Product(matrix)
         self._methods = list(methods)
-        self._ready = [methods[0](self._product)]
+        self._prepared = [methods[0](self._product)]
         self._row_sums = np.asarray(matrix.sum(axis=1))[:, None]
         self.note = ""
 
     @property
     def cycle(self) -> Preconditioner | None:
-        """That which preconditions it, if multigrid does."""
-        first = self._ready[0]
+        """The multigrid cycle that preconditions it, if there is one."""
+        first = self._prepared[0]
         return first.cycle if isinstance(first, Multigrid) else None
 
-    def solve(self, load: FloatArray) -> LinearResult:
+    @property
+    def preconditioner(self) -> Preconditioner:
+        """What preconditions larger matrices that hold this one: its cycle, its factors, or its diagonal."""
+        first = self._prepared[0]
+        if isinstance(first, Multigrid):
+            return first.cycle
+        if self._methods[0] is direct:
+            return lambda rest: first(rest)[0]
+        inverse = 1.0 / self.matrix.diagonal()[:, None]
+        return lambda rest: inverse * rest
+
+    def solve(self, load: NumberArray) -> LinearResult:
         """Solve for one right-hand side or for several.
 
         Parameters
         ----------
         load : (n,) or (n, k) ndarray
+            Real or complex. With a real matrix, real and imaginary parts are solved for as columns of their own.
 
         Returns
         -------
@@ -95,69 +109,97 @@ class Solver:
             If a residual, computed anew from the solution, is above 1e-8 of its load.
         """
         loads = load.reshape(len(load), -1)
-        result, found = np.empty(loads.shape), []
-        portion = TOGETHER * THREADS
+        if self._needs_parts(loads):
+            result = self.solve(as_parts(loads))
+            return replace(result, x=from_parts(result.x).reshape(load.shape))
+        dtype = np.complex128 if self._product.is_complex else np.float64
+        solutions, results = np.empty(loads.shape, dtype), []
+        portion = GROUP * THREADS
         for start in range(0, loads.shape[1], portion):
             columns = slice(start, start + portion)
-            found.append(self._solve_together(np.asarray(loads[:, columns], dtype=np.float64)))
-            result[:, columns] = found[-1].x
+            results.append(self._solve_portion(np.asarray(loads[:, columns], dtype=dtype)))
+            solutions[:, columns] = results[-1].x
         names = [method.__name__ for method in self._methods]
         return LinearResult(
-            result.reshape(load.shape),
-            max((part.residual for part in found), default=0.0),
-            max((part.iterations for part in found), default=0),
-            max((part.method for part in found), key=names.index, default=names[0]),
+            solutions.reshape(load.shape),
+            max((result.residual for result in results), default=0.0),
+            max((result.iterations for result in results), default=0),
+            max((result.method for result in results), key=names.index, default=names[0]),
         )
 
-    def roughly(self, loads: FloatArray) -> LinearResult:
+    def roughly(self, loads: NumberArray) -> LinearResult:
         """Solve for (n, k) right-hand sides to residuals of 1e-3 at most, in less than half of the iterations."""
-        # In units in which the iteration stops there.
-        size = np.sqrt(dots(loads, loads)) * ROUGH_AIM / krylov.AIM
-        size[size == 0] = 1.0
-        x, iterations = self._ready[0](loads / size)
-        left = loads / size - self._product(x)
-        residual = float(np.sqrt(dots(left, left)).max()) * ROUGH_AIM / krylov.AIM
+        if self._needs_parts(loads):
+            result = self.roughly(as_parts(loads))
+            return replace(result, x=from_parts(result.x))
+        # The iteration stops at AIM: in these units that is ROUGH_AIM of the load.
+        sizes = norms(loads) * ROUGH_AIM / krylov.AIM
+        sizes[sizes == 0] = 1.0
+        x, iterations = self._prepared[0](loads / sizes)
+        residual = float(norms(loads / sizes - self._product(x)).max()) * ROUGH_AIM / krylov.AIM
         if not residual <= 10.0 * ROUGH_AIM:
             return self.solve(loads)
-        return LinearResult(x * size, residual, iterations, self._methods[0].__name__)
+        return LinearResult(x * sizes, residual, iterations, self._methods[0].__name__)
 
-    def _solve_together(self, loads: FloatArray) -> LinearResult:
-        size = np.linalg.norm(loads, axis=0)
-        size[size == 0] = 1.0
-        loads = loads / size
-        result, rest, residual, iterations = np.zeros_like(loads), loads, 1.0, 0
-        name = self._methods[0].__name__
-        for number, method in enumerate(self._methods):
-            if residual <= krylov.AIM:
+    def _needs_parts(self, loads: NumberArray) -> bool:
+        """Whether loads are complex and the matrix is not."""
+        return np.iscomplexobj(loads) and not self._product.is_complex
+
+    def _solve_portion(self, loads: NumberArray) -> LinearResult:
+        """Solve for (n, k) right-hand sides by one method after the other, until the residuals are small."""
+        sizes = np.linalg.norm(loads, axis=0)
+        sizes[sizes == 0] = 1.0
+        loads = loads / sizes
+        state = _State(np.zeros_like(loads), loads, 1.0, 0, self._methods[0].__name__)
+        for number in range(len(self._methods)):
+            if state.residual <= krylov.AIM:
                 break
-            if residual > REFUSED and number > 0:
-                self.note = Note(
-                    "solver-fallback",
-                    f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
-                    "takes longer: coefficients are far apart, or tetrahedra flat.",
-                )
-            if number == len(self._ready):
-                self._ready.append(method(self._product))
-            helps = True
-            # The iteration's own residual drifts from the true one; the same again on what is left mends that.
-            while residual > krylov.AIM and helps:
-                correction, more = self._ready[number](rest)
-                better, iterations, name = result + correction, iterations + more, method.__name__
-                left = loads - self._product(better)
-                reached = float(np.linalg.norm(left, axis=0).max())
-                helps = reached < 0.1 * residual
-                if reached < residual:
-                    result, rest, residual = better, left, reached
-        # Moving all nodes alike makes the residuals sum to zero, and the ledger of power is such a sum.
-        shift = rest.sum(axis=0) / self._row_sums.sum()
-        result, rest = result + shift, rest - shift * self._row_sums
-        residual = float(np.linalg.norm(rest, axis=0).max())
+            state = self._improve(state, loads, number)
+        # Adding a constant makes the residuals sum to zero, and the ledger of power is such a sum.
+        shift = state.residuals.sum(axis=0) / self._row_sums.sum()
+        solution, residuals = state.solution + shift, state.residuals - shift * self._row_sums
+        residual = float(np.linalg.norm(residuals, axis=0).max())
         if not residual <= REFUSED:
             raise RunError(
                 f"the linear solver stopped at a relative residual of {residual:.1e}, above {REFUSED:.0e}; "
                 "the mesh is too badly shaped or the coefficients too far apart: try a finer or cleaner mesh."
             )
-        return LinearResult(np.asarray(result * size), residual, iterations, name)
+        return LinearResult(np.asarray(solution * sizes), residual, state.iterations, state.method)
+
+    def _improve(self, state: "_State", loads: NumberArray, number: int) -> "_State":
+        """Reduce the residuals of loads (n, k) by one method, as far as it helps."""
+        method = self._methods[number]
+        if state.residual > REFUSED and number > 0:
+            self.note = Note(
+                "solver-fallback",
+                f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
+                "takes longer: coefficients are far apart, or tetrahedra flat.",
+            )
+        if number == len(self._prepared):
+            self._prepared.append(method(self._product))
+        helps = True
+        # The residual that an iteration updates drifts from the true one: solve again for the true residual.
+        while state.residual > krylov.AIM and helps:
+            correction, more = self._prepared[number](state.residuals)
+            solution = state.solution + correction
+            residuals = loads - self._product(solution)
+            residual = float(np.linalg.norm(residuals, axis=0).max())
+            helps = residual < 0.1 * state.residual
+            state = replace(state, iterations=state.iterations + more, method=method.__name__)
+            if residual < state.residual:
+                state = replace(state, solution=solution, residuals=residuals, residual=residual)
+        return state
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Solutions and true residuals (n, k) of loads of norm 1, the largest norm of these, and what it took."""
+
+    solution: NumberArray
+    residuals: NumberArray
+    residual: float
+    iterations: int
+    method: str
 
 
 def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None = None) -> Solver:
@@ -166,11 +208,11 @@ def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None =
     Parameters
     ----------
     matrix : (n, n) csr_array
-        Symmetric, positive definite.
+        As for `Solver`.
     loads : int
         How many right-hand sides are to come, roughly.
     cycle : callable, optional
-        That of a matrix much like this one: if multigrid is the method, its preparation is spared.
+        The multigrid cycle of a similar matrix, such as that of A for ``A + i beta M``; it spares the preparation.
 
     Returns
     -------

@@ -16,12 +16,12 @@ AnyMedium = Medium | VaryingMedium
 # Media by the regions or labels of a mesh that they fill: the body's own, or the outermost, first.
 MediaByLabel = Mapping[int, AnyMedium]
 # Barycentric coordinates of the points of a rule that is exact for quadratics, each of the same weight.
-_WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
+WITHIN = np.full((4, 4), 0.1381966011250105) + (0.5854101966249685 - 0.1381966011250105) * np.eye(4)
 
 
 @dataclass(frozen=True, eq=False)
 class Coefficients:
-    """Coefficients of the tetrahedra of a mesh; a number where they are all alike.
+    """Coefficients of the tetrahedra of a mesh; numbers where the medium is the same throughout.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Coefficients:
         return self.sigma_a + self.scattering
 
     @property
-    def escape(self) -> float:
+    def robin(self) -> float:
         """1/(2A) of the boundary condition."""
         return 0.5 / self.outer.boundary_factor
 
@@ -79,11 +79,11 @@ def condition_bound(one: Coefficients, other: Coefficients) -> float:
     sums differ by a factor between the least and the largest ratio. The bound is the largest over the least.
     """
     ratios = []
-    for name in ("diffusion", "sigma_a", "escape"):
+    for name in ("diffusion", "sigma_a", "robin"):
         first, second = np.broadcast_arrays(getattr(one, name), getattr(other, name))
-        some = (first > 0) | (second > 0)
+        present = (first > 0) | (second > 0)
         with np.errstate(divide="ignore"):
-            ratios.append(np.ravel(first[some] / second[some]))
+            ratios.append(np.ravel(first[present] / second[present]))
     every = np.concatenate(ratios)
     return float(every.max() / every.min()) if every.min() > 0 else np.inf
 
@@ -125,11 +125,11 @@ def coefficients_on(mesh: TetMesh, media: MediaByLabel | Sequence[AnyMedium]) ->
     for label, medium in labelled.items():
         inside = np.flatnonzero(mesh.regions == label) if len(labelled) > 1 else np.arange(len(mesh.tetrahedra))
         if isinstance(medium, Medium):
-            found = [medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington, known_cosine(medium)]
-            values[:, inside] = np.array(found)[:, None]
+            constants = [medium.sigma_a, medium.sigma_t_prime, *medium.delta_eddington, known_cosine(medium)]
+            values[:, inside] = np.array(constants)[:, None]
             continue
         # The mean of four points in each tetrahedron, which is exact for what changes quadratically.
-        points = _WITHIN @ mesh.points[mesh.tetrahedra[inside]]
+        points = WITHIN @ mesh.points[mesh.tetrahedra[inside]]
         at = medium.at(points.reshape(-1, 3))
         absorption, reduced = (value.reshape(-1, 4).mean(axis=1) for value in at)
         peaked, forward = medium.delta_eddington(reduced)

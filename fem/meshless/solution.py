@@ -18,6 +18,7 @@ from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
@@ -67,6 +68,8 @@ class ChargeSolution:
     seconds : dict
         Seconds spent on surface, solve, and total.
     warnings : list of str
+    readings : tuple of Reading
+        What the detectors read that were given to `tetlux.fem.solve`, in their order.
     """
 
     surface: Surface
@@ -79,6 +82,7 @@ class ChargeSolution:
     quality: Quality
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
+    readings: tuple[Reading, ...] = ()
 
     mesh = None
     model = "charges"

@@ -13,7 +13,6 @@ The gradients sum to zero, so the first is known from its values on the edges: e
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -22,16 +21,18 @@ from tetlux.fem.linear.krylov import Preconditioner
 from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of, condition_bound
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import FloatArray, IndexArray, sum_by_index
+from tetlux.fem.operators.pattern import Pattern, pattern_of
+from tetlux.fem.operators.terms import Mass, Terms, boundary_term, mass_term, stiffness_term
+from tetlux.meshing.arrays import FloatArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import cross, dot, run_on_corners
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import EDGES
 
-Mass = Literal["lumped", "consistent"]
+__all__ = ["ALIKE", "Assembly", "Mass", "system_matrix"]
 
-# Coefficients that are no farther apart share a preconditioner: it takes at most twice the iterations, and on balls in
-# a beam, with absorption or diffusion up to four times as strong, no more than its own.
+# Coefficients whose `condition_bound` is no larger share a preconditioner: it takes at most twice the iterations, and
+# on balls in a beam, with absorption or diffusion up to four times as strong, no more than its own.
 ALIKE = 4.0
 
 
@@ -70,27 +71,37 @@ class Assembly:
     mesh: TetMesh
     cycles: list[tuple[Coefficients, Preconditioner]] = field(default_factory=list)
 
-    def solver(self, coefficients: Coefficients, mass: Mass, loads: int) -> Solver:
-        """One for the matrix of given coefficients, prepared with what was prepared for others much like them."""
+    def solver(self, coefficients: Coefficients, matrix: csr_array, loads: int) -> Solver:
+        """A solver for the matrix of given coefficients, prepared with what was prepared for similar ones."""
         known = next((cycle for others, cycle in self.cycles if condition_bound(coefficients, others) <= ALIKE), None)
-        solver = solver_for(self.of(coefficients, mass), loads, known)
+        solver = solver_for(matrix, loads, known)
         if known is None and solver.cycle is not None:
             self.cycles.append((coefficients, solver.cycle))
         return solver
 
     def of(self, coefficients: Coefficients, mass: Mass = "lumped") -> csr_array:
         """The matrix of given coefficients, see `system_matrix`."""
-        return self.matrix(coefficients.diffusion, coefficients.sigma_a, coefficients.escape, mass)
+        return self.matrix(coefficients.diffusion, coefficients.sigma_a, coefficients.robin, mass)
 
     def matrix(
         self,
         diffusion: float | FloatArray,
         sigma_a: float | FloatArray,
-        escape: float | FloatArray,
+        robin: float | FloatArray,
+        mass: Mass = "lumped",
+    ) -> csr_array:
+        """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ robin phi v``, see `terms`."""
+        return self.terms(diffusion, sigma_a, robin, mass).combine()
+
+    def terms(
+        self,
+        diffusion: float | FloatArray,
+        sigma_a: float | FloatArray,
+        robin: float | FloatArray,
         mass: Mass = "lumped",
         absorption_scale: FloatArray | None = None,
-    ) -> csr_array:
-        """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ escape phi v``.
+    ) -> Terms:
+        """The terms of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ robin phi v``.
 
         Parameters
         ----------
@@ -98,39 +109,25 @@ class Assembly:
             D, of all or of each tetrahedron, unit.
         sigma_a : float or (m,) ndarray
             Absorption coefficient, 1/unit.
-        escape : float or (f,) ndarray
-            1/(2A), of all or of each boundary triangle.
+        robin : float or (f,) ndarray
+            1/(2A), of all or of each boundary triangle; 0 where no light passes (Neumann).
         mass : {"lumped", "consistent"}
         absorption_scale : (n,) ndarray, optional
             The factor on the absorption in the lumped mass of each node, see `tetlux.fem.operators.fitting`.
 
         Returns
         -------
-        (n, n) csr_array
-            It shares its pattern with the others of this assembly.
+        Terms
         """
-        mesh, nodes = self.mesh, len(self.mesh.points)
-        low, high = mesh.edges.T
         edges = diffusion * self._stiffness if np.ndim(diffusion) == 0 else self._stiffness_of(diffusion)
-        diagonal = -sum_by_index(low, edges, nodes) - sum_by_index(high, edges, nodes)
-        absorbed = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
-        diagonal += absorbed if absorption_scale is None else absorption_scale * absorbed
-        diagonal[mesh.boundary_nodes] += mesh.to_boundary_nodes(escape * mesh.boundary_areas)
-        if mass == "consistent":
-            # Their rows sum to what those of the lumped ones hold on the diagonal.
-            within = np.tile(sigma_a * mesh.volumes / 20.0, 6)
-            across = np.repeat(escape * mesh.boundary_areas / 12.0, 3)
-            coupling = sum_by_index(self._slots, within, len(edges)) + sum_by_index(
-                mesh.boundary_edges, across, len(edges)
-            )
-            diagonal -= sum_by_index(low, coupling, nodes) + sum_by_index(high, coupling, nodes)
-            edges = edges + coupling
-        indptr, indices, source = self._pattern
-        return csr_array((np.concatenate([edges, diagonal])[source], indices, indptr), shape=(nodes, nodes))
-
-    @property
-    def _slots(self) -> IndexArray:
-        return self.mesh.tetrahedron_edges.T.reshape(-1)
+        return Terms(
+            self.mesh,
+            self._pattern,
+            mass,
+            stiffness_term(self.mesh, edges),
+            mass_term(self.mesh, sigma_a, mass, absorption_scale),
+            boundary_term(self.mesh, robin, mass),
+        )
 
     @cached_property
     def _stiffness(self) -> FloatArray:
@@ -151,26 +148,10 @@ class Assembly:
                 values[edge, block] = scale * dot(normals[i], normals[j])
 
         run_on_corners(fill, mesh.points, mesh.tetrahedra)
-        return sum_by_index(self._slots, values, len(mesh.edges))
+        return sum_by_index(mesh.tetrahedron_edges.T.reshape(-1), values, len(mesh.edges))
 
     @cached_property
-    def _pattern(self) -> tuple[IndexArray, IndexArray, IndexArray]:
-        """Row starts (n+1,), columns (z,), and where each entry's value is among edges and diagonal, (z,)."""
-        nodes, (low, high) = len(self.mesh.points), self.mesh.edges.T
-        count = np.arange(len(low), dtype=np.int32)
-        above = np.concatenate([[0], np.cumsum(np.bincount(low, minlength=nodes))])
-        below = np.concatenate([[0], np.cumsum(np.bincount(high, minlength=nodes))])
-        # Edges are sorted by their smaller node; sorted by their larger one they are the other triangle's rows.
-        transposed = csr_array((count, high.astype(np.int32), above.astype(np.int32)), shape=(nodes, nodes)).tocsc()
-        starts = above + below + np.arange(nodes + 1)
-        middle = starts[:-1] + np.diff(below)
-        indices, source = np.empty((2, starts[-1]), dtype=np.int32)
-        place = middle[low] + 1 + count - above[low]
-        indices[place], source[place] = high, count
-        other = high[transposed.data]
-        place = starts[other] + count - below[other]
-        indices[place], source[place] = transposed.indices, transposed.data
-        indices[middle], source[middle] = np.arange(nodes), len(low) + np.arange(nodes)
-        return starts.astype(np.int32), indices, source
+    def _pattern(self) -> Pattern:
+        return pattern_of(self.mesh)
 
     __repr__ = one_line

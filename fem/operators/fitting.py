@@ -24,10 +24,10 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Below this k h the elements' own coefficients are as good: the exitance's error on balls is the same from .4 down.
-FITTED = 0.5
-# k h counts as no less than this, where quotients are 1, and sinh is taken of no more, where one is 0, to rounding.
-LEAST, MOST = 1e-6, 600.0
+# Layers are fitted from this k h on: below, the error of the exitance on balls is the same without.
+FITTED_FROM = 0.5
+# k h is clipped to this range: at the lower end the quotients are 1 to rounding, at the upper one sinh would overflow.
+SMALLEST_KH, LARGEST_KH = 1e-6, 600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +60,13 @@ def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> Fitting | None:
     spacing = 2.0 * mesh.node_volumes[nodes] / areas
     decay = mesh.to_boundary_nodes(np.sqrt(sigma_a / diffusion) * mesh.boundary_areas) / areas
     at_boundary = decay * spacing
-    if at_boundary.max() <= FITTED:
+    if at_boundary.max() <= FITTED_FROM:
         return None
     across, scale = np.zeros(len(mesh.points)), np.ones(len(mesh.points))
-    across[nodes] = np.maximum(at_boundary, LEAST)
+    across[nodes] = np.maximum(at_boundary, SMALLEST_KH)
     scale[nodes] = np.tanh(0.5 * across[nodes]) / (0.5 * across[nodes])
     corners = across[mesh.tetrahedra]
     touching = np.count_nonzero(corners, axis=1)
-    mean = np.minimum(corners.sum(axis=1) / np.maximum(touching, 1), MOST)
+    mean = np.minimum(corners.sum(axis=1) / np.maximum(touching, 1), LARGEST_KH)
     share = np.divide(mean, np.sinh(mean), out=np.ones(len(mean)), where=touching > 0)
     return Fitting(coefficients.diffusion * share, scale, across)

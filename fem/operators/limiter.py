@@ -11,9 +11,9 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 
-# From neighbour to neighbour so many times; what is lacking still is taken from all nodes alike.
+# Sweeps from neighbour to neighbour; what is still missing after them is taken from all nodes in proportion.
 SWEEPS = 10
-# Quotients by less could overflow.
+# Quotients by less than this could overflow.
 NOTHING = 1e-250
 
 
@@ -40,25 +40,25 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     total = float(power.sum())
     if fluence.min(initial=0.0) >= 0 or total < NOTHING:
         return fluence, 0.0
-    lacking, left = np.maximum(-power, 0.0), np.maximum(power, 0.0)
-    limited_power = float(lacking.sum())
+    deficit, available = np.maximum(-power, 0.0), np.maximum(power, 0.0)
+    limited_power = float(deficit.sum())
 
     def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(nodes, values, minlength=len(power)), dtype=np.float64)
 
     for _ in range(SWEEPS):
-        ways = edges[(lacking[edges] > 0).any(axis=1)]
-        if len(ways) == 0:
+        pairs = edges[(deficit[edges] > 0).any(axis=1)]
+        if len(pairs) == 0:
             break
-        takers, givers = np.concatenate([ways, ways[:, ::-1]]).T
-        # All ask of their neighbours in proportion to what these have, and a neighbour gives no more than that.
-        asked = _ratio(lacking, at_nodes(takers, left[givers]))[takers] * left[givers]
-        given = asked * np.minimum(_ratio(left, at_nodes(givers, asked)), 1.0)[givers]
-        lacking = np.maximum(lacking - at_nodes(takers, given), 0.0)
-        left = np.maximum(left - at_nodes(givers, given), 0.0)
-    # Rounding too: so much is left in all.
-    left *= _ratio(np.array(total), left.sum())
-    return np.where(weights > 0, _ratio(left, weights), np.maximum(fluence, 0.0)), limited_power
+        takers, givers = np.concatenate([pairs, pairs[:, ::-1]]).T
+        # Each taker asks its neighbours in proportion to what they have; a giver gives no more than it has.
+        asked = _ratio(deficit, at_nodes(takers, available[givers]))[takers] * available[givers]
+        given = asked * np.minimum(_ratio(available, at_nodes(givers, asked)), 1.0)[givers]
+        deficit = np.maximum(deficit - at_nodes(takers, given), 0.0)
+        available = np.maximum(available - at_nodes(givers, given), 0.0)
+    # The total is kept to rounding.
+    available *= _ratio(np.array(total), available.sum())
+    return np.where(weights > 0, _ratio(available, weights), np.maximum(fluence, 0.0)), limited_power
 
 
 def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:

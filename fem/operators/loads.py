@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.media.fresnel import moments
+from tetlux.fem.models.boundary import PartialCurrent
 from tetlux.fem.operators.operator import Operator
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.ledger import Ledger
@@ -90,8 +90,8 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms) -
             cells[: len(terms.point_cells)] = terms.point_cells
         load += _point_load(mesh, points, powers, cells)
     if np.any(terms.transmitted_irradiance):
-        _, c2 = moments(coefficients.outer.eta)
-        load[mesh.boundary_nodes] += mesh.boundary_node_areas * 2.0 * terms.transmitted_irradiance / (1.0 + 3.0 * c2)
+        inflow = PartialCurrent(coefficients.outer).inflow(terms.transmitted_irradiance)
+        load[mesh.boundary_nodes] += mesh.boundary_node_areas * inflow
     if np.any(terms.emission):
         load += mesh.to_nodes(terms.emission * mesh.volumes)
     return load

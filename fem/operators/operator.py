@@ -7,8 +7,10 @@ import numpy as np
 
 from tetlux.fem.linear.solver import LinearResult, Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.model import Model
 from tetlux.fem.operators.assembly import Assembly, Mass
 from tetlux.fem.operators.fitting import Fitting
+from tetlux.fem.operators.terms import Terms
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
@@ -16,46 +18,52 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """A matrix on a mesh, its solver, and the power that a fluence loses.
+    """The equation on a mesh by its terms, and its solver.
 
     Attributes
     ----------
     mesh : TetMesh
-    coefficients : Coefficients
-        Of the media, on its tetrahedra.
+    model : Model
+        The equation, with the coefficients of the media on its tetrahedra.
+    terms : Terms
+        Of the matrix.
     solver : Solver
-    absorbing : (n,) ndarray
-        Power absorbed for a fluence of 1 at each node, unit².
     fitting : Fitting, optional
         The coefficients of the matrix where they are not those of the media.
     """
 
     mesh: TetMesh
-    coefficients: Coefficients
+    model: Model
+    terms: Terms
     solver: Solver
-    absorbing: FloatArray
     fitting: Fitting | None
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """Of the media."""
+        return self.model.coefficients
+
+    @property
+    def absorbing(self) -> FloatArray:
+        """Power absorbed for a fluence of 1 at each node, (n,), unit²."""
+        return self.terms.absorption.row_sums(self.mesh)
 
     @property
     def losses(self) -> FloatArray:
         """Power absorbed or lost through the boundary for a fluence of 1 at each node, (n,), unit²."""
-        losses = self.absorbing.copy()
-        losses[self.mesh.boundary_nodes] += self.coefficients.escape * self.mesh.boundary_node_areas
-        return losses
+        return self.absorbing + self.terms.boundary.row_sums(self.mesh)
 
     __repr__ = one_line
 
 
-def operator_of(
-    assembly: Assembly, coefficients: Coefficients, mass: Mass, loads: int, fitting: Fitting | None = None
-) -> Operator:
-    """The operator of given coefficients.
+def operator_of(assembly: Assembly, model: Model, mass: Mass, loads: int, fitting: Fitting | None = None) -> Operator:
+    """The operator of a model with one unknown.
 
     Parameters
     ----------
     assembly : Assembly
         Of the mesh.
-    coefficients : Coefficients
+    model : Model
     mass : {"lumped", "consistent"}
     loads : int
         How many right-hand sides are to come, roughly.
@@ -66,14 +74,14 @@ def operator_of(
     -------
     Operator
     """
-    mesh, sigma_a = assembly.mesh, coefficients.sigma_a
-    absorbing = np.asarray(
-        sigma_a * mesh.node_volumes if coefficients.uniform else mesh.to_nodes(sigma_a * mesh.volumes)
-    )
+    ((block,),) = model.blocks
     if fitting is None:
-        return Operator(mesh, coefficients, assembly.solver(coefficients, mass, loads), absorbing, None)
-    matrix = assembly.matrix(fitting.diffusion, sigma_a, coefficients.escape, mass, fitting.absorption_scale)
-    return Operator(mesh, coefficients, solver_for(matrix, loads), fitting.absorption_scale * absorbing, fitting)
+        terms = assembly.terms(block.diffusion, block.sigma, block.robin, mass)
+        solver = assembly.solver(model.coefficients, terms.combine(), loads)
+    else:
+        terms = assembly.terms(fitting.diffusion, block.sigma, block.robin, mass, fitting.absorption_scale)
+        solver = solver_for(terms.combine(), loads)
+    return Operator(assembly.mesh, model, terms, solver, fitting)
 
 
 def solve_columns(

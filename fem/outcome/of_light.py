@@ -35,7 +35,8 @@ def solution_of_light(
     """
     known, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
     mesh, limited_power = operator.mesh, 0.0
-    if limit and not (load.has_first_moment or any(each.patch.charges.dips for each in subtractions)):
+    dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
+    if limit and operator.model.nonnegative and not dips:
         fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
     outside = mesh.boundary_node_areas * terms.irradiance
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
@@ -51,7 +52,7 @@ def solution_of_light(
     solution = Solution(
         mesh,
         surface,
-        operator.coefficients.outer,
+        operator.model.boundary,
         fluence,
         ledger,
         tuple(each.patch for each in subtractions),

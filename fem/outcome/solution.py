@@ -5,13 +5,18 @@ from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
-from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.boundary import Boundary
+from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.quadratic.error import read_with_error
+from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -59,8 +64,9 @@ class Solution:
     mesh : TetMesh
     surface : Surface
         What the mesh stands for: exitance at points is taken to this.
-    medium : Medium
-    fluence : (n,) ndarray
+    boundary : Boundary
+        How the exitance follows from the fluence: see `tetlux.fem.models.boundary`.
+    fluence : (n,) ndarray, real or complex
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
     patches : tuple of Patch
@@ -83,12 +89,16 @@ class Solution:
         Largest relative residual of the linear systems on `mesh`, computed anew from their solutions.
     iterations : int
         Most iterations that one of them took; 0 if all were solved directly.
+    readings : tuple of Reading
+        What the detectors read that were given to `tetlux.fem.solve`, in their order.
+    quadratic : QuadraticSolution, optional
+        The same in quadratic elements, which detectors are read by: see `tetlux.fem.quadratic`.
     """
 
     mesh: TetMesh
     surface: Surface
-    medium: Medium
-    fluence: FloatArray
+    boundary: Boundary
+    fluence: NumberArray
     power: Power
     patches: tuple[Patch, ...] = ()
     transmitted_irradiance: float | FloatArray = 0.0
@@ -100,24 +110,20 @@ class Solution:
     validity: Validity | None = None
     residual: float = 0.0
     iterations: int = 0
+    readings: tuple[Reading, ...] = ()
+    quadratic: QuadraticSolution | None = None
 
     @cached_property
-    def exitance(self) -> FloatArray:
-        """Exitance at the boundary nodes of `mesh`, (b,), W/unit².
+    def exitance(self) -> NumberArray:
+        """Exitance at the boundary nodes of `mesh`, (b,), W/unit²: see `tetlux.fem.models.boundary`."""
+        return self.boundary.exitance(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
 
-        ``M = phi/(2A)``; under diffuse light ``M = E_t + E.n``, where the boundary condition makes
-        ``E.n = (phi - 4 E_t/(1 - 2 C1))/(2A)``.
-        """
-        return self._exitance_of(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
+    @property
+    def medium(self) -> Medium:
+        """The medium below the surface: of a body of several, one of the refractive index that all of them share."""
+        return self.boundary.medium
 
-    def _exitance_of(self, fluence: FloatArray, transmitted: float | FloatArray) -> FloatArray:
-        exitance = fluence / (2.0 * self.medium.boundary_factor)
-        if np.any(transmitted):
-            _, c2 = moments(self.medium.eta)
-            exitance = exitance + transmitted * (1.0 - 2.0 / (1.0 + 3.0 * c2))
-        return np.asarray(exitance)
-
-    def exitance_at(self, points: FloatArray) -> FloatArray:
+    def exitance_at(self, points: FloatArray) -> NumberArray:
         """Exitance at the points of the surface nearest to given points.
 
         Parameters
@@ -131,22 +137,23 @@ class Solution:
         """
         return self._at_nearest(points, self.exitance_on)
 
-    def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """What there is at the points of the surface nearest to given points; nan where those are not finite."""
+    def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], NumberArray]) -> NumberArray:
+        """Values at the points of the surface nearest to given points; nan where those are not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
-        values = np.full(len(places), np.nan)
-        values[finite] = values_on(self.surface.project(places[finite])[0])
+        known = values_on(self.surface.project(places[finite])[0])
+        values = np.full(len(places), np.nan, known.dtype)
+        values[finite] = known
         return values
 
-    def exitance_on(self, queries: FloatArray) -> FloatArray:
+    def exitance_on(self, queries: FloatArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         _, face, weights = self.mesh.closest_boundary(queries)
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        return self._exitance_of(self._interpolated(queries, cells, corners, weights), transmitted)
+        return self.boundary.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
@@ -181,7 +188,7 @@ class Solution:
             raise InputError("validity is that of all lights together; ask the whole solution, not one of of_lights.")
         return self.validity.at(queries)
 
-    def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> FloatArray:
+    def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> NumberArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
         linear = (weights * self.fluence[nodes]).sum(axis=1)
         known, guessed = np.zeros(len(points)), np.zeros(len(points))
@@ -190,6 +197,8 @@ class Solution:
             known[inside] += patch.charges.fluence(points[inside])
             guessed[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
         fluence = linear + (known - guessed)
+        if np.iscomplexobj(fluence):
+            return np.asarray(fluence)
         # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
         below = (fluence < 0) & (linear >= 0)
         shares = below & (known >= 0) & (guessed > 0)
@@ -200,7 +209,7 @@ class Solution:
             fluence[rest] = linear[rest]
         return np.asarray(fluence)
 
-    def fluence_at(self, points: FloatArray) -> FloatArray:
+    def fluence_at(self, points: FloatArray) -> NumberArray:
         """Fluence at given points.
 
         Parameters
@@ -220,23 +229,53 @@ class Solution:
             lost = lost[self.surface.contains(queries[lost])]
             cells[lost] = self.mesh.boundary_cells[self.mesh.closest_boundary(queries[lost])[1]]
             weights[lost] = self.mesh.barycentric(queries[lost], cells[lost])
-        fluence = np.full(len(queries), np.nan)
-        found = np.flatnonzero(cells >= 0)
+        fluence = np.full(len(queries), np.nan, self.fluence.dtype)
 
-        def fill(some: IntArray) -> None:
-            nodes = self.mesh.tetrahedra[cells[some]]
-            fluence[some] = self._interpolated(queries[some], cells[some], nodes, weights[some])
+        def fill(places: IntArray) -> None:
+            nodes = self.mesh.tetrahedra[cells[places]]
+            fluence[places] = self._interpolated(queries[places], cells[places], nodes, weights[places])
 
-        fill(found)
-        # What falls off towards the surface may not be carried on below zero.
+        fill(np.flatnonzero(cells >= 0))
+        if np.iscomplexobj(fluence):
+            return fluence
+        # Extrapolation beyond the facets may not go below zero.
         below = lost[fluence[lost] < 0]
         weights[below] = np.maximum(weights[below], 0.0)
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
         return fluence
 
+    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Fluence at given points by quadratic elements, and how far it may be off.
+
+        Each point needs a dual solution of its own, so that thousands take minutes.
+
+        Parameters
+        ----------
+        points : (q, 3) array_like
+
+        Returns
+        -------
+        fluence : (q,) ndarray
+            W/unit²; nan outside the body.
+        relative_error : (q,) ndarray
+            Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
+        """
+        queries = np.asarray(points, dtype=float).reshape(-1, 3)
+        found = np.full((2, len(queries)), np.nan)
+        if self.quadratic is None:
+            raise InputError("this solution was not made by solve, and has no errors of single points.")
+        inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
+        inside = inside[self.surface.contains(queries[inside])]
+        sights = [Sight(queries[[i]], np.ones(1), inside=True) for i in inside]
+        self.quadratic.operator.duals(sights)
+        for i, sight in zip(inside, sights, strict=True):
+            reading = read_with_error(self.quadratic, sight)
+            found[:, i] = reading.value, reading.relative
+        return found[0], found[1]
+
     def __repr__(self) -> str:
-        low, high = self.exitance.min(), self.exitance.max()
+        low, high = self.exitance.real.min(), self.exitance.real.max()
         facts = [
             count(len(self.mesh.points), "node"),
             f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",

@@ -72,7 +72,7 @@ def labels_of(raw: RawMesh, name: str | None = None) -> Labels:
         if name not in raw.arrays:
             known = ", ".join(raw.arrays) or "none"
             raise InputError(f'it holds no array "{name}" of cell values; the arrays there are: {known}.')
-        values = _whole(raw, name)
+        values = _integers(raw, name)
         if values is None:
             raise InputError(f'the values of "{name}" are no whole numbers, one for each tetrahedron.')
         return Labels(values, _names(raw, name, values))
@@ -114,13 +114,13 @@ def _candidates(raw: RawMesh) -> dict[str, IntArray]:
     """Possible label arrays and their values: arrays of a known name, or with few distinct integers."""
     found = {}
     for name in raw.arrays:
-        values = _whole(raw, name)
+        values = _integers(raw, name)
         if values is not None and (name.lower() in ORDER or len(np.unique(values)) <= MOST_LABELS):
             found[name] = values
     return found
 
 
-def _whole(raw: RawMesh, name: str) -> IntArray | None:
+def _integers(raw: RawMesh, name: str) -> IntArray | None:
     """Values of an array if they are integers, one per tetrahedron."""
     values = raw.values(name)
     return whole_numbers(values, len(values))
@@ -136,7 +136,7 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
     sizes = [len(raw.blocks[i][1]) for i in raw.tetrahedra]
     members = {name: _members(parts, raw.tetrahedra, sizes) for name, parts in raw.sets.items()}
     solid: dict[str, BoolArray] = {}
-    for name, inside in sorted(members.items(), key=lambda item: _made_up(item[0])):
+    for name, inside in sorted(members.items(), key=lambda item: _is_generated(item[0])):
         # Ignore sets that repeat another under a different name.
         if inside.any() and not any((inside == other).all() for other in solid.values()):
             solid[name] = inside
@@ -158,7 +158,7 @@ def _labels_of_sets(raw: RawMesh) -> Labels:
     return Labels(values, names, tuple(notes))
 
 
-def _made_up(name: str) -> bool:
+def _is_generated(name: str) -> bool:
     """Whether gmsh generated the name of a set; the user's name of the same set is preferred."""
     return name.startswith("Volume") and name[len("Volume") :].isdecimal()
 

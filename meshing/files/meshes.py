@@ -15,8 +15,10 @@ from tetlux.meshing.files import nirfast
 from tetlux.meshing.files.gmsh import is_gmsh, read_gmsh
 from tetlux.meshing.files.gmsh_write import write_gmsh
 from tetlux.meshing.files.labels import REGION, labels_of
-from tetlux.meshing.files.raw import RawMesh
+from tetlux.meshing.files.raw import STRAIGHTENED, RawMesh
+from tetlux.meshing.files.second_order import straighten
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
+from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.tets.given import Given, make_checked_mesh
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -133,10 +135,29 @@ def _read(path: Path) -> RawMesh:
         raise InputError(f"{path} cannot be read: {error.strerror or error}.") from error
     except Exception as error:  # a damaged file can make its reader raise anything
         raise InputError(f"{path} is not a readable {suffix[1:].upper()} mesh; export it again.") from error
-    data = read_with_meshio(path, MESHIO[suffix])
+    data, straight = _read_linear(path, suffix)
     arrays = {name: list(values) for name, values in data.cell_data.items()}
     points = np.asarray(data.points, dtype=np.float64)
-    return RawMesh(points, [(block.type, block.data) for block in data.cells], arrays, sets=data.cell_sets)
+    cells = [(block.type, block.data) for block in data.cells]
+    notes = (STRAIGHTENED.format(straight),) if straight else ()
+    return RawMesh(points, cells, arrays, notes=notes, sets=data.cell_sets)
+
+
+def _read_linear(path: Path, suffix: str) -> "tuple[meshio.Mesh, int]":
+    """Read a file with meshio, second-order tetrahedra as linear ones, and return how many of these there are."""
+    try:
+        linear, count = straighten(path.read_bytes(), suffix)
+    except (OSError, ValueError):
+        count = 0
+    if count == 0:
+        return read_with_meshio(path, MESHIO[suffix]), 0
+    with scratch("mesh") as folder:
+        copy = folder / f"linear{suffix}"
+        copy.write_bytes(linear)
+        try:
+            return read_with_meshio(copy, MESHIO[suffix]), count
+        except InputError as error:
+            raise InputError(str(error).replace(str(copy), str(path))) from error
 
 
 def read_with_meshio(path: Path, file_format: str) -> "meshio.Mesh":

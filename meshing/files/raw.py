@@ -11,6 +11,7 @@ from tetlux.meshing.errors import InputError
 
 # Substrings of meshio's names of solid cells, and the names in messages.
 TETRAHEDRON = "tetra"
+STRAIGHTENED = "{:,} tetrahedra of higher order were taken by their corners, with straight edges."
 SOLIDS = {"hexahedron": "hexahedra", "wedge": "wedges", "pyramid": "pyramids", "polyhedron": "polyhedra"}
 
 
@@ -65,8 +66,7 @@ class RawMesh:
         if not chosen:
             raise InputError("it holds no tetrahedra; give a tetrahedral mesh.")
         curved = sum(len(self.blocks[i][1]) for i in chosen if self.blocks[i][1].shape[1] > 4)
-        note = f"{curved:,} tetrahedra of higher order were taken by their corners, with straight edges."
-        return np.vstack([self.blocks[i][1][:, :4] for i in chosen]), (note,) if curved else ()
+        return np.vstack([self.blocks[i][1][:, :4] for i in chosen]), (STRAIGHTENED.format(curved),) if curved else ()
 
     def values(self, name: str) -> npt.NDArray[np.generic]:
         """Values of the tetrahedra by the name of an array, (m, ...)."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.files.formats.encoding import as_utf8
 from tetlux.meshing.files.formats.obj import read_obj
 from tetlux.meshing.files.formats.off import read_off
 from tetlux.meshing.files.formats.ply import read_ply
@@ -100,7 +101,7 @@ def _load(path: Path) -> tuple[FloatArray, IntArray]:
     reader = READERS.get(path.suffix.lower())
     try:
         with quiet(), np.errstate(all="ignore"):
-            points, faces = reader(path.read_bytes()) if reader else read_scene(path)
+            points, faces = reader(as_utf8(path.read_bytes())) if reader else read_scene(path)
     except InputError as error:
         raise InputError(f"{path} {error}") from error
     if len(faces) == 0:

@@ -53,41 +53,41 @@ def group_keys(keys: npt.NDArray[np.uint64]) -> tuple[npt.NDArray[np.uint64], np
     parts = min(max(1, -(-len(keys) // KEYS_AT_ONCE)), MOST_KEY_PARTS)
     sample = np.sort(keys[:: max(1, len(keys) // (64 * parts))])
     limits = [np.uint64(0), *sample[(np.arange(1, parts) * len(sample)) // parts]]
-    found: list[tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]] = [_NO_KEYS] * parts
+    groups: list[tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]] = [_NO_KEYS] * parts
 
     def sort_part(block: slice) -> None:
         part = block.start
         inside = keys >= limits[part]
         if part + 1 < parts:
             inside &= keys < limits[part + 1]
-        found[part] = _group_part(keys, np.flatnonzero(inside), limits[part])
+        groups[part] = _group_part(keys, np.flatnonzero(inside), limits[part])
 
     run_in_blocks(sort_part, parts, 1)
-    first = np.concatenate([[0], np.cumsum([len(unique) for unique, _, _ in found])])
+    first = np.concatenate([[0], np.cumsum([len(unique) for unique, _, _ in groups])])
     inverse = np.empty(len(keys), dtype=np.int32)
 
     def place_part(block: slice) -> None:
-        _, places, rank = found[block.start]
-        inverse[places] = rank + np.int32(first[block.start])
+        _, indices, rank = groups[block.start]
+        inverse[indices] = rank + np.int32(first[block.start])
 
     run_in_blocks(place_part, parts, 1)
-    return np.concatenate([unique for unique, _, _ in found]), inverse
+    return np.concatenate([unique for unique, _, _ in groups]), inverse
 
 
 _NO_KEYS = (np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros(0, np.int32))
 
 
 def _group_part(
-    keys: npt.NDArray[np.uint64], places: IntArray, least: np.uint64
+    keys: npt.NDArray[np.uint64], indices: IntArray, least: np.uint64
 ) -> tuple[npt.NDArray[np.uint64], IntArray, npt.NDArray[np.int32]]:
-    """The unique keys at `places`, the places in ascending order of keys, and the rank of each key."""
-    if len(places) == 0:
+    """The unique keys at `indices`, the indices in ascending order of keys, and the rank of each key."""
+    if len(indices) == 0:
         return _NO_KEYS
-    key = keys[places] - least
-    count = np.uint64(len(places))
-    if int(key.max()) < (2**64 - len(places)) // len(places):
+    key = keys[indices] - least
+    count = np.uint64(len(indices))
+    if int(key.max()) < (2**64 - len(indices)) // len(indices):
         key *= count
-        key += np.arange(len(places), dtype=np.uint64)
+        key += np.arange(len(indices), dtype=np.uint64)
         key.sort()
         sorted_key = key // count
         key -= sorted_key * count
@@ -95,36 +95,36 @@ def _group_part(
     else:
         order = np.argsort(key, kind="stable")
         sorted_key = key[order]
-    new = np.empty(len(places), dtype=bool)
+    new = np.empty(len(indices), dtype=bool)
     new[0] = True
     np.not_equal(sorted_key[1:], sorted_key[:-1], out=new[1:])
     rank = np.cumsum(new, dtype=np.int32)
     rank -= 1
-    return sorted_key[new] + least, places[order], rank
+    return sorted_key[new] + least, indices[order], rank
 
 
 def find_single_keys(keys: npt.NDArray[np.uint64]) -> IntArray:
     """Indices (o,), ascending, of the keys (k,) that occur once."""
     ordered = np.sort(keys)
     differs = ordered[1:] != ordered[:-1]
-    alone = np.ones(len(keys), dtype=bool)
-    alone[1:] &= differs
-    alone[:-1] &= differs
-    single = ordered[alone]
+    is_single = np.ones(len(keys), dtype=bool)
+    is_single[1:] &= differs
+    is_single[:-1] &= differs
+    single = ordered[is_single]
     # Few keys occur once, so a table of their hashes excludes most indices before the binary search.
     table = np.zeros(1 << _HASH_BITS, dtype=bool)
     table[_hash(single)] = True
-    maybe = np.empty(len(keys), dtype=bool)
+    candidate = np.empty(len(keys), dtype=bool)
 
     def mark(block: slice) -> None:
-        maybe[block] = table[_hash(keys[block])]
+        candidate[block] = table[_hash(keys[block])]
 
     run_in_blocks(mark, len(keys), 16 * BLOCK)
-    places = np.flatnonzero(maybe)
-    found = np.searchsorted(single, keys[places])
-    known = found < len(single)
-    known[known] = single[found[known]] == keys[places[known]]
-    return places[known]
+    indices = np.flatnonzero(candidate)
+    position = np.searchsorted(single, keys[indices])
+    present = position < len(single)
+    present[present] = single[position[present]] == keys[indices[present]]
+    return indices[present]
 
 
 _HASH_BITS = 20

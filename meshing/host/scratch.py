@@ -8,13 +8,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-# Age in seconds above which an unfinished file belongs to no running process: a day.
-LONGEST_RUN = 86_400.0
+# An unfinished file older than this, seconds, belongs to no running process: a day.
+UNFINISHED_AGE = 86_400.0
 
 
 def is_abandoned(path: Path) -> bool:
     """Whether a file or folder is too old to belong to a running process."""
-    return path.stat().st_mtime < time.time() - LONGEST_RUN
+    return path.stat().st_mtime < time.time() - UNFINISHED_AGE
 
 
 @contextmanager

@@ -69,10 +69,10 @@ def check_body(mesh: TetMesh, surface: Surface, deviation: float) -> None:
             "others; leave it out, or make it larger."
         )
     part_numbers = parts_of(surface.points, surface.faces)
-    wanted = max(len(first), 0 if part_numbers is None else int(part_numbers.max()) + 1)
+    expected = max(len(first), 0 if part_numbers is None else int(part_numbers.max()) + 1)
     parts = int(bodies(len(mesh.points), mesh.tetrahedra).max()) + 1
-    if parts > wanted:
+    if parts > expected:
         raise NotTheBodyError(
-            f"{surface.name}: the mesh fell into {parts} parts where the surface has {wanted}; "
+            f"{surface.name}: the mesh fell into {parts} parts where the surface has {expected}; "
             "thicken the narrowest part."
         )

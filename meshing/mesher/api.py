@@ -142,7 +142,7 @@ def tetrahedralize(
     if deviation is None and epsilon is None:
         check_thickness(surface)
     size = surface.diagonal
-    wanted = EDGE_LENGTH * size if edge_length is None else edge_length
+    target_length = EDGE_LENGTH * size if edge_length is None else edge_length
     if deviation is None:
         # The volume of a surface that crosses itself, and so its thickness, is unknown before it is meshed.
         thickness = math.inf if surface.overlaps else 2.0 * surface.volume / surface.area
@@ -155,7 +155,7 @@ def tetrahedralize(
         key = mesh_key(
             surface,
             regions,
-            edge_length=wanted,
+            edge_length=target_length,
             deviation=deviation,
             envelope=envelope,
             stop_energy=stop_energy,
@@ -165,7 +165,7 @@ def tetrahedralize(
         cached = load_cached_mesh(key, directory, surface.unit)
         if cached is not None:
             return cached
-    mesh = _mesh_body(surface, wanted, deviation, envelope, stop_energy, time_limit, regions)
+    mesh = _mesh_body(surface, target_length, deviation, envelope, stop_energy, time_limit, regions)
     if directory is not None:
         store_cached_mesh(key, directory, mesh)
     return mesh

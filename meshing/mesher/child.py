@@ -105,7 +105,7 @@ def _module_paths() -> str:
     """Module paths for `_mesher_process`, as JSON. An editable install may know them by an import hook only."""
     spec = importlib.util.find_spec("pytetwild")
     folder = (spec.submodule_search_locations or [""])[0] if spec else ""
-    places = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
+    candidates = [*sys.path, str(Path(np.__file__).parents[1]), str(Path(folder).parent)]
     # Drop relative paths: the process has another working directory.
-    paths = [place for place in dict.fromkeys(places) if Path(place).is_absolute()]
+    paths = [path for path in dict.fromkeys(candidates) if Path(path).is_absolute()]
     return json.dumps({"paths": paths, "pytetwild": folder, "parent": os.getpid()})

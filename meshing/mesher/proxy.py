@@ -93,22 +93,22 @@ def _decimate(surface: Surface, deviation: float) -> Surface:
     """Decimate a manifold surface; the surface itself if no coarser one is close enough, closed and manifold."""
     if len(surface.faces) <= FEWEST_TRIANGLES:
         return surface
-    wanted = min(TRIANGLES_NEEDED * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
+    target = min(TRIANGLES_NEEDED * surface.area / (deviation * surface.diagonal), 0.5 * len(surface.faces))
     # Scaled to unit size about the origin, since fast-simplification's thresholds are absolute.
     origin, size = surface.points.mean(axis=0), surface.diagonal
     fine: tuple[FloatArray, IntArray] = (surface.points - origin) / size, surface.faces
     # Do most of the decimation once instead of once per attempt.
-    base = _decimate_to(*fine, int(5 * wanted)) if len(surface.faces) > 10 * wanted else fine
+    base = _decimate_to(*fine, int(5 * target)) if len(surface.faces) > 10 * target else fine
     best = surface
     for _ in range(MEASURED_PROXIES):
-        count = int(max(wanted, FEWEST_TRIANGLES))
+        count = int(max(target, FEWEST_TRIANGLES))
         if count >= 0.8 * len(best.faces):
             break
         if count > 0.6 * len(base[1]):
             base = fine
         coarse = _decimate_soundly(surface, base, count, origin, size)
         if coarse is None:
-            wanted *= 2.0
+            target *= 2.0
             continue
         distance = two_sided_distance(coarse, surface, FIRST_SAMPLES)
         if distance <= deviation:
@@ -118,7 +118,7 @@ def _decimate(surface: Surface, deviation: float) -> Surface:
             if distance > USED_DEVIATION * deviation or count <= FEWEST_TRIANGLES:
                 break
         # The distance of a chord from its arc grows with the edge squared, and so with the inverse of the count.
-        wanted = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
+        target = count * np.clip(distance / (0.8 * deviation), 0.2, 4.0)
     return best
 
 
@@ -126,7 +126,7 @@ def _decimate_soundly(
     surface: Surface, base: tuple[FloatArray, IntArray], count: int, origin: FloatArray, size: float
 ) -> Surface | None:
     """Decimate to about `count` triangles; None if no result is manifold with as many bodies as the surface."""
-    wanted = int(bodies(len(surface.points), surface.faces).max()) + 1
+    expected = int(bodies(len(surface.points), surface.faces).max()) + 1
     for attempt in range(COUNTS_TRIED):
         target = int(count * (1.0 + 0.04 * attempt))
         if target >= len(base[1]):
@@ -135,7 +135,7 @@ def _decimate_soundly(
         if len(f) < 4 or not _is_manifold(f):
             continue
         body = bodies(len(p), f)
-        if int(body.max()) + 1 != wanted or any(signed_volume(p, f[body == i]) <= 0 for i in range(wanted)):
+        if int(body.max()) + 1 != expected or any(signed_volume(p, f[body == i]) <= 0 for i in range(expected)):
             continue
         if not surface.overlaps and count_self_intersections(p, f):
             continue

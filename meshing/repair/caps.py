@@ -1,7 +1,7 @@
 """Cap a hole: triangulate its rim, refine to the density of the rim, and relax the cap like a membrane.
 
 Liepa, Filling holes in meshes, SGP 2003, with a harmonic surface in place of his thin plate. It stays within the convex
-hull of the rim, so the cap of a flat rim is flat.
+hull of the rim, so the cap of a flat rim is flat, and it does not leave a concave flat rim.
 """
 
 from collections.abc import Callable
@@ -12,16 +12,20 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.repair.merge import without_collapsed
 from tetlux.meshing.repair.topology import Edges
 
-# Longer rims are first triangulated over every k-th vertex, since time grows with the cube (.3 s at this length).
+# Of longer rims one in k vertices is triangulated first, since time grows with the cube (.3 s at this length).
 LONGEST_RIM = 300
-# Weight of squared sides relative to area. All triangulations of a flat rim have one area; this prefers compact ones.
-COMPACT = 1e-3
+# Weight of squared sides relative to area, over the squared shortest edge of the rim as a share of its extent. All
+# triangulations of a flat rim that stay within it have one area, and this prefers compact ones; with a constant weight
+# of 1e-3, triangles leave the rim at concave corners.
+COMPACT = 0.01
 # Triangles are split until their sides are this many rim edges long (Liepa's alpha).
 DENSITY = 2.0
 # Rounds of splitting and flipping; each at least halves the lengths.
 ROUNDS = 12
 # Largest number of triangles of one cap. A rim of n edges needs about n squared / 10.
 MOST = 20_000
+# Triangles without area may count as turned over by this share of the cap's area.
+ROUNDING = 1e-12
 # Gain (e,) of flipping the edge a-b of triangles abc and bad, from their corners (e, 3).
 Gain = Callable[[FloatArray, FloatArray, FloatArray, FloatArray], FloatArray]
 
@@ -49,7 +53,7 @@ def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, Int
     names, place = np.unique(loop, return_inverse=True)
     faces, rim = without_collapsed(place.reshape(-1)[faces])[0], points[names]
     inner, faces = _refine(rim, _spacing(points, loop, names), faces) if len(loop) > 4 else (rim[:0], faces)
-    inner = _membrane(rim, inner, faces)
+    inner = _relax(rim, inner, faces)
     return inner, np.concatenate([names, first + np.arange(len(inner))])[faces]
 
 
@@ -68,9 +72,9 @@ def triangulate_polygon(corners: FloatArray) -> IntArray:
     count = len(corners)
     if count <= LONGEST_RIM:
         return _least_area(corners)
-    coarse = np.arange(0, count, -(-count // LONGEST_RIM))
+    coarse = _sharpest(corners, -(-count // LONGEST_RIM))
     parts = [coarse[_least_area(corners[coarse])]]
-    for start, end in zip(coarse, [*coarse[1:], count], strict=True):
+    for start, end in zip(coarse, [*coarse[1:], coarse[0] + count], strict=True):
         if end - start > 1:
             chain = np.arange(start, end + 1) % count
             parts.append(chain[_least_area(corners[chain])])
@@ -83,12 +87,23 @@ def triangulate_polygon(corners: FloatArray) -> IntArray:
     return faces
 
 
+def _sharpest(corners: FloatArray, step: int) -> IntArray:
+    """The sharpest of each `step` consecutive vertices of a polygon (k, 3), so that corners are among them."""
+    ahead = np.roll(corners, -1, axis=0) - corners
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), np.finfo(float).tiny)
+    straight = np.round(np.einsum("ij,ij->i", ahead, np.roll(ahead, 1, axis=0)), 9)
+    starts = range(0, len(corners), step)
+    return np.array([start + int(straight[start : start + step].argmin()) for start in starts])
+
+
 def _least_area(corners: FloatArray) -> IntArray:
     """Triangulate by dynamic programming (Barequet & Sharir 1995) over all chains of one length at a time."""
     count = len(corners)
     if count == 3:
         return np.arange(3).reshape(1, 3)
     squares = ((corners[:, None] - corners) ** 2).sum(axis=2)
+    edges = np.append(squares[np.arange(count - 1), np.arange(1, count)], squares[0, -1])
+    compact = COMPACT * edges.min(initial=np.inf, where=edges > 0) / squares.max()
     best = np.zeros((count, count))
     apex = np.zeros((count, count), dtype=np.int64)
     for gap in range(2, count):
@@ -98,7 +113,7 @@ def _least_area(corners: FloatArray) -> IntArray:
         a, b, c = squares[i, k], squares[k, j], squares[i, j]
         # Heron's formula in squared sides; cross products take three times as long.
         area = 0.25 * np.sqrt(np.maximum(4.0 * a * b - (a + b - c) ** 2, 0.0))
-        weight = best[i, k] + best[k, j] + area + COMPACT * (a + b + c)
+        weight = best[i, k] + best[k, j] + area + compact * (a + b + c)
         least = weight.argmin(axis=1)
         rows = i[:, 0]
         best[rows, rows + gap] = weight[rows, least]
@@ -182,6 +197,22 @@ def _area_saved(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> F
 
     before, after = area(a, b, c) + area(a, b, d), area(a, c, d) + area(b, c, d)
     return before * (1.0 - 1e-9) - after
+
+
+def _relax(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:
+    """Move the inner vertices of a cap onto a membrane.
+
+    If no triangle overlaps another, seen along the mean normal, they move along that normal only, so that none ever
+    does: by a membrane in all directions, triangles would fold over at concave corners of the rim (Tutte 1963).
+    """
+    moved = _membrane(rim, inner, faces)
+    corners = np.vstack([rim, inner])[faces]
+    vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = vectors.sum(axis=0)
+    if (vectors @ normal < -ROUNDING * (normal @ normal)).any():
+        return moved
+    normal /= np.linalg.norm(normal)
+    return np.asarray(inner + ((moved - inner) @ normal)[:, None] * normal)
 
 
 def _membrane(rim: FloatArray, inner: FloatArray, faces: IntArray) -> FloatArray:

@@ -24,7 +24,7 @@ def wind_consistently(faces: IntArray, name: str, repairs: list[str]) -> IntArra
     edges = Edges(faces)
     if edges.consistent:
         return faces
-    turned = _to_flip(edges, len(faces))
+    turned = flips_of(edges, len(faces))
     if turned is None:
         raise InputError(f"{name}: the surface has no inside and outside (like a Klein bottle); repair it.")
     repairs.append("made the winding of the triangles consistent.")
@@ -92,7 +92,7 @@ def _inner_bodies(points: FloatArray, parts: list[IntArray], inward: BoolArray, 
     return inner
 
 
-def _to_flip(edges: Edges, count: int) -> BoolArray | None:
+def flips_of(edges: Edges, count: int) -> BoolArray | None:
     """Triangles to flip, (m,), for a consistent orientation; None if there is none.
 
     A graph has two nodes per triangle, one for each orientation, and links consistent orientations of neighbours. If

@@ -14,6 +14,7 @@ from tetlux.meshing.repair.merge import MERGE_TOLERANCE, merge_vertices, single_
 from tetlux.meshing.repair.orient import face_outward, wind_consistently
 from tetlux.meshing.repair.pinches import mend_parts
 from tetlux.meshing.repair.seams import stitch
+from tetlux.meshing.repair.sides import drop_second_sides
 from tetlux.meshing.repair.specks import drop_specks
 from tetlux.meshing.repair.topology import Edges, bodies, compact
 from tetlux.meshing.resolution import FLAT
@@ -119,6 +120,7 @@ def _connect(
 ) -> tuple[FloatArray, IntArray]:
     """Merge vertices, stitch seams and remove duplicate triangles."""
     points, faces = merge_vertices(points, faces, repairs)
+    points, faces = drop_second_sides(points, faces, repairs)
     points, faces = compact(points, single_faces(points, faces, repairs))
     _check_solid(points, faces, name, rounding, least=1)
     return stitch(points, faces, repairs)

@@ -213,10 +213,12 @@ def _merge_nodes(given: _Tetrahedra) -> _Tetrahedra:
     if len(pairs) == 0:
         return given
     size = len(points)
-    _, place = connected_components(coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size)), directed=False)
-    _, first = np.unique(place, return_index=True)
-    repair = f"{size - len(first):,} nodes that lie where another one does were joined with it."
-    vertices, corners, nodes = _drop_unused(points[first], place[corners].astype(np.int64), given.nodes[first])
+    _, group = connected_components(coo_array((np.ones(len(pairs)), pairs.T), shape=(size, size)), directed=False)
+    _, representatives = np.unique(group, return_index=True)
+    repair = f"{size - len(representatives):,} nodes that lie where another one does were joined with it."
+    vertices, corners, nodes = _drop_unused(
+        points[representatives], group[corners].astype(np.int64), given.nodes[representatives]
+    )
     return replace(given, points=vertices, corners=corners, nodes=nodes, repairs=(*given.repairs, repair))
 
 
@@ -225,9 +227,9 @@ def _remove_flat(given: _Tetrahedra) -> _Tetrahedra:
     volumes = np.abs(tetrahedron_volumes(points, corners))
     sizes = np.ptp(points[corners], axis=1).max(axis=1)
     flat = volumes <= FLAT_VOLUME * sizes**3
-    found = given.select(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
-    vertices, corners, nodes = _drop_unused(found.points, found.corners, found.nodes)
-    return replace(found, points=vertices, corners=corners, nodes=nodes)
+    remaining = given.select(~flat, f"{flat.sum():,} tetrahedra without volume were left out.")
+    vertices, corners, nodes = _drop_unused(remaining.points, remaining.corners, remaining.nodes)
+    return replace(remaining, points=vertices, corners=corners, nodes=nodes)
 
 
 def _reorient(given: _Tetrahedra) -> _Tetrahedra:
@@ -247,17 +249,17 @@ def _remove_copies(given: _Tetrahedra, regions: IntArray | None) -> _Tetrahedra:
     if not count_doubly_covered_faces(given.corners, len(given.points)):
         return given
     labels = np.zeros(len(given.corners), dtype=np.int64) if regions is None else regions[given.cells]
-    _, kind, sizes = np.unique(labels, return_inverse=True, return_counts=True)
-    order = np.argsort(sizes[kind.reshape(-1)], kind="stable")
+    _, label_index, sizes = np.unique(labels, return_inverse=True, return_counts=True)
+    order = np.argsort(sizes[label_index.reshape(-1)], kind="stable")
     chosen, of_kind = distinct_rows(np.sort(given.corners[order], axis=1))
     kept = np.zeros(len(given.corners), dtype=bool)
     kept[order[chosen]] = True
     copies = int((~kept).sum())
-    alike = (labels[order] == labels[order[chosen]][of_kind]).all()
-    which = "as the first of each" if alike else "with the rarer label"
-    found = given.select(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
-    check_overlap(found.corners, len(found.points))
-    return found
+    same_label = (labels[order] == labels[order[chosen]][of_kind]).all()
+    which = "as the first of each" if same_label else "with the rarer label"
+    remaining = given.select(kept, f"{copies:,} tetrahedra that are given more than once were counted once, {which}.")
+    check_overlap(remaining.corners, len(remaining.points))
+    return remaining
 
 
 def whole_numbers(values: npt.ArrayLike, count: int) -> IntArray | None:

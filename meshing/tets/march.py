@@ -76,21 +76,21 @@ def _trace_cached(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterator
     """Trace the lines (7, p) that are not cached; yield indices of lines with their paths."""
     keys, unknown = hash_lines(lines), np.arange(len(cells))
     for part in list(mesh.cache.paths.parts):
-        places = part.find(keys[unknown], lines[:, unknown], cells[unknown])
-        found = places >= 0
+        cached = part.find(keys[unknown], lines[:, unknown], cells[unknown])
+        found = cached >= 0
         if not found.any():
             continue
-        some, places, unknown = unknown[found], places[found], unknown[~found]
-        wanted = lines[6, some]
-        short = (wanted > part.lines[6, places]) & ~part.lost[places]
-        whole = part
-        if short.any():
-            further = places[short]
-            whole = part.extend(
-                _trace(mesh, lines[:, some[short]], part.ends[further], part.lines[6, further]), further
+        some, cached, unknown = unknown[found], cached[found], unknown[~found]
+        lengths = lines[6, some]
+        too_short = (lengths > part.lines[6, cached]) & ~part.lost[cached]
+        traced = part
+        if too_short.any():
+            further = cached[too_short]
+            traced = part.extend(
+                _trace(mesh, lines[:, some[too_short]], part.ends[further], part.lines[6, further]), further
             )
-            mesh.cache.paths.add(whole, instead=part)
-        yield some, whole.select(places).shorten(wanted)
+            mesh.cache.paths.add(traced, instead=part)
+        yield some, traced.select(cached).shorten(lengths)
     for some, part in _trace_portions(mesh, lines[:, unknown], cells[unknown]):
         mesh.cache.paths.add(part)
         yield unknown[some], part
@@ -105,7 +105,7 @@ def _trace_portions(mesh: TetMesh, lines: FloatArray, cells: IntArray) -> Iterat
 
 def _trace(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArray) -> TracedPaths:
     """Trace lines (7, p), each from a distance `reached` along it, in the tetrahedron of `cells`, (p,) each."""
-    coordinates, whole, ends = np.ascontiguousarray(mesh.points.T), lines, cells.copy()
+    coordinates, all_lines, ends = np.ascontiguousarray(mesh.points.T), lines, cells.copy()
     lost = np.zeros(len(cells), dtype=bool)
     # For each unfinished path: its index and its number of steps without progress.
     paths, stalls = np.arange(len(lost)), np.zeros(len(lost), dtype=np.int64)
@@ -135,15 +135,15 @@ def _trace(mesh: TetMesh, lines: FloatArray, cells: IntArray, reached: FloatArra
     every = [np.concatenate(column, axis=-1) for column in zip(*parts, strict=True)]
     owners, passed, enter, leave, weights, changes = _select(~lost[every[0]], *every)
     segments = PathSegments(owners, passed, enter, leave, weights.T, changes.T)
-    return TracedPaths(whole, begin, ends, lost, segments)
+    return TracedPaths(all_lines, begin, ends, lost, segments)
 
 
 def _select(chosen: BoolArray, *arrays: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
     """The chosen entries of each array along its last axis."""
     if chosen.all():
         return list(arrays)
-    places = np.flatnonzero(chosen)
-    return [array.take(places, axis=-1) for array in arrays]
+    indices = np.flatnonzero(chosen)
+    return [array.take(indices, axis=-1) for array in arrays]
 
 
 def _coordinates(

@@ -105,20 +105,20 @@ def _check_inside_body(inner: Surface, body: Surface, name: str, body_name: str,
     """Refuse an inner surface that is not inside the body; whether it touches the body's surface."""
     if inner.unit != body.unit:
         raise InputError(f"{name} is in {inner.unit} and the body in {body.unit}; give both in one unit.")
-    place = _find_crossing(inner, body, near)
+    crossing = _find_crossing(inner, body, near)
     sides = _locate_sides(inner, body, near)
-    if place is None and len(sides.inside) == 0:
+    if crossing is None and len(sides.inside) == 0:
         raise InputError(f"{name} is the whole body; give its medium to the body and leave it out.")
-    if place is None and not sides.inside.any():
+    if crossing is None and not sides.inside.any():
         around = as_text(inner.points.mean(axis=0), near / TOUCH_DISTANCE)
         if _locate_sides(body, inner, near).inside.any():
             raise InputError(f"{name} holds {body_name} and not the other way round; exchange or shrink it.")
         raise InputError(f"{name} lies outside {body_name}, around {around}; move it inside, or leave it out.")
-    if place is None and not sides.inside.all():
-        place = sides.points[~sides.inside][0]
-    if place is not None:
+    if crossing is None and not sides.inside.all():
+        crossing = sides.points[~sides.inside][0]
+    if crossing is not None:
         raise InputError(
-            f"{name} crosses the surface of {body_name} around {as_text(place, near / TOUCH_DISTANCE)}; "
+            f"{name} crosses the surface of {body_name} around {as_text(crossing, near / TOUCH_DISTANCE)}; "
             "move or shrink it until it lies inside."
         )
     return sides.touches or bool(are_on_surface(body.points, inner, near).any())
@@ -128,16 +128,16 @@ def _compare_pair(
     first: Surface, second: Surface, name: str, other_name: str, near: float
 ) -> tuple["_Sides", "_Sides"]:
     """Compare two inner surfaces: the sides of each relative to the other; an error if they cross or are equal."""
-    place = _find_crossing(first, second, near)
+    crossing = _find_crossing(first, second, near)
     one, other = _locate_sides(first, second, near), _locate_sides(second, first, near)
-    if place is None and 0 in (len(one.inside), len(other.inside)):
+    if crossing is None and 0 in (len(one.inside), len(other.inside)):
         raise InputError(f"{name} and {other_name} are the same surface; leave one of them out.")
     for sides in (one, other):
-        if place is None and sides.inside.any() and not sides.inside.all():
-            place = sides.points[sides.inside][0]
-    if place is not None:
+        if crossing is None and sides.inside.any() and not sides.inside.all():
+            crossing = sides.points[sides.inside][0]
+    if crossing is not None:
         raise InputError(
-            f"{name} and {other_name} cross each other around {as_text(place, near / TOUCH_DISTANCE)}; "
+            f"{name} and {other_name} cross each other around {as_text(crossing, near / TOUCH_DISTANCE)}; "
             "move them apart, or put one wholly inside the other."
         )
     return one, other
@@ -168,9 +168,9 @@ def _find_crossing(first: Surface, second: Surface, near: float) -> FloatArray |
     for i, j in overlapping_boxes(corners.min(axis=1), corners.max(axis=1)):
         mixed = (i < count) != (j < count)
         for face, other in ((i[mixed], j[mixed]), (j[mixed], i[mixed])):
-            place = _find_pierced(corners[face], corners[other], near)
-            if place is not None:
-                return place
+            crossing = _find_pierced(corners[face], corners[other], near)
+            if crossing is not None:
+                return crossing
     return None
 
 
@@ -210,20 +210,22 @@ def _locate_sides(first: Surface, second: Surface, near: float) -> _Sides:
 
     Surfaces that do not cross change sides only where they touch, so a few sample points per connected part suffice.
     """
-    on = are_on_surface(first.points, second, near)
+    touching = are_on_surface(first.points, second, near)
     ends = np.concatenate([first.faces[:, [0, 1]], first.faces[:, [1, 2]], first.faces[:, [2, 0]]])
-    ends = ends[~on[ends].any(axis=1)]
+    ends = ends[~touching[ends].any(axis=1)]
     size = len(first.points)
     part = connected_components(coo_array((np.ones(len(ends)), ends.T), shape=(size, size)), directed=False)[1]
-    free = np.flatnonzero(~on)
+    free = np.flatnonzero(~touching)
     order = free[np.argsort(part[free], kind="stable")]
     starts = np.flatnonzero(np.diff(part[order], prepend=-1))
-    each = max(1, SIDE_SAMPLES // max(len(starts), 1))
-    chosen = np.concatenate([those[spread_indices(len(those), each)] for those in np.split(order, starts[1:])])
-    middles = first.points[first.faces[on[first.faces].any(axis=1)]].mean(axis=1)
+    samples_per_part = max(1, SIDE_SAMPLES // max(len(starts), 1))
+    chosen = np.concatenate(
+        [members[spread_indices(len(members), samples_per_part)] for members in np.split(order, starts[1:])]
+    )
+    middles = first.points[first.faces[touching[first.faces].any(axis=1)]].mean(axis=1)
     middles = middles[spread_indices(len(middles), SIDE_SAMPLES)]
     points = np.concatenate([first.points[chosen], middles[~are_on_surface(middles, second, near)]])
-    return _Sides(points, second.contains(points), bool(on.any()))
+    return _Sides(points, second.contains(points), bool(touching.any()))
 
 
 def are_on_surface(points: FloatArray, surface: Surface, near: float) -> BoolArray:

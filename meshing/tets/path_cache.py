@@ -52,40 +52,46 @@ class TracedPaths:
 
         Lengths may differ. Of several equal lines, only one is found.
         """
-        known, order = self._by_key
-        places = np.minimum(np.searchsorted(known, keys), len(order) - 1)
-        alike = np.flatnonzero(known[places] == keys)
+        ascending, order = self._by_key
+        candidates = np.minimum(np.searchsorted(ascending, keys), len(order) - 1)
+        queries = np.flatnonzero(ascending[candidates] == keys)
         found = np.full(len(keys), -1)
-        if len(alike) == 0:
+        if len(queries) == 0:
             return found
-        places = order[places[alike]]
-        same = (self.lines[:6, places] == lines[:6, alike]).all(axis=0) & (self.cells[places] == cells[alike])
-        places, alike = places[same], alike[same]
-        one = np.empty(len(order), dtype=np.int64)
-        one[places] = alike
-        first = one[places] == alike
-        found[alike[first]] = places[first]
+        candidates = order[candidates[queries]]
+        same = (self.lines[:6, candidates] == lines[:6, queries]).all(axis=0) & (
+            self.cells[candidates] == cells[queries]
+        )
+        candidates, queries = candidates[same], queries[same]
+        query_of = np.empty(len(order), dtype=np.int64)
+        query_of[candidates] = queries
+        unique = query_of[candidates] == queries
+        found[queries[unique]] = candidates[unique]
         return found
 
-    def select(self, places: IntArray) -> "TracedPaths":
+    def select(self, indices: IntArray) -> "TracedPaths":
         """The paths of given indices, in that order."""
-        if np.array_equal(places, np.arange(len(self.cells))):
+        if np.array_equal(indices, np.arange(len(self.cells))):
             return self
         number = np.full(len(self.cells), -1)
-        number[places] = np.arange(len(places))
+        number[indices] = np.arange(len(indices))
         numbers = number[self.segments.paths]
         segments = select_segments(replace(self.segments, paths=numbers), numbers >= 0)
-        return TracedPaths(self.lines[:, places], self.cells[places], self.ends[places], self.lost[places], segments)
+        return TracedPaths(
+            self.lines[:, indices], self.cells[indices], self.ends[indices], self.lost[indices], segments
+        )
 
     def shorten(self, lengths: FloatArray) -> "TracedPaths":
         """The paths cut off at lengths (p,); `ends` is not valid for the shortened paths."""
         if (self.lines[6] <= lengths).all():
             return self
-        every = self.segments
-        longest = lengths[every.paths]
+        segments = self.segments
+        limits = lengths[segments.paths]
         return replace(
             self,
-            segments=select_segments(replace(every, leave=np.minimum(every.leave, longest)), every.enter < longest),
+            segments=select_segments(
+                replace(segments, leave=np.minimum(segments.leave, limits)), segments.enter < limits
+            ),
         )
 
     def extend(self, more: "TracedPaths", further: IntArray) -> "TracedPaths":
@@ -106,19 +112,19 @@ class TracedPaths:
     __repr__ = one_line
 
 
-def select_segments(every: PathSegments, chosen: BoolArray) -> PathSegments:
+def select_segments(segments: PathSegments, chosen: BoolArray) -> PathSegments:
     """The chosen segments."""
     if chosen.all():
-        return every
-    places = np.flatnonzero(chosen)
+        return segments
+    indices = np.flatnonzero(chosen)
     return PathSegments(
-        every.paths[places],
-        every.cells[places],
-        every.enter[places],
-        every.leave[places],
+        segments.paths[indices],
+        segments.cells[indices],
+        segments.enter[indices],
+        segments.leave[indices],
         # Selected corner by corner, the memory order in which paths are traced.
-        every.weights.T.take(places, axis=1).T,
-        every.slopes.T.take(places, axis=1).T,
+        segments.weights.T.take(indices, axis=1).T,
+        segments.slopes.T.take(indices, axis=1).T,
     )
 
 

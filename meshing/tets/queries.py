@@ -35,8 +35,8 @@ class BoundaryQueries:
 
     def distances(self, surface: Surface, faces: IntArray) -> FloatArray:
         """Distance of the centroids of boundary triangles (q,) from a surface, (q,); each is computed once."""
-        known = self._distances.setdefault(surface, np.full(len(self._faces), np.nan))
-        new = faces[np.isnan(known[faces])]
-        middles = self._points[self._faces[new]].mean(axis=1)
-        known[new] = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
-        return np.asarray(known[faces])
+        cached = self._distances.setdefault(surface, np.full(len(self._faces), np.nan))
+        missing = faces[np.isnan(cached[faces])]
+        middles = self._points[self._faces[missing]].mean(axis=1)
+        cached[missing] = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
+        return np.asarray(cached[faces])

@@ -17,6 +17,8 @@ from tetlux.meshing.tets.topology import EDGES, EDGES_OF_FACES
 # share of its quality or a quality above the second value (or its old quality, if that is lower).
 SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
+# A part is split often enough if its volume is at most this many times what halving makes of it.
+FULLY_SPLIT = 1.5
 # A node on two surfaces is projected on each in turn, this many times: the projections converge to their intersection.
 PROJECTION_ROUNDS = 10
 # The edges of a tetrahedron, and of each of its faces.
@@ -52,13 +54,48 @@ def refine(
     InputError
         If `mesh` has more regions than there are inner surfaces, unless there are none.
     """
+    return _refine(mesh, marked, surface, regions)[0]
+
+
+def refine_often(mesh: TetMesh, splits: IntArray, surface: Surface, regions: Sequence[Surface], most: int) -> TetMesh:
+    """Bisect each tetrahedron and its parts several times.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    splits : (m,) ndarray of int
+        How often: 1 halves the tetrahedron, 2 its halves too.
+    surface, regions
+        As in `refine`.
+    most : int
+        Number of tetrahedra at which it stops.
+
+    Returns
+    -------
+    TetMesh
+    """
+    left, volumes = splits, mesh.volumes * 0.5**splits
+    while (left > 0).any():
+        mesh, parents = _refine(mesh, left > 0, surface, regions)
+        if len(mesh.tetrahedra) > most:
+            break
+        left, volumes = left[parents] - 1, volumes[parents]
+        # Neighbours have split some of them already.
+        left[mesh.volumes < FULLY_SPLIT * volumes] = 0
+    return mesh
+
+
+def _refine(
+    mesh: TetMesh, marked: BoolArray, surface: Surface | None, regions: Sequence[Surface]
+) -> tuple[TetMesh, IntArray]:
+    """The refined mesh, and the tetrahedron that each of its tetrahedra is a part of, (m,)."""
     points, tetrahedra, parents = _bisect(mesh, marked)
     fine = TetMesh(points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
     if mesh.regions.any():
         fine = replace(fine, regions=mesh.regions[parents])
     if surface is None:
-        return fine
-    return move_to_surface(fine, surface, regions, first=len(mesh.points))
+        return fine, parents
+    return move_to_surface(fine, surface, regions, first=len(mesh.points)), parents
 
 
 def _bisect(mesh: TetMesh, marked: BoolArray) -> tuple[FloatArray, IntArray, IntArray]:

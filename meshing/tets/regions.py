@@ -39,10 +39,10 @@ def owners(pairs: IntArray, regions: Sequence[Surface]) -> IntArray:
 
 def region_at(points: FloatArray, regions: Sequence[Surface]) -> IntArray:
     """The region of each point (q, 3) of a body, (q,)."""
-    found = np.zeros(len(points), dtype=np.int64)
+    result = np.zeros(len(points), dtype=np.int64)
     for region in sort_by_volume(regions):
-        found[regions[region - 1].contains(points)] = region
-    return found
+        result[regions[region - 1].contains(points)] = region
+    return result
 
 
 def surface_nodes(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -> list[tuple[Surface, BoolArray]]:
@@ -67,18 +67,18 @@ def surface_nodes(mesh: TetMesh, surface: Surface, regions: Sequence[Surface]) -
         )
     order = [0, *sort_by_volume(regions)]
     owner = owners(pairs, regions)
-    found = []
+    surfaces = []
     for i in order[:0:-1]:
         mask = np.zeros(len(mesh.points), dtype=bool)
         mask[faces[owner == i]] = True
-        found.append((regions[i - 1], mask))
-    if (np.sum([boundary, *(mask for _, mask in found)], axis=0) > 1).any():
+        surfaces.append((regions[i - 1], mask))
+    if (np.sum([boundary, *(mask for _, mask in surfaces)], axis=0) > 1).any():
         # Where surfaces touch, the triangles belong to the body's surface or else to the smaller one.
-        found = [
-            (_part_off(inner, (surface, *(smaller for smaller, _ in found[:k]))), mask)
-            for k, (inner, mask) in enumerate(found)
+        surfaces = [
+            (_part_off(inner, (surface, *(smaller for smaller, _ in surfaces[:k]))), mask)
+            for k, (inner, mask) in enumerate(surfaces)
         ]
-    return [*found, (surface, boundary)]
+    return [*surfaces, (surface, boundary)]
 
 
 @lru_cache(maxsize=16)  # each refinement needs it again

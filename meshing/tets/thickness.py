@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, perpendicular_axes
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Number of rays at 45 degrees around the inward normal.
@@ -23,9 +23,7 @@ def thickness(mesh: TetMesh) -> FloatArray:
         Thickness, unit.
     """
     inward = -mesh.surface.normals
-    first = np.cross(inward, np.eye(3)[np.abs(inward).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    second = np.cross(inward, first)
+    first, second = perpendicular_axes(inward)
     turns = 2.0 * np.pi * np.arange(SLANTED_RAYS) / SLANTED_RAYS
     slanted = inward + np.cos(turns)[:, None, None] * first + np.sin(turns)[:, None, None] * second
     rays = np.concatenate([inward[None], slanted / np.sqrt(2.0)])

@@ -107,8 +107,8 @@ def find_shared_faces(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntAr
 
 def find_boundary(tetrahedra: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """Find the faces of only one tetrahedron: ``4 tetrahedron + face`` (f,), and their corners (f, 3)."""
-    places = find_single_keys(face_keys(tetrahedra, nodes))
-    return places, tetrahedra[places[:, None] // 4, FACES[places % 4]]
+    faces = find_single_keys(face_keys(tetrahedra, nodes))
+    return faces, tetrahedra[faces[:, None] // 4, FACES[faces % 4]]
 
 
 def find_interfaces(tetrahedra: IntArray, regions: IntArray, nodes: int) -> tuple[IntArray, IntArray, IntArray]:

@@ -1,8 +1,7 @@
 """All malformed inputs, each put through the command line."""
 
+import contextlib
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Collection, Iterator
@@ -11,6 +10,7 @@ from pathlib import Path
 import yaml
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
+from tests.elsewhere import start_elsewhere
 from tests.fuzz.case_files import case_files, companions, traps
 from tests.fuzz.outcome import Outcome, complaint, outcome_of
 from tests.fuzz.surfaces import Malformed, surfaces
@@ -39,6 +39,10 @@ def check_made(folder: Path, count: int, number: int = 0) -> Iterator[Outcome]:
         yield _within_the_folder(outcome_of(f"made: {content!r}", ["check", str(path)]), path)
 
 
+class EnoughError(Exception):
+    """So many inputs are made as were asked for."""
+
+
 def made(count: int, number: int = 0) -> list[bytes]:
     """So many different case files, the same for a seed."""
     found: dict[bytes, None] = {}
@@ -54,11 +58,13 @@ def made(count: int, number: int = 0) -> list[bytes]:
     )
     @given(case_files())
     def collect(content: bytes) -> None:
-        if len(found) < count:
-            found[content] = None
+        found[content] = None
+        if len(found) >= count:
+            raise EnoughError
 
-    collect()
-    return list(found)
+    with contextlib.suppress(EnoughError):
+        collect()
+    return list(found)[:count]
 
 
 def _within_the_folder(outcome: Outcome, path: Path) -> Outcome:
@@ -117,15 +123,16 @@ def run_surfaces(folder: Path, limit: float, names: Collection[str] = ()) -> Ite
             continue
         name = f"run: {malformed.name}"
         started = time.perf_counter()
-        command = [sys.executable, "-m", "tetlux.cases", "run", str(path), "--out", str(folder / "out"), "--no-cache"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
-        except subprocess.TimeoutExpired:
+        process = start_elsewhere(["run", str(path), "--out", str(folder / "out"), "--no-cache"], folder)
+        process.join(limit)
+        if process.is_alive():
+            process.kill()
             yield Outcome(name, None, "", f"took more than {limit:g} s", limit)
             continue
-        violation = complaint(done.returncode, done.stdout, done.stderr, (0, 1))
-        words = done.stderr if done.returncode else done.stdout
-        yield Outcome(name, done.returncode, words.strip(), violation, time.perf_counter() - started)
+        printed, complaints = ((folder / stream).read_text(encoding="utf-8") for stream in ("stdout", "stderr"))
+        violation = complaint(process.exitcode, printed, complaints, (0, 1))
+        words = complaints if process.exitcode else printed
+        yield Outcome(name, process.exitcode, words.strip(), violation, time.perf_counter() - started)
 
 
 def check_volumes(folder: Path) -> Iterator[Outcome]:

@@ -14,7 +14,7 @@ import numpy as np
 from tetlux.fem import Medium
 from tetlux.fem.exact import half_space, monte_carlo, slab_plane, sphere, sphere_light
 from tetlux.fem.exact.beam import Source
-from tetlux.fem.exact.monte_carlo import Estimate
+from tetlux.fem.exact.monte_carlo import SampleMean
 from tetlux.fem.exact.numerics.bessel import SPHERICAL, inner_ratios, wall_rates
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import composite_rule, graded_rule
@@ -52,17 +52,17 @@ def head(*cells: str) -> None:
     row(*["---"] * len(cells))
 
 
-def ratio(model: float, truth: Estimate) -> str:
+def ratio(model: float, truth: SampleMean) -> str:
     if truth.standard_error > BLURRED * truth.value or truth.value == 0.0:
         return "-"
     return f"{model / truth.value:.3f}"
 
 
-def ratios(models: list[float], truths: list[Estimate]) -> list[str]:
+def ratios(models: list[float], truths: list[SampleMean]) -> list[str]:
     return [ratio(model, truth) for model, truth in zip(models, truths, strict=True)]
 
 
-def blur(truth: Estimate) -> str:
+def blur(truth: SampleMean) -> str:
     return f"{100.0 * truth.standard_error / truth.value:.2f} %" if truth.value else "-"
 
 
@@ -79,10 +79,10 @@ def bin_means(exitance: Exitance, bins: Bins) -> FloatArray:
     return np.asarray(np.array(integrals) / (np.cos(lows) - np.cos(highs)))
 
 
-def estimates_of(run: monte_carlo.SphereResult, bins: Bins) -> list[Estimate]:
+def estimates_of(run: monte_carlo.SphereResult, bins: Bins) -> list[SampleMean]:
     """What Monte Carlo found in each bin, and the whole."""
     where = [int(np.argmin(np.abs(run.edges - math.radians(low)))) for low, _ in bins]
-    return [Estimate(run.exitance[i], run.standard_error[i]) for i in where] + [run.exited]
+    return [SampleMean(run.exitance[i], run.standard_error[i]) for i in where] + [run.exited]
 
 
 def pencil_on_a_ball(title: str, medium: Medium, radius: float, photons: int) -> None:
@@ -156,7 +156,7 @@ def beam_on_a_slab(photons: int) -> None:
                     # Little light comes through where much is absorbed, and that run is short.
                     count = photons * (1 if albedo > 0.95 else 3)
                     truth = monte_carlo.slab(medium, thickness=thickness, light="beam", photons=count)
-                    passed = Estimate(
+                    passed = SampleMean(
                         truth.transmittance.value + truth.ballistic.value,
                         math.hypot(truth.transmittance.standard_error, truth.ballistic.standard_error),
                     )

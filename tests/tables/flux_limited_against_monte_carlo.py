@@ -50,7 +50,7 @@ from tests.tables.diffusion_against_monte_carlo import entered, head, medium_of,
 from tetlux.fem import Medium, PencilBeam
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import monte_carlo
-from tetlux.fem.exact.monte_carlo import Estimate
+from tetlux.fem.exact.monte_carlo import SampleMean
 from tetlux.fem.grading import grade_mesh, places_to_resolve
 from tetlux.fem.linear.solver import solver_for
 from tetlux.fem.media.coefficients import coefficients_of
@@ -126,12 +126,12 @@ def slab(model: Model, medium: Medium, thickness: float) -> tuple[float, float]:
     load[:-1] -= forward
     corners = np.full(CELLS + 1, step)
     corners[[0, -1]] *= 0.5
-    escape = 0.5 / medium.boundary_factor
+    robin = 0.5 / medium.boundary_factor
 
     def solved(diffusion: FloatArray) -> Solved:
         bands = np.zeros((3, CELLS + 1))
         bands[1] = medium.sigma_a * corners
-        bands[1, [0, -1]] += escape
+        bands[1, [0, -1]] += robin
         bands[1, 1:] += diffusion / step
         bands[1, :-1] += diffusion / step
         bands[0, 1:] = bands[2, :-1] = -diffusion / step
@@ -139,7 +139,7 @@ def slab(model: Model, medium: Medium, thickness: float) -> tuple[float, float]:
         return fluence, 0.5 * (fluence[1:] + fluence[:-1]), np.abs(np.diff(fluence)) / step
 
     fluence = iterated(model, medium, scattered / step, SLAB_STEPS, solved)
-    return escape * float(fluence[0]), escape * float(fluence[-1])
+    return robin * float(fluence[0]), robin * float(fluence[-1])
 
 
 def wide_beams(photons: int) -> None:
@@ -166,7 +166,7 @@ def pencils(photons: int) -> None:
     for albedo, eta, g, radius in BALLS:
         medium, edges = medium_of(albedo, g, eta), np.radians(degrees)
         run = monte_carlo.sphere(medium, radius=radius, light="pencil", edges=edges, photons=photons)
-        truth = [Estimate(*pair) for pair in zip(run.exitance, run.standard_error, strict=True)]
+        truth = [SampleMean(*pair) for pair in zip(run.exitance, run.standard_error, strict=True)]
         for model, exitance in zip(MODELS, exitances_of_ball(medium, radius, edges), strict=True):
             row(*(f"{value:g}" for value in (albedo, eta, g, radius)), model, *ratios(exitance.tolist(), truth))
 
@@ -178,12 +178,12 @@ def exitances_of_ball(medium: Medium, radius: float, edges: FloatArray) -> list[
     mesh = tetrahedralize(surface, edge_length=radius / 9.0)
     mesh = grade_mesh(mesh, surface, *places_to_resolve([deposit]), 200_000, longest=0.35)
     load = load_vector(mesh, coefficients_of(medium), deposit.terms)
-    assembly, escape = Assembly(mesh), 0.5 / medium.boundary_factor
+    assembly, robin = Assembly(mesh), 0.5 / medium.boundary_factor
     corners = mesh.points[mesh.tetrahedra]
     inverse = np.linalg.inv(corners[:, 1:] - corners[:, :1])
 
     def solved(diffusion: FloatArray) -> Solved:
-        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, escape), 1).solve(load).x
+        fluence = solver_for(assembly.matrix(diffusion, medium.sigma_a, robin), 1).solve(load).x
         at = fluence[mesh.tetrahedra]
         slope = (inverse @ (at[:, 1:] - at[:, :1])[..., None])[..., 0]
         return fluence, at.mean(axis=1), np.linalg.norm(slope, axis=1)
@@ -196,7 +196,7 @@ def exitances_of_ball(medium: Medium, radius: float, edges: FloatArray) -> list[
     found = []
     for model in MODELS:
         fluence = iterated(model, medium, q0, BALL_STEPS, solved)
-        power = mesh.boundary_areas * escape * fluence[mesh.boundary_faces].mean(axis=1)
+        power = mesh.boundary_areas * robin * fluence[mesh.boundary_faces].mean(axis=1)
         found.append(np.bincount(ring, power)[1 : len(edges)] / area)
     return found
 

@@ -7,7 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3
+from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3, shape_of
 
 
 class SphereSpec(Section):
@@ -105,6 +105,24 @@ Output = Literal["surface", "volume", "picture"]
 Model = Literal["full", "charges"]
 
 
+Relative = Annotated[float, Field(strict=True, ge=1e-4, lt=1)]
+
+
+class ToleranceSpec(Section):
+    """Tolerances of several quantities; what has none is as it comes."""
+
+    exitance: Relative | None = Field(None, description="wanted relative L2 error of the exitance")
+    detectors: Relative | None = Field(None, description="wanted relative error of what each detector reads")
+
+
+Tolerance = Annotated[
+    Annotated[Relative, Tag(TAG + "one")]
+    | Annotated[Relative, Tag(TAG + "list")]
+    | Annotated[ToleranceSpec, Tag(TAG + "mapping")],
+    Discriminator(shape_of),
+]
+
+
 def _word_or_number(value: object) -> str:
     whole = isinstance(value, int) and not isinstance(value, bool)
     return TAG + ("word" if isinstance(value, str) else "whole" if whole else "number")
@@ -134,8 +152,8 @@ class CaseSpec(Section):
     model: Model = Field(
         "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
     )
-    tolerance: Annotated[float, Field(strict=True, ge=1e-4, lt=1)] = Field(
-        0.02, description="wanted relative L2 error of the exitance"
+    tolerance: Tolerance = Field(
+        0.02, description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors"
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
@@ -150,6 +168,29 @@ class CaseSpec(Section):
     sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
     )
+
+    @property
+    def tolerances(self) -> ToleranceSpec:
+        """Those of each quantity."""
+        if isinstance(self.tolerance, ToleranceSpec):
+            return self.tolerance
+        return ToleranceSpec(exitance=self.tolerance, detectors=None)
+
+    @model_validator(mode="after")
+    def _some_tolerance(self) -> "CaseSpec":
+        found = self.tolerances
+        if found.exitance is None and (found.detectors is None or self.model == "charges"):
+            needed = "of the exitance" if self.model == "charges" else "of exitance or detectors"
+            raise PydanticCustomError(
+                "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
+            )
+        if found.detectors is not None and not self.detectors:
+            raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
+        if found.detectors is not None and self.model == "charges":
+            raise PydanticCustomError(
+                "tolerance", 'a tolerance for detectors is for finite elements, not for model "charges"; leave it out'
+            )
+        return self
 
     @model_validator(mode="before")
     @classmethod

@@ -1,1 +1,1 @@
-"""Radiative transfer by Monte Carlo: the walk of a photon packet, and batches of walks."""
+"""Radiative transfer by Monte Carlo: the random walk of photon packets, and batches of walks."""

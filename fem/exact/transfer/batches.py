@@ -1,4 +1,4 @@
-"""Batches of random walks: independent runs, whose spread is the standard error."""
+"""Independent batches of random walks, whose spread gives standard errors."""
 
 import math
 import os
@@ -13,13 +13,14 @@ from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 
-BATCHES = 128  # standard errors are themselves known to 1/sqrt(2 BATCHES) = 6 %
+# The relative uncertainty of a standard error is 1/sqrt(2 BATCHES), 6 %.
+BATCHES = 128
 
-Light = Literal["pencil", "beam", "point"]
+LightKind = Literal["pencil", "beam", "point"]
 
 
-class Estimate(NamedTuple):
-    """A mean and its standard error."""
+class SampleMean(NamedTuple):
+    """A mean over samples and its standard error."""
 
     value: float
     standard_error: float
@@ -29,15 +30,15 @@ class LedgerFields(TypedDict):
     """The fields of a ledger, see `tetlux.fem.exact.monte_carlo.Ledger`."""
 
     photons: int
-    specular: Estimate
-    absorbed: Estimate
-    exited: Estimate
-    ballistic: Estimate
+    specular: SampleMean
+    absorbed: SampleMean
+    exited: SampleMean
+    ballistic: SampleMean
 
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Counts of each batch, as shares of the incident light: (batches,) and (batches, bins + 1)."""
+    """Tallies of each batch, as shares of the incident power: (batches,), and (batches, bins + 1) for both faces."""
 
     photons: int
     specular: FloatArray
@@ -47,7 +48,7 @@ class Shares:
     back: FloatArray
 
     def ledger(self) -> LedgerFields:
-        """Estimates of where the light went."""
+        """The shares of the power balance, with standard errors."""
         return {
             "photons": self.photons,
             "specular": estimate(self.specular),
@@ -59,19 +60,19 @@ class Shares:
 
 @dataclass(frozen=True, eq=False)
 class Batches:
-    """One run in independent batches: everything that `photons.trace` needs."""
+    """The arguments of a run in independent batches, for `photons.trace`."""
 
     medium: Medium
     ball: bool
     size: float
-    light: Light
+    light: LightKind
     depth: float
     edges: FloatArray
     photons: int
     seed: int
 
     def run(self) -> Shares:
-        """Run all batches, as many at a time as there are cores."""
+        """Run all batches in threads on all cores."""
         if self.photons < 1 or self.seed < 0:
             raise InputError(f"photons is {self.photons} and seed {self.seed}; give at least 1, and at least 0.")
         kernel = _kernel()
@@ -85,8 +86,8 @@ class Batches:
             specular=rows[:, kernel.SPECULAR],
             absorbed=rows[:, kernel.ABSORBED],
             ballistic=rows[:, kernel.BALLISTIC],
-            front=rows[:, kernel.LEDGER : kernel.LEDGER + bins],
-            back=rows[:, kernel.LEDGER + bins :],
+            front=rows[:, kernel.FIRST_BIN : kernel.FIRST_BIN + bins],
+            back=rows[:, kernel.FIRST_BIN + bins :],
         )
 
     def _run_batch(self, kernel: ModuleType, photons: int, seed: np.random.SeedSequence) -> FloatArray:
@@ -109,7 +110,7 @@ class Batches:
 
 
 def _kernel() -> ModuleType:
-    """Import what needs numba, now that it is needed."""
+    """Import the compiled random walk, which needs numba."""
     try:
         import numba  # noqa: F401, PLC0415
     except ImportError as error:
@@ -120,12 +121,9 @@ def _kernel() -> ModuleType:
 
 
 def _scattering(medium: Medium) -> tuple[float, float]:
-    """sigma_s and g; sigma_s' and 0 for a medium that does not tell.
-
-    Photons are scattered by Henyey and Greenstein's phase function.
-    """
+    """sigma_s and g of a medium; sigma_s' and 0 if only sigma_s' is given."""
     if medium.phase is not None:
-        raise InputError("Monte Carlo knows no other phase function than Henyey-Greenstein; give the medium g instead.")
+        raise InputError("Monte Carlo has only the Henyey-Greenstein phase function; give the medium g, not phase.")
     if medium.sigma_s is None or medium.g is None:
         return medium.reduced_scattering, 0.0
     return medium.sigma_s, medium.g
@@ -136,7 +134,7 @@ def mean_and_error(batches: FloatArray) -> tuple[FloatArray, FloatArray]:
     return batches.mean(axis=0), batches.std(axis=0, ddof=1) / math.sqrt(len(batches))
 
 
-def estimate(batches: FloatArray) -> Estimate:
+def estimate(batches: FloatArray) -> SampleMean:
     """Mean over the batches with its standard error."""
     mean, error = mean_and_error(batches)
-    return Estimate(float(mean), float(error))
+    return SampleMean(float(mean), float(error))

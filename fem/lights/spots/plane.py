@@ -6,7 +6,7 @@ Offsets (q, 3) are relative to a point on the axis; `direction` is a unit vector
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.meshing.arrays import FloatArray, Vector
+from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 
@@ -24,10 +24,8 @@ def sunflower(count: int, radius: float, direction: FloatArray) -> FloatArray:
     """Offsets (count, 3) spread evenly over a disc across a direction, by the golden angle (Vogel 1979)."""
     index = np.arange(count)
     distance, angle = radius * np.sqrt((index + 0.5) / count), index * np.pi * GOLDEN_ANGLE
-    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
-    across /= np.linalg.norm(across)
-    first = np.outer(distance * np.cos(angle), across)
-    return np.asarray(first + np.outer(distance * np.sin(angle), np.cross(direction, across)))
+    first, second = perpendicular_axes(direction)
+    return np.asarray(np.outer(distance * np.cos(angle), first) + np.outer(distance * np.sin(angle), second))
 
 
 def prepend_center(offsets: FloatArray) -> FloatArray:

@@ -27,7 +27,9 @@ def read_obj(data: bytes) -> tuple[FloatArray, IntArray]:
         data = re.sub(rb"\\[ \t]*(\r\n|\n|\r)", b" ", data)
     if b"#" in data:
         data = re.sub(rb"#[^\r\n]*", b"", data)
-    lines = [line for line in map(bytes.lstrip, data.removeprefix(b"\xef\xbb\xbf").splitlines()) if line[:2] in KINDS]
+    # Some programs write keywords in capitals.
+    every = (line.lstrip() for line in data.removeprefix(b"\xef\xbb\xbf").splitlines())
+    lines = [line[:1].lower() + line[1:] for line in every if line[:2].lower() in KINDS]
     kinds = np.array([KINDS[line[:2]] for line in lines], dtype=np.int64)
     words, starts, counts = _words([line for line in lines if line[:1] == b"v"], b"v")
     if (counts < 3).any():

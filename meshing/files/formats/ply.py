@@ -41,18 +41,14 @@ def read_ply(data: bytes) -> tuple[FloatArray, IntArray]:
     vertex = columns["vertex"]
     points = np.column_stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"])
     faces = [np.zeros((0, 3), dtype=np.int64)]
-    for name, make in (("face", _of_polygons), ("tristrips", _of_strips)):
+    for name, make in (("face", triangulate), ("tristrips", _strip_triangles)):
         found = next((columns[name][key] for key in INDICES if key in columns.get(name, {})), None)
         if isinstance(found, Lists):
             faces.append(make(points, found.values.astype(np.int64), found.counts))
     return points, np.vstack(faces)
 
 
-def _of_polygons(points: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
-    return triangulate(points, corners, counts)
-
-
-def _of_strips(_: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
+def _strip_triangles(_: FloatArray, corners: IntArray, counts: IntArray) -> IntArray:
     """Triangles of strips: every other one is turned over; -1, or the list's end, ends a strip."""
     strip = np.repeat(np.arange(len(counts)), counts)
     ends = corners < 0

@@ -29,7 +29,7 @@ def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntA
         which = np.flatnonzero(counts == count)
         polygons = corners[start[which, None] + np.arange(count)]
         fans = np.stack([polygons[:, [0, i, i + 1]] for i in range(1, count - 1)], axis=1)
-        for i in _hollow(points, fans):
+        for i in _concave(points, fans):
             fans[i] = polygons[i][triangulate_polygon(points[polygons[i]])]
         triangles.append(fans.reshape(-1, 3))
         place.append(np.repeat(start[which], count - 2))
@@ -38,7 +38,7 @@ def triangulate(points: FloatArray, corners: IntArray, counts: IntArray) -> IntA
     return np.concatenate(triangles)[np.argsort(np.concatenate(place), kind="stable")]
 
 
-def _hollow(points: FloatArray, fans: IntArray) -> IntArray:
+def _concave(points: FloatArray, fans: IntArray) -> IntArray:
     """Indices of concave polygons: fans (p, k - 2, 3) whose triangles face different ways."""
     if fans.shape[1] < 2:
         return np.zeros(0, dtype=np.int64)

@@ -1,0 +1,1 @@
+"""The equations that are solved: diffusion is the one model today."""

@@ -1,0 +1,38 @@
+"""`Reading`: what a detector reads, and how far off that may be."""
+
+from dataclasses import dataclass
+
+from tetlux.meshing.arrays import Vector
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a detector reads.
+
+    Attributes
+    ----------
+    position : (3,) floats
+        Where on the surface it is, unit.
+    normal : (3,) floats
+        Outward unit normal there.
+    exitance : float
+        At the point, or the mean over the disc, W/unit².
+    area : float or None
+        Of the flat disc, unit²; None for a point.
+    power : float or None
+        Exitance times area, and for a fibre the share of it within its aperture, W; None for a point.
+    relative_error : float or None
+        Estimated numerical error of this reading, relative: see `tetlux.fem.quadratic.error`. None where it is not
+        estimated, as without a mesh.
+    model_error : float or None
+        Expected relative error of the diffusion approximation there, which no mesh makes smaller: see
+        `tetlux.fem.validity.local`. None where it is not known, as of one of several lights.
+    """
+
+    position: Vector
+    normal: Vector
+    exitance: float
+    area: float | None = None
+    power: float | None = None
+    relative_error: float | None = None
+    model_error: float | None = None

@@ -1,0 +1,27 @@
+"""How much the gradient of a quadratic function jumps between tetrahedra, which shows what it does not resolve."""
+
+import numpy as np
+
+from tetlux.fem.quadratic.space import QuadraticSpace
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.tets.topology import EDGES
+
+
+def roughness(space: QuadraticSpace, function: FloatArray) -> FloatArray:
+    """The averaged gradient less the gradient at the corners of each tetrahedron, (m, 4, 3), of a function (size,).
+
+    Gradients are averaged over the tetrahedra of one region around a node, weighted by volume; across an interface they
+    jump.
+    """
+    mesh = space.mesh
+    values, hats = function[space.cells], mesh.hat_gradients
+    slopes = np.repeat(np.einsum("mij,mi->mj", hats, values[:, :4])[:, None], 4, axis=1)
+    for edge, (i, j) in enumerate(EDGES, 4):
+        steepness = 4.0 * values[:, edge, None]
+        slopes[:, i] += steepness * hats[:, j]
+        slopes[:, j] += steepness * hats[:, i]
+    curved = space.curved
+    if len(curved):
+        slopes[curved] = (slopes[curved, :, None] @ space.straightening)[:, :, 0]
+    groups, average = space.averaging
+    return np.asarray((average @ slopes.reshape(-1, 3))[groups] - slopes)
