@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fuzz.surfaces import bulging, cube_of_quads
 from tetlux.cases.cli import main
 from tetlux.meshing import InputError, Surface, box, cylinder, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -176,6 +177,20 @@ def test_of_two_sides_the_finer_is_kept() -> None:
         surface = surface_from_arrays(*arrays)
         assert surface.volume == pytest.approx(FINE.volume)
         assert "kept one side of a two-sided surface, and removed the 320 triangles of the other." in surface.repairs
+
+
+@pytest.mark.parametrize("apart", [1e-6, 1e-5], ids=["merged in part", "cracked"])
+@pytest.mark.parametrize("turned", [0, 1])
+def test_a_second_side_in_pieces_is_a_side(apart: float, turned: int) -> None:
+    """Each face of the second cube has corners of its own, nearly those of the first, and some triangles are turned."""
+    random = np.random.default_rng(5)
+    (points, first), (others, second) = (cube_of_quads(random, bulging) for _ in range(2))
+    second[turned:] = turned_over(second[turned:])
+    moved = others + random.normal(scale=apart, size=others.shape)
+    surface = surface_from_arrays(*together((points, first), (moved, second)))
+    assert surface.volume == pytest.approx(surface_from_arrays(points, first).volume, rel=0.01)
+    assert len(surface.faces) == len(first)
+    assert surface.warnings == ()
 
 
 def test_an_open_body_whose_sides_differ_is_capped_as_one() -> None:
