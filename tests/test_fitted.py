@@ -56,6 +56,15 @@ def test_a_ball_is_right_and_the_estimate_honest(ball: Surface, albedo: float, e
     assert abs(solution.power.balance_error) < 1e-9
 
 
+def test_exitance_between_nodes_where_light_fades_within_a_facet(ball: Surface) -> None:
+    """Charges are below zero there; the linear function beside a bright node is hundreds of times too large."""
+    medium = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
+    solution = solve(ball, medium, [PointSource((0.0, 0.0, RADIUS - 1.0))])
+    # Measured .002; with the linear function .13.
+    assert ball_error(solution, medium, 1.0) < 0.01
+    assert (solution.exitance_on(along_the_meridian(500)) >= 0.0).all()
+
+
 def test_finite_elements_add_what_charges_lack() -> None:
     """The same few charges come nearer to the truth on a finer mesh; so does the power that leaves."""
     ring, source = torus(10.0, 4.0), [PointSource((13.0, 0.0, 0.0))]

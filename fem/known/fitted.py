@@ -10,7 +10,7 @@ a mesh by nearest points. u is some hundredths of the light or less, and smooth 
 apart: a coarse mesh will do, and is refined where u asks for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,7 +20,7 @@ from tetlux.fem.charges.check import damped
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.places import FINER, Places
 from tetlux.fem.charges.quadrature import quadrature
-from tetlux.fem.charges.samples import Samples
+from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
 from tetlux.fem.media.medium import Medium
@@ -74,18 +74,25 @@ class FittedLight:
         Where charges were put and fitted; for the same light in other coefficients.
     accurate : (q,) ndarray of bool
         Whether the charges are accurate at each point of `violation`.
+    surface : Surface
+        What they were fitted to.
     """
 
     charges: Charges
     violation: Violation
     places: Places
     accurate: BoolArray
+    surface: Surface
 
     def accurate_at(self, points: FloatArray) -> BoolArray:
         """Whether the charges are accurate at the point of `violation` nearest to each of some points (n, 3), (n,)."""
         if self.accurate.all():
             return np.ones(len(points), dtype=bool)
         return np.asarray(self.accurate[cKDTree(self.violation.points.points).query(points)[1]])
+
+    def violation_within(self, wanted: Spacing) -> Violation:
+        """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
+        return violation_of(self.charges, self.places.fitted, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -121,9 +128,10 @@ def fit_light(
             return None
     else:
         fitted = fit_at(like.places, equation, drive)
-    violation = violation_of(fitted, surface)
+    charges = _charges(fitted, surface, medium)
+    violation = violation_of(charges, fitted.places.fitted, surface)
     accurate = like.accurate if like is not None else _accurate(violation, medium)
-    return FittedLight(_charges(fitted, surface, medium), violation, fitted.places, accurate)
+    return FittedLight(charges, violation, fitted.places, accurate, surface)
 
 
 def _accurate(violation: Violation, medium: Medium) -> BoolArray:
@@ -155,11 +163,18 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def violation_of(fitted: FittedCharges, surface: Surface) -> Violation:
-    """What the first light's charges violate on the true surface."""
-    samples = fitted.places.fitted
+def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Violation:
+    """What charges violate on the true surface, at points that follow from samples where they were fitted."""
     tree = cKDTree(samples.points)
-    points = quadrature(surface, lambda queries: INTEGRATED * FINER * samples.spacing[tree.query(queries)[1]])
-    exitance, residual = fitted.field.exitance_and_residual(points.points, points.normals)
-    apart = Samples(points.points, points.normals, points.areas, points.spacing / INTEGRATED)
-    return Violation(apart, exitance[:, 0], residual[:, 0])
+
+    def spacing(queries: FloatArray) -> FloatArray:
+        own = INTEGRATED * FINER * samples.spacing[tree.query(queries)[1]]
+        return own if wanted is None else np.minimum(own, wanted(queries))
+
+    points = quadrature(surface, spacing)
+    fluence, flux = equation_of(charges.medium).traces(
+        points.points, points.normals, charges.positions, charges.strengths
+    )
+    exitance = 0.5 / charges.medium.boundary_factor * fluence
+    apart = replace(points, spacing=FINER * samples.spacing[tree.query(points.points)[1]])
+    return Violation(apart, exitance, flux + exitance)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import damped
 from tetlux.fem.charges.kernel import equation_of
@@ -17,6 +18,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
 SHORTER = 0.65
+# Facets shorter than this times the distance of the points at which the violation is integrated have more points.
+FINE = 1.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,19 +88,29 @@ class FittedPatch(Patch):
 
 def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
     """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
-    points = light.violation.points.points
+    points = light.violation.points
     if coarse is None:
         at_nodes = light.charges.fluence(mesh.points)
-        _, facets, weights = mesh.closest_boundary(points)
     else:
         # Nodes of the coarse mesh come first.
         new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
         at_nodes = np.concatenate([coarse.at_nodes, new])
+    if coarse is None or coarse.violation is not light.violation:
+        _, facets, weights = mesh.closest_boundary(points.points)
+    else:
         facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
         others = np.flatnonzero(facets < 0)
-        _, facets[others], weights[others] = mesh.closest_boundary(points[others])
+        _, facets[others], weights[others] = mesh.closest_boundary(points.points[others])
+    violation = light.violation
+    corners = mesh.points[mesh.boundary_faces]
+    sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
+    nearest = apart[cKDTree(points.points).query(corners.mean(axis=1))[1]]
+    if (sides < FINE * nearest).any():
+        limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
+        violation = light.violation_within(lambda queries: limits[tree.query(queries)[1]])
+        _, facets, weights = mesh.closest_boundary(violation.points.points)
     cells = light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1)
-    patch = FittedPatch(mesh, light.charges, cells, at_nodes, light.violation, facets, weights)
+    patch = FittedPatch(mesh, light.charges, cells, at_nodes, violation, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
 
 
