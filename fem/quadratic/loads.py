@@ -36,7 +36,7 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: Sou
     """Load of source terms, as they are on the mesh of a space, (size,)."""
     mesh, load = space.mesh, np.zeros(space.size)
     if len(terms.points) or len(terms.segments):
-        lines, points, powers = _line_load(space, coefficients, terms.segments)
+        lines, points, powers = line_load(space, coefficients, terms.segments)
         load += lines
         points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
         load += _point_load(space, points, powers)
@@ -66,7 +66,7 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     return load
 
 
-def _line_load(
+def line_load(
     space: QuadraticSpace, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, by Gauss points along them in every tetrahedron; stretches outside of all as points and powers."""

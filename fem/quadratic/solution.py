@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.quadratic.loads import QuadraticPatch, quadratic_load, quadratic_patch
+from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.roughness import roughness
 from tetlux.fem.quadratic.sight import Seen, Sight
@@ -17,6 +17,8 @@ from tetlux.meshing.describe import one_line
 
 # Charges are subtracted where they are at most this many times brighter than the fluence.
 BRIGHTER = 4.0
+# A beam of so many rays or more is broad.
+BROAD = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +57,17 @@ class QuadraticLights:
         return np.column_stack(
             [load + sum(each.load for each in own) for load, own in zip(loads, self.patches, strict=True)]
         )
+
+    @cached_property
+    def broad_beams(self) -> FloatArray:
+        """What the rays of broad beams put on bubbles, of each light, (size, k), W."""
+        space, coefficients = self.operator.space, self.operator.coefficients
+        found = np.zeros((space.size, len(self.deposits)))
+        for light, deposit in enumerate(self.deposits):
+            if len(deposit.terms.segments) >= BROAD:
+                found[:, light], *_ = line_load(space, coefficients, deposit.terms.segments)
+        found[: len(space.mesh.points)] = 0.0
+        return found
 
     @cached_property
     def fluence(self) -> FloatArray:
@@ -110,6 +123,11 @@ class QuadraticSolution:
             inside = np.flatnonzero(patch.patch.cells)
             rough[inside] -= roughness(space, patch.guess)[inside]
         return rough
+
+    @property
+    def broad_beams(self) -> FloatArray:
+        """What the rays of broad beams put on bubbles, (size,), W."""
+        return np.asarray(self.of.broad_beams[:, self.lights].sum(axis=1))
 
     @cached_property
     def rest(self) -> FloatArray:
