@@ -15,6 +15,7 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA as MOST_TO_READ
 from tetlux.fem.outcome.detectors import Detector, read_all, view_of
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
@@ -288,6 +289,8 @@ def solve_each(
         sources = [sources_of(lights, each, subtract) for lights, each in zip(scenes, checked.bodies, strict=True)]
         dark = Dark(checked.surface, checked.bodies[0].outer)
         aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
+    if detector_tolerance is not None:
+        most_tetrahedra = min(most_tetrahedra, MOST_TO_READ)
     problem = Problem(checked, sources, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
     most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)

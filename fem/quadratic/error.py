@@ -10,6 +10,7 @@ These have either sign and cancel mostly, like the steps of a random walk, but n
 Points that lie off the mesh, where its bent facets miss the true surface, add what the fluence changes by on the way.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,16 @@ class ReadingError:
     squares: FloatArray
     sum: float
     rays: float
+
+    @staticmethod
+    def add(parts: "Sequence[ReadingError]") -> "ReadingError":
+        """The reading of several lights together."""
+        return ReadingError(
+            sum(part.value for part in parts),
+            np.sum([part.squares for part in parts], axis=0),
+            sum(part.sum for part in parts),
+            sum(part.rays for part in parts),
+        )
 
     @property
     def error(self) -> float:
