@@ -22,9 +22,9 @@ from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
-from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.media.region import Region
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.solve import solve, solve_each
 from tetlux.meshing.arrays import FloatArray

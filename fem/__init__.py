@@ -1,7 +1,6 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
-from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -23,6 +22,7 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, read
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading

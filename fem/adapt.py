@@ -141,7 +141,7 @@ def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Repor
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])
+        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.not_fitted])
         mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
         if aims.readings is not None:
             seen = np.array([view.position for view in aims.views])

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tetlux.fem.error.estimate import ROUNDING
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.split import Sources
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
@@ -154,7 +155,7 @@ def _on_shallow_sources(solution: Solution) -> Iterator[Note]:
     """Report the first source whose depth below the facets differs much from that below the surface."""
     for patch in solution.patches:
         sources = patch.charges.positions[: patch.charges.sources]
-        if len(sources) == 0:
+        if len(sources) == 0 or isinstance(patch, FittedPatch):
             continue
         depths = np.linalg.norm(solution.surface.closest(sources)[0] - sources, axis=1)
         below_facets = np.linalg.norm(solution.mesh.closest_boundary(sources)[0] - sources, axis=1)

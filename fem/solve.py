@@ -5,14 +5,15 @@ from dataclasses import replace
 from typing import Any, Literal, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Aims, Problem, first_mesh, solve_and_refine
-from tetlux.fem.charges.solution import ChargeSolution
-from tetlux.fem.charges.solve import solve_with_charges
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of
+from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
+from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import affordable_tetrahedra, check_memory
+from tetlux.fem.meshless.solution import ChargeSolution
+from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA as MOST_TO_READ
@@ -92,7 +93,7 @@ def solve(
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
-    subtract: Subtract = "half-space",
+    subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
@@ -126,9 +127,12 @@ def solve(
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
         Quadrature of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
-    subtract : {"half-space", "free-space", "nothing"}
-        The closed form that is subtracted from the fluence of point sources before finite elements solve for the
-        rest, see `tetlux.fem.known`.
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        What is subtracted from the fluence of point sources before finite elements solve for the rest, see
+        `tetlux.fem.known`. "fitted" is charges fitted to the surface, for points and beams that are points, where the
+        body is a `Surface` of one even medium; other light, and light for which they would not do, has "half-space".
+        Places of charges are kept with the mesh of a solution: solved on it again as `mesh`, the exitance depends
+        smoothly on the medium.
     limit : bool
         Whether the fluence is limited to be nonnegative where lumping alone does not make it so, see
         `tetlux.fem.operators.limiter`.
@@ -211,7 +215,7 @@ def solve_each(
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Mass = "lumped",
-    subtract: Subtract = "half-space",
+    subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
@@ -286,7 +290,13 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        sources = [sources_of(lights, each, subtract) for lights, each in zip(scenes, checked.bodies, strict=True)]
+        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        if isinstance(body, TetMesh):
+            subtract = without_fit(subtract)
+        sources = [
+            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
+            for lights, each in zip(scenes, checked.bodies, strict=True)
+        ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
         aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
     if detector_tolerance is not None:
@@ -298,6 +308,7 @@ def solve_each(
         mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
+    keep_with(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else where
     solutions = []
     for number, step in enumerate(steps):

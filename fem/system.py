@@ -10,9 +10,10 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.error.by_operator import estimate_by_operator
 from tetlux.fem.error.estimate import Estimate
+from tetlux.fem.known.kept import kept_on
 from tetlux.fem.known.patch import good_nodes, inherit_good_nodes
-from tetlux.fem.known.split import Sources, Subtract, sources_of
-from tetlux.fem.known.subtraction import Subtraction, subtract_on
+from tetlux.fem.known.split import Sources, Subtract, sources_of, without_fit
+from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_on
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
@@ -133,14 +134,14 @@ class System:
     def _loads_expected(self) -> int:
         return LOADS_OF_A_LIGHT * self.expected
 
-    def solve(self, lights: Sequence[Light], *, subtract: Subtract = "half-space") -> Solution:
+    def solve(self, lights: Sequence[Light], *, subtract: Subtract = "fitted") -> Solution:
         """Solve for lights on the mesh as it is, without an estimate of the error.
 
         Parameters
         ----------
         lights : sequence of Light
             At least one; they add up.
-        subtract : {"half-space", "free-space", "nothing"}
+        subtract : {"fitted", "half-space", "free-space", "nothing"}
             See `tetlux.fem.solve`.
 
         Returns
@@ -156,7 +157,10 @@ class System:
         """
         watch = Stopwatch()
         with watch.stage("surface"):
-            sources = sources_of(lights, Body(self.true_surface, self.media, MeshPartition(self.mesh)), subtract)
+            body = Body(self.true_surface, self.media, MeshPartition(self.mesh))
+            if self.surface is None or self.surface is self.mesh.surface:
+                subtract = without_fit(subtract)
+            sources = sources_of(lights, body, subtract, kept=kept_on(self.mesh))
         solution = self._solve(sources, watch, None).whole
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
@@ -175,25 +179,36 @@ class System:
             subtractions = self._subtractions(sources, before)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.at_nodes.any()]
-            operators = [*(self.plain for _ in subtractions), *(loads[light].operator for light in lit)]
+            coarse = () if before is None else before.solution.patches
+            fitted = [
+                subtract_fitted(light, each, self.plain, self.mass, coarse) for light, each in sources.fitted.items()
+            ]
+            operators = [*(self.plain for _ in [*subtractions, *fitted]), *(loads[light].operator for light in lit)]
         with watch.stage("solve"):
             # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
-            columns = [*(each.terms.load for each in subtractions), *(loads[light].at_nodes for light in lit)]
+            columns = [each.terms.load for each in [*subtractions, *fitted]] + [loads[light].at_nodes for light in lit]
             fluences, results = solve_columns(operators, columns, len(self.mesh.points))
+            for column, each in enumerate(fitted, len(subtractions)):
+                fluences[:, column] += each.patch.at_nodes
         good = tuple(good_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False))
         if before is None:
             results += self._shrink(subtractions, good, fluences, watch)
-        owners = np.array([*sources.owners, *lit], dtype=np.int64)
+        owners = np.array([*sources.owners, *sources.fitted, *lit], dtype=np.int64)
         of_lights = []
         for light, load in enumerate(loads):
             fluence = fluences[:, owners == light].sum(axis=1)
-            own = [each for each in subtractions if each.light == light]
+            own = [each for each in [*subtractions, *fitted] if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
-        patches = tuple(each.patches for each in of_lights)
-        deposits, guesses = tuple(load.deposit for load in loads), tuple(each.fluence for each in of_lights)
-        quadratic = QuadraticLights(self.quadratic, deposits, patches, guesses)
-        for light, each in enumerate(of_lights):
-            of_lights[light] = replace(each, quadratic=QuadraticSolution(quadratic, (light,)))
+        quadratic = QuadraticLights(
+            self.quadratic,
+            tuple(load.deposit for load in loads),
+            tuple(solution.patches for solution in of_lights),
+            tuple(solution.fluence for solution in of_lights),
+        )
+        of_lights = [
+            replace(solution, quadratic=QuadraticSolution(quadratic, (light,)))
+            for light, solution in enumerate(of_lights)
+        ]
         whole = self._sum(of_lights, loads, results, sources)
         whole = replace(whole, quadratic=QuadraticSolution(quadratic, tuple(range(len(loads)))))
         return _Solved(loads, of_lights, whole, good)
@@ -203,7 +218,8 @@ class System:
         loads = []
         for light, deposit in enumerate(sources.remaining):
             on_mesh = self._scale_emission(deposit.evaluate_on(self.mesh, self.true_surface, self.coefficients))
-            operator = self.fitted if on_mesh.terms.is_distributed and light not in sources.owners else self.plain
+            known = light in sources.owners or light in sources.fitted
+            operator = self.fitted if on_mesh.terms.is_distributed and not known else self.plain
             loads.append(load_of(on_mesh, operator))
         return loads
 

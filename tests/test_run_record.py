@@ -72,7 +72,7 @@ def test_a_run_of_a_sweep_has_its_values_put_in(tmp_path: Path) -> None:
 
 
 def test_a_medium_of_a_file_is_told_by_its_path_and_its_means(tmp_path: Path) -> None:
-    np.save(tmp_path / "field.npy", np.full((2, 2, 2), 0.02))
+    np.save(tmp_path / "field.npy", np.broadcast_to([0.01, 0.03], (2, 2, 2)))
     (tmp_path / "varying.yaml").write_text(
         "surface: {sphere: {radius: 5}}\nlights: [{diffuse: {irradiance: 1}}]\nmedium:\n"
         "  sigma_a: {array: {file: field.npy, origin: [-9, -9, -9], spacing: 18}}\n  sigma_s_prime: 1.0\n  eta: 1.4\n"
@@ -81,6 +81,7 @@ def test_a_medium_of_a_file_is_told_by_its_path_and_its_means(tmp_path: Path) ->
     record = describe_run(case)
     assert record["scene"]["medium"]["sigma_a"]["array"]["file"] == str(tmp_path / "field.npy")
     ((body,),) = media_rows(case, block((2, 2, 2), (1.0, 1.0, 1.0)))
-    assert body["sigma_a"] == pytest.approx(0.02)
+    # It is .02 in the middle, and the block lies between z = -1 and 0.
+    assert body["sigma_a"] == pytest.approx(0.02 - 0.01 * 0.5 / 9.0)
     assert body["varies"] == ["sigma_a"]
     again(case, tmp_path)

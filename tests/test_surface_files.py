@@ -159,7 +159,8 @@ def test_stl_records_that_are_no_triangles_are_ignored(extra: bytes) -> None:
 def test_text_in_utf_16_is_read(suffix: str, encoding: str, tmp_path: Path) -> None:
     kind, options = ("stl_ascii", {}) if suffix == "stl" else (suffix, {"encoding": "ascii"} if suffix == "ply" else {})
     data = trimesh.Trimesh(BALL.points, BALL.faces, process=False).export(file_type=kind, **options)
-    text = data.decode() if isinstance(data, bytes) else str(data)
+    assert isinstance(data, str | bytes)
+    text = data.decode() if isinstance(data, bytes) else data
     path = tmp_path / f"ball.{suffix}"
     path.write_bytes(text.encode(encoding))
     assert read_surface(path).volume == pytest.approx(BALL.volume, rel=1e-4)

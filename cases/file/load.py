@@ -16,10 +16,10 @@ from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.sweep import LONGEST_NAME, expand_sweep
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
-from tetlux.fem.charges.solve import check_deposit, check_simple, even_medium
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.solve import check_deposit, check_simple, even_medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

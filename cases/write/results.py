@@ -10,8 +10,8 @@ import numpy.typing as npt
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
-from tetlux.fem.charges import ChargeSolution
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution

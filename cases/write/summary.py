@@ -10,7 +10,7 @@ from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.write.media_rows import media_rows
 from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
 from tetlux.cases.write.run_record import describe_run
-from tetlux.fem.charges import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Power
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN

@@ -14,14 +14,8 @@ tables are nearly singular and why that does no harm, see Barnett & Betcke 2008,
     adapt       more charges, where the residual is large
     quadrature  integrals over the surface
     several     several even regions, each with charges of its own
-    remainder   finite elements for what charges leave
-    field, solution, solve
+    field       sources and charges together
 
 `tetlux.fem.charges.check` says what the bound promises and what not. Surfaces are the smooth ones (`Surface.on_curve`):
 their true normals are what the method lives on.
 """
-
-from tetlux.fem.charges.solution import ChargeSolution
-from tetlux.fem.charges.solve import solve_with_charges
-
-__all__ = ["ChargeSolution", "solve_with_charges"]

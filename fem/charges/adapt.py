@@ -30,6 +30,10 @@ SMOOTH = 0.003
 POWER, ALIKE, NOISE = 0.5, 12, 2.0
 # New points take the mean of so many old ones.
 AROUND = 6
+# Beside finite elements: charges are enough when the estimate of theirs alone is this share of the tolerance, or at so
+# many, which take .2 s. The next fit has as many as it takes if the estimate falls with this power of their number, but
+# no less and no more than these factors. If they leave more than the last number, they are no help.
+ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.6, 600, 2.0, 1.4, 2.2, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,37 @@ def levels(surface: Surface, equation: Equation, drive: Drive, *, most: int = MO
         yield fitted
         height = HIGH if fitted.quality.estimate <= SMOOTH else LOW
         spacing = _finer(places.checked, np.abs(fitted.residual) * places.checked.spacing)
+
+
+def fit_within(surface: Surface, equation: Equation, drive: Drive, *, tolerance: float) -> FittedCharges | None:
+    """Fit as many charges as pay where finite elements solve for what they leave.
+
+    Parameters
+    ----------
+    surface : Surface
+    equation : Equation
+    drive : Drive
+    tolerance : float
+        Relative L2 error of the exitance, of both together.
+
+    Returns
+    -------
+    FittedCharges or None
+        None if they leave so much that it would be better to start from something else.
+    """
+    spacing = distance = distance_from(surface, drive.points)
+    best, count, height = None, FIRST, LOW
+    while True:
+        fitted = fit_at(places_for(surface, spacing, distance, count, height), equation, drive)
+        estimate = fitted.quality.estimate
+        if best is None or estimate < best.quality.estimate:
+            best = fitted
+        short = best.quality.estimate / (ENOUGH * tolerance)
+        if short <= 1.0 or LEAST_GROWTH * count > MOST_BESIDE:
+            return best if best.quality.estimate <= HOPELESS else None
+        count = min(round(count * np.clip(short ** (1.0 / RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_BESIDE)
+        height = HIGH if estimate <= SMOOTH else LOW
+        spacing = _finer(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)
 
 
 def fit_at(places: Places, equation: Equation, drive: Drive) -> FittedCharges:

@@ -1,6 +1,7 @@
 """Strengths of charges by least squares on what they violate at the surface."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -18,8 +19,10 @@ class Factors:
 
     Attributes
     ----------
-    basis, turn : (m, c), (c, r) ndarray
-        Q1 and Q2.
+    reflectors, factors : (m, k), (k,) ndarray
+        Q1 as a product of reflections, as LAPACK keeps it: forming it takes as long as finding it.
+    turn : (c, r) ndarray
+        Q2.
     triangle : (r, r) ndarray
         R.
     columns : (r,) ndarray
@@ -28,7 +31,8 @@ class Factors:
         Lengths that columns were divided by.
     """
 
-    basis: NumberArray
+    reflectors: NumberArray
+    factors: NumberArray
     turn: NumberArray
     triangle: NumberArray
     columns: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -36,10 +40,20 @@ class Factors:
 
     def solve(self, right: NumberArray) -> NumberArray:
         """Least-squares solutions (c, s) for right sides (m, s)."""
-        found = np.zeros((len(self.scales), right.shape[1]), dtype=np.result_type(self.basis, right))
-        projected = self.turn.conj().T @ (self.basis.conj().T @ right)
+        found = np.zeros((len(self.scales), right.shape[1]), dtype=np.result_type(self.reflectors, right))
+        projected = self.turn.conj().T @ self._project(right)
         found[self.columns] = scipy.linalg.solve_triangular(self.triangle, projected, check_finite=False)
         return found / self.scales[:, None]
+
+    def _project(self, right: NumberArray) -> NumberArray:
+        """The conjugate transpose of Q1 times right sides (m, s), (k, s)."""
+        values = np.asarray(right, dtype=np.result_type(self.reflectors, right), order="F")
+        functions: Any = scipy.linalg.get_lapack_funcs(("ormqr",), (self.reflectors, values))
+        multiply = functions[0]
+        way = "C" if np.iscomplexobj(self.reflectors) else "T"
+        lengths = multiply("L", way, self.reflectors, self.factors, values, -1)[1]
+        product = multiply("L", way, self.reflectors, self.factors, values, int(lengths[0].real))[0]
+        return np.asarray(product[: len(self.factors)])
 
 
 def factorise(table: NumberArray) -> Factors:
@@ -53,8 +67,9 @@ def factorise(table: NumberArray) -> Factors:
     scales = np.linalg.norm(table, axis=0)
     scales[scales == 0.0] = 1.0
     table /= scales
-    basis, first = scipy.linalg.qr(table, mode="economic", overwrite_a=True, check_finite=False)
+    (reflectors, factors), first = scipy.linalg.qr(table, mode="raw", overwrite_a=True, check_finite=False)
     turn, triangle, order = scipy.linalg.qr(first, mode="economic", pivoting=True, check_finite=False)
     pivots = np.abs(np.diag(triangle))
     rank = int((pivots > RCOND * pivots[0]).sum())
-    return Factors(basis, turn[:, :rank], triangle[:rank, :rank], order[:rank].astype(np.int64), scales)
+    reflectors, columns = reflectors[:, : len(factors)], order[:rank].astype(np.int64)
+    return Factors(reflectors, factors, turn[:, :rank], triangle[:rank, :rank], columns, scales)

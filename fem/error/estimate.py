@@ -6,7 +6,9 @@ weight of a local error in the total power that leaves. For either of them these
 
 * the residual within tetrahedra (`tetlux.fem.error.residual`),
 * layers thinner than their tetrahedra (`tetlux.fem.error.layers`),
-* flat facets in place of curved surfaces (`tetlux.fem.error.facets`).
+* flat facets in place of curved surfaces (`tetlux.fem.error.facets`),
+* ripples of what fitted charges violate at the boundary that are finer than facets (`tetlux.fem.known.fitted_patch`),
+  which hardly change the total.
 
 All terms are moduli, so that errors that cancel are counted.
 """
@@ -19,6 +21,7 @@ import numpy as np
 from tetlux.fem.error.facets import boundary_facets, interface_facets
 from tetlux.fem.error.layers import boundary_layers, interface_layers
 from tetlux.fem.error.residual import averaging, lumping_error, ripple, root_mean_square, roughness, without_patches
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.operators.fitting import Fitting
@@ -101,8 +104,7 @@ def estimate_error(
     mean = averaging(mesh)
     smooth, rough = without_patches(solution, mean)
     slope_error = root_mean_square(rough)
-    leaving = np.zeros(len(mesh.points))
-    leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
+    beyond, leaving = _beyond_fitted(solution)
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
@@ -114,13 +116,14 @@ def estimate_error(
         shares += _boundary_lumping(mesh, coefficients, smooth, dual)
         if fitting is not None:
             shares += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
-        values = solution.fluence, leaving, dual
+        values = beyond, leaving, dual
         shares += FACETS * boundary_facets(mesh, coefficients, solution.surface, values, float(shares.sum()), scale)
         shares += interface_layers(mesh, coefficients, smooth, at_corners)
         return shares + FACETS * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
 
     shares, power_shares = map_in_threads(shares_by, list(duals.T))
-    return Estimate(shares + ripple(mesh, coefficients, load, norm), power_shares)
+    shares += ripple(mesh, coefficients, load, norm) + _unseen(solution, norm)
+    return Estimate(shares, power_shares)
 
 
 def _dual_loads(
@@ -132,6 +135,32 @@ def _dual_loads(
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     return loads
+
+
+def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """What the mesh adds to fitted charges: its fluence, and the net flux of that which leaves, at the nodes (n,)."""
+    mesh, beyond = solution.mesh, solution.fluence
+    leaving = np.zeros(len(mesh.points))
+    leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
+    for patch in solution.patches:
+        if isinstance(patch, FittedPatch):
+            beyond = beyond - patch.at_nodes
+            robin = 0.5 / patch.charges.medium.boundary_factor
+            leaving[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
+            leaving += patch.residual_at_nodes
+    return beyond, leaving
+
+
+def _unseen(solution: Solution, norm: float) -> FloatArray:
+    """Shares in what the mesh misses of the residuals of fitted charges, (m,), by the norm of the exitance."""
+    mesh = solution.mesh
+    square = np.zeros(len(mesh.boundary_faces))
+    for patch in solution.patches:
+        if isinstance(patch, FittedPatch):
+            square += patch.unseen()
+    shares = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
+    total = float(np.sqrt(shares.sum()))
+    return np.asarray(shares / (total * norm if total > 0 else 1.0), dtype=np.float64)
 
 
 def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:

@@ -1,15 +1,17 @@
 """What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.fitted import FittedLight, fit_light
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
+from tetlux.fem.known.kept import KeptPlaces
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
@@ -22,7 +24,9 @@ from tetlux.meshing.surface.surface import Surface
 # Points in more different media than this stay on the mesh, since each medium takes a solution of its own.
 MOST_MEDIA = 4
 
-Subtract = Literal["half-space", "free-space", "nothing"]
+Subtract = Literal["fitted", "half-space", "free-space", "nothing"]
+# Fitted charges of all lights; lights that come later are left to the half-space.
+MOST_FITTED = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +38,11 @@ class Sources:
     deposits : tuple of Deposit
         What each light leaves in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
-        The points among that, where these are subtracted.
+        The points among that, where these are subtracted near by.
     owners : tuple of int
         The light of each of these.
+    fitted : mapping of int to FittedLight
+        Lights from which charges are subtracted that were fitted to the surface.
     remaining : tuple of Deposit
         What of each light is not subtracted: the right-hand side on the mesh.
     """
@@ -44,12 +50,18 @@ class Sources:
     deposits: tuple[Deposit, ...]
     charges: tuple[Charges, ...]
     owners: tuple[int, ...]
+    fitted: Mapping[int, FittedLight]
     remaining: tuple[Deposit, ...]
 
     @property
     def warnings(self) -> list[str]:
         """What a user should know of the lights."""
         return [warning for deposit in self.deposits for warning in deposit.warnings]
+
+    @property
+    def not_fitted(self) -> list[Deposit]:
+        """Of the lights that are not fitted, which a mesh has to resolve."""
+        return [deposit for light, deposit in enumerate(self.deposits) if light not in self.fitted]
 
     @property
     def dips(self) -> bool:
@@ -63,6 +75,9 @@ def sources_of(
     lights: Sequence[Light],
     body: Body,
     subtract: Subtract,
+    *,
+    tolerance: float = 0.02,
+    kept: KeptPlaces | None = None,
 ) -> Sources:
     """Let lights fall into a body.
 
@@ -70,15 +85,20 @@ def sources_of(
     ----------
     lights : sequence of Light
     body : Body
-    subtract : {"half-space", "free-space", "nothing"}
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        "fitted" is for a body whose surface is the true one; what cannot be fitted has "half-space".
+    tolerance : float
+        Relative L2 error of the exitance, of what is fitted and the mesh together.
+    kept : KeptPlaces, optional
+        Choices to follow, and to add to.
 
     Raises
     ------
     InputError
         If there is no light, or one of them does not go with the body or the medium.
     """
-    if subtract not in ("half-space", "free-space", "nothing"):
-        raise InputError(f'subtract is "{subtract}"; it is "half-space", "free-space" or "nothing".')
+    if subtract not in get_args(Subtract):
+        raise InputError(f'subtract is "{subtract}"; it is "fitted", "half-space", "free-space" or "nothing".')
     check_list(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
@@ -86,10 +106,18 @@ def sources_of(
     charges: list[Charges] = []
     owners: list[int] = []
     remaining: list[Deposit] = []
+    fitted: dict[int, FittedLight] = {}
     left = 0 if subtract == "nothing" else MOST_CHARGES
-    images = subtract == "half-space"
+    images = subtract in ("fitted", "half-space")
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
+        if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
+            found_fit = _fitted(light, deposit, body, tolerance, kept)
+            if found_fit is not None:
+                fitted[number] = found_fit
+                deposits.append(deposit)
+                remaining.append(_without_points(deposit))
+                continue
         if body.only_medium is not None:
             known, rest, found = _charges_in_one_medium(
                 deposit, body.surface, body.only_medium, images=images, most=left
@@ -101,7 +129,30 @@ def sources_of(
         owners += [number] * len(found)
         deposits.append(known)
         remaining.append(rest)
-    return Sources(tuple(deposits), tuple(charges), tuple(owners), tuple(remaining))
+    return Sources(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(remaining))
+
+
+def _fitted(
+    light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptPlaces | None
+) -> FittedLight | None:
+    """Charges fitted to a light, at places that are kept if there are any; None if they would not do."""
+    medium = body.only_medium
+    if medium is None or len(deposit.terms.points) == 0:
+        return None
+    if kept is None:
+        return fit_light(deposit, body.surface, medium, tolerance=tolerance)
+    chosen, places = kept.find(repr(light), deposit.hints.resolution)
+    if chosen and places is None:
+        return None
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, places=places)
+    if not chosen:
+        kept.keep(repr(light), deposit.hints.resolution, None if found is None else found.places)
+    return found
+
+
+def without_fit(subtract: Subtract) -> Subtract:
+    """What to subtract in place of fitted charges where no true surface is known."""
+    return "half-space" if subtract == "fitted" else subtract
 
 
 def check_list(lights: Sequence[Light]) -> None:

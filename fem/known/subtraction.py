@@ -1,13 +1,17 @@
 """`Subtraction`: charges that are subtracted on a mesh, and what that adds to the equations there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.fitted import FittedLight
+from tetlux.fem.known.fitted_patch import FittedPatch, fitted_patch, fitted_terms
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.operator import Operator
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
@@ -46,3 +50,27 @@ def subtract_on(mesh: TetMesh, light: int, charges: Charges, mass: Mass, good: B
     """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
     patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
+
+
+def subtract_fitted(
+    light: int, fitted: FittedLight, operator: Operator, mass: Mass, before: Sequence[Patch] = ()
+) -> Subtraction:
+    """Subtract fitted charges of a light; its load is then that of what is missing.
+
+    Parameters
+    ----------
+    light : int
+    fitted : FittedLight
+    operator : Operator
+        That is solved with.
+    mass : {"lumped", "consistent"}
+    before : sequence of Patch
+        Of all lights on a mesh that the operator's is a refinement of.
+
+    Returns
+    -------
+    Subtraction
+    """
+    ours = (each for each in before if isinstance(each, FittedPatch) and each.charges is fitted.charges)
+    patch = fitted_patch(operator.mesh, fitted, next(ours, None))
+    return Subtraction(light, patch, fitted_terms(patch, operator.absorbing), mass)

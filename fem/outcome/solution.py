@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import Boundary
@@ -156,9 +157,14 @@ class Solution:
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
-        """Middles of boundary facets (f, 3), and the longest sides of these, (f,), unit."""
+        """Points of the surface (n, 3), and how much space the exitance needs to change there, (n,), unit.
+
+        Middles of boundary facets and their longest sides, and where charges were fitted, how far these are apart.
+        """
         facets = self.mesh.points[self.mesh.boundary_faces]
-        return np.asarray(facets.mean(axis=1)), longest_sides(facets)
+        fitted = [patch.violation.points for patch in self.patches if isinstance(patch, FittedPatch)]
+        places = np.vstack([facets.mean(axis=1), *(each.points for each in fitted)])
+        return places, np.concatenate([longest_sides(facets), *(each.spacing for each in fitted)])
 
     def valid_at(self, points: FloatArray) -> FloatArray:
         """How far the diffusion approximation is to be trusted at the points of the surface nearest to given points.
@@ -194,8 +200,13 @@ class Solution:
         if np.iscomplexobj(fluence):
             return np.asarray(fluence)
         # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
-        shares = (fluence < 0) & (linear >= 0) & (known >= 0) & (guessed > 0)
+        below = (fluence < 0) & (linear >= 0)
+        shares = below & (known >= 0) & (guessed > 0)
         fluence[shares] = linear[shares] * known[shares] / guessed[shares]
+        if any(isinstance(patch, FittedPatch) for patch in self.patches):
+            # They may be below zero where they are off by more than there is light.
+            rest = below & ~shares
+            fluence[rest] = linear[rest]
         return np.asarray(fluence)
 
     def fluence_at(self, points: FloatArray) -> NumberArray:

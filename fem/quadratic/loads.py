@@ -9,6 +9,7 @@ from skfem.refdom import RefTri
 
 from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
 from tetlux.fem.media.fresnel import moments
@@ -110,6 +111,23 @@ class QuadraticPatch:
     patch: Patch
     guess: FloatArray
     load: FloatArray
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether its charges are fitted to the surface, and subtracted throughout."""
+        return isinstance(self.patch, FittedPatch)
+
+
+def quadratic_fitted_patch(operator: QuadraticOperator, patch: FittedPatch) -> QuadraticPatch:
+    """Charges fitted to the surface with their load: that of their interpolant, and ``-∮ r v`` for what is missing.
+
+    r is that of the true surface, at the boundary triangles nearest to its points.
+    """
+    space, violation = operator.space, patch.violation
+    guess = space.interpolate(patch.at_nodes, patch.charges.fluence(space.middles))
+    missing = (-violation.points.areas * violation.residual)[:, None] * functions(patch.weights, TRIANGLE_EDGES)
+    load = sum_by_index(space.faces(operator.mesh.boundary_faces[patch.facets]), missing, space.size)
+    return QuadraticPatch(patch, guess, load + operator.matrix @ guess)
 
 
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:

@@ -5,10 +5,17 @@ from functools import cached_property
 
 import numpy as np
 
+from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
+from tetlux.fem.quadratic.loads import (
+    QuadraticPatch,
+    line_load,
+    quadratic_fitted_patch,
+    quadratic_load,
+    quadratic_patch,
+)
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.roughness import roughness
 from tetlux.fem.quadratic.sight import Seen, Sight
@@ -48,7 +55,7 @@ class QuadraticLights:
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
         return tuple(
-            tuple(quadratic_patch(self.operator, _widened(patch, guess)) for patch in own)
+            tuple(_patch(self.operator, patch, guess) for patch in own)
             for own, guess in zip(self.linear, self.guesses, strict=True)
         )
 
@@ -75,9 +82,23 @@ class QuadraticLights:
     @cached_property
     def fluence(self) -> FloatArray:
         """The fluence of each light, with interpolants where it is subtracted, (size, k), W/unit²."""
-        return self.operator.solve(self.loads)
+        # Fitted charges are far brighter near the light than what is missing, which is all that is solved for.
+        fitted = np.column_stack(
+            [
+                np.sum([np.zeros(self.operator.space.size), *(each.guess for each in own if each.is_fitted)], axis=0)
+                for own in self.patches
+            ]
+        )
+        return fitted + self.operator.solve(self.loads - self.operator.matrix @ fitted)
 
     __repr__ = one_line
+
+
+def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> QuadraticPatch:
+    """A patch in quadratic elements, by the fluence (n,) of its light in linear elements."""
+    if isinstance(patch, FittedPatch):
+        return quadratic_fitted_patch(operator, patch)
+    return quadratic_patch(operator, _widened(patch, fluence))
 
 
 def _widened(patch: Patch, fluence: FloatArray) -> Patch:

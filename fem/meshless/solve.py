@@ -8,13 +8,13 @@ import numpy as np
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST
-from tetlux.fem.charges.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.split import check_list
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
+from tetlux.fem.meshless.solution import ChargeSolution, Entry, charge_solution
 from tetlux.fem.outcome.solution import Power
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light

@@ -1,0 +1,120 @@
+"""`FittedPatch`: fitted charges on one mesh, what they leave to it, and what of that it does not see."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tetlux.fem.charges.check import damped
+from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.known.fitted import FittedLight, Violation
+from tetlux.fem.known.patch import Patch
+from tetlux.fem.known.patch_terms import PatchTerms
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.surface.triangles import longest_sides
+from tetlux.meshing.tets.mesh import TetMesh
+
+# Ripples that a mesh misses are shorter than those that charges leave, by this factor.
+SHORTER = 0.65
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FittedPatch(Patch):
+    """All tetrahedra of a mesh, with charges that are fitted to the true surface.
+
+    Parameters
+    ----------
+    violation : Violation
+        Of the charges, on the true surface.
+    facets : (q,) ndarray
+        The boundary triangle nearest to each of its points.
+    weights : (q, 3) ndarray
+        Barycentric coordinates of the points there.
+    """
+
+    violation: Violation
+    facets: IntArray
+    weights: FloatArray
+
+    @cached_property
+    def load(self) -> FloatArray:
+        """``-∮ r v`` (n,), W."""
+        missing = -self.violation.points.areas * self.violation.residual
+        return self._at_nodes(missing)
+
+    @cached_property
+    def residual_at_nodes(self) -> FloatArray:
+        """The residual that the mesh sees, averaged around each node, (n,), W/unit²; 0 at nodes inside."""
+        area = self._at_nodes(self.violation.points.areas)
+        return np.divide(-self.load, area, out=np.zeros(len(area)), where=area > 0)
+
+    def unseen(self) -> FloatArray:
+        """Integral of the square of the exitance that the mesh misses of each boundary triangle, (f,), W²/unit².
+
+        Of the residual it sees averages around its nodes. What is left has ripples as long as charges are apart, or
+        those that fit into a triangle, of which only a part reaches the exitance: see `tetlux.fem.charges.check`.
+        """
+        corners = self.mesh.boundary_faces[self.facets]
+        seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
+        sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
+        length = SHORTER * np.minimum(self.violation.points.spacing, sides[self.facets])
+        missed = damped(equation_of(self.charges.medium), self.violation.residual - seen, length)
+        square = self.violation.points.areas * missed**2
+        return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
+
+    def _at_nodes(self, values: FloatArray) -> FloatArray:
+        """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
+        corners = self.mesh.boundary_faces[self.facets]
+        return sum_by_index(corners, values[:, None] * self.weights, len(self.mesh.points))
+
+
+def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
+    """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
+    everywhere, points = np.ones(len(mesh.tetrahedra), dtype=bool), light.violation.points.points
+    if coarse is None:
+        at_nodes = light.charges.fluence(mesh.points)
+        _, facets, weights = mesh.closest_boundary(points)
+    else:
+        # Nodes of the coarse mesh come first.
+        new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
+        at_nodes = np.concatenate([coarse.at_nodes, new])
+        facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
+        others = np.flatnonzero(facets < 0)
+        _, facets[others], weights[others] = mesh.closest_boundary(points[others])
+    return FittedPatch(mesh, light.charges, everywhere, at_nodes, light.violation, facets, weights)
+
+
+def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
+    """The boundary triangle of a refined mesh that each of the coarse mesh still is, -1 if it was split, (f,)."""
+    count = len(fine.points)
+    before, after = (
+        (faces[:, 0] * count + faces[:, 1]) * count + faces[:, 2]
+        for faces in (coarse.boundary_faces.astype(np.int64), fine.boundary_faces.astype(np.int64))
+    )
+    order = np.argsort(after)
+    found = order[np.minimum(np.searchsorted(after, before, sorter=order), len(order) - 1)]
+    return np.where(after[found] == before, found, -1)
+
+
+def fitted_terms(patch: FittedPatch, absorbing: FloatArray) -> PatchTerms:
+    """The load of what is missing, and the ledger of the charges less that of their values at the nodes.
+
+    Parameters
+    ----------
+    patch : FittedPatch
+    absorbing : (n,) ndarray
+        Power absorbed for a fluence of 1 at each node, unit².
+
+    Returns
+    -------
+    PatchTerms
+        Its load is that of ``u = phi - G``, not of the fluence itself.
+    """
+    mesh, charges, violation = patch.mesh, patch.charges, patch.violation
+    areas = violation.points.areas
+    exited, inflow = float(areas @ violation.exitance), float(areas @ (violation.residual - violation.exitance))
+    robin = 0.5 / charges.medium.boundary_factor
+    at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
+    # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.
+    absorbed = float(charges.strengths[: charges.sources].sum()) + inflow
+    return PatchTerms(patch.load, exited - at_boundary, absorbed - float(absorbing @ patch.at_nodes))

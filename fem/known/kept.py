@@ -1,0 +1,55 @@
+"""Places of charges that are kept with a mesh, so that readings on it depend smoothly on the coefficients.
+
+Where charges go follows from a light's depth and from random draws: chosen anew for each set of coefficients, a reading
+would jump by the error of the fit. So a light on a mesh that was solved on before has the places that it had then, and
+is left to other ways if it was then.
+"""
+
+from dataclasses import dataclass, field
+from weakref import WeakKeyDictionary
+
+from tetlux.fem.charges.places import Places
+from tetlux.meshing.describe import one_line
+from tetlux.meshing.tets.mesh import TetMesh
+
+# Places serve for a light that is so many times deeper or shallower than the one they were chosen for.
+OTHER_DEPTH = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class KeptPlaces:
+    """Places by light.
+
+    Attributes
+    ----------
+    choices : dict
+        By the light's name: the depths that it was solved for, unit, and the places chosen, None if it was not fitted.
+    """
+
+    choices: dict[str, list[tuple[float, Places | None]]] = field(default_factory=dict)
+
+    def find(self, light: str, depth: float) -> tuple[bool, Places | None]:
+        """Whether there was a choice for a light at about this depth, and the places."""
+        for known, places in self.choices.get(light, []):
+            if known <= OTHER_DEPTH * depth and depth <= OTHER_DEPTH * known:
+                return True, places
+        return False, None
+
+    def keep(self, light: str, depth: float, places: Places | None) -> None:
+        """Remember a choice."""
+        self.choices.setdefault(light, []).append((depth, places))
+
+    __repr__ = one_line
+
+
+_OF_MESHES: WeakKeyDictionary[TetMesh, KeptPlaces] = WeakKeyDictionary()
+
+
+def kept_on(mesh: TetMesh) -> KeptPlaces:
+    """What is kept with a mesh; nothing at first."""
+    return _OF_MESHES.setdefault(mesh, KeptPlaces())
+
+
+def keep_with(mesh: TetMesh, kept: KeptPlaces) -> None:
+    """Keep places with a mesh."""
+    _OF_MESHES[mesh] = kept
