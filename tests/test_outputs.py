@@ -22,7 +22,7 @@ from tetlux.cases.write.results import Results, collect_results
 from tetlux.fem import PointDetector, read, solve
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.solve import solve_each
+from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing import Surface, box
 from tetlux.meshing.arrays import FloatArray
 

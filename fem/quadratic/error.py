@@ -92,3 +92,11 @@ def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
         squares[seen.cells[0]] += off**2
     rays = RAYS * float(solution.broad_beams @ dual)
     return ReadingError(value, squares, SIZE * SUM * float(local.sum()), rays)
+
+
+def fluence_with_error(solution: QuadraticSolution, points: FloatArray) -> FloatArray:
+    """Fluence at points (q, 3) inside the body, W/unit², and its relative error, (2, q)."""
+    sights = [Sight(point[None], np.ones(1), inside=True) for point in points]
+    solution.operator.duals(sights)
+    readings = [read_with_error(solution, sight) for sight in sights]
+    return np.array([[reading.value for reading in readings], [reading.relative for reading in readings]])
