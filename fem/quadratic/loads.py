@@ -118,18 +118,6 @@ class QuadraticPatch:
         return isinstance(self.patch, FittedPatch)
 
 
-def quadratic_fitted_patch(operator: QuadraticOperator, patch: FittedPatch) -> QuadraticPatch:
-    """Charges fitted to the surface with their load: that of their interpolant, and ``-∮ r v`` for what is missing.
-
-    r is that of the true surface, at the boundary triangles nearest to its points.
-    """
-    space, violation = operator.space, patch.violation
-    guess = space.interpolate(patch.at_nodes, patch.charges.fluence(space.middles))
-    missing = (-violation.points.areas * violation.residual)[:, None] * functions(patch.weights, TRIANGLE_EDGES)
-    load = sum_by_index(space.faces(operator.mesh.boundary_faces[patch.facets]), missing, space.size)
-    return QuadraticPatch(patch, guess, load + operator.matrix @ guess)
-
-
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
     """A patch with its load, as `tetlux.fem.known.patch_terms` has it for linear elements.
 

@@ -9,13 +9,7 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.quadratic.loads import (
-    QuadraticPatch,
-    line_load,
-    quadratic_fitted_patch,
-    quadratic_load,
-    quadratic_patch,
-)
+from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.roughness import roughness
 from tetlux.fem.quadratic.sight import Seen, Sight
@@ -95,10 +89,12 @@ class QuadraticLights:
 
 
 def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> QuadraticPatch:
-    """A patch in quadratic elements, by the fluence (n,) of its light in linear elements."""
-    if isinstance(patch, FittedPatch):
-        return quadratic_fitted_patch(operator, patch)
-    return quadratic_patch(operator, _widened(patch, fluence))
+    """A patch in quadratic elements, by the fluence (n,) of its light in linear elements.
+
+    The residual of fitted charges is integrated anew over the bent facets: at the points that linear elements have it,
+    a reading a thousandth as bright as the brightest was 4 % off.
+    """
+    return quadratic_patch(operator, patch if isinstance(patch, FittedPatch) else _widened(patch, fluence))
 
 
 def _widened(patch: Patch, fluence: FloatArray) -> Patch:
