@@ -144,10 +144,16 @@ def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
     leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
-            beyond = beyond - patch.at_nodes
+            # At the border of the patch the mesh holds all of the fluence.
+            known, residual = patch.at_nodes, patch.residual_at_nodes
+            if not patch.is_whole:
+                known, residual = known.copy(), residual.copy()
+                border = mesh.tetrahedra[~patch.cells]
+                known[border] = residual[border] = 0.0
+            beyond = beyond - known
             robin = 0.5 / patch.charges.medium.boundary_factor
-            leaving[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
-            leaving += patch.residual_at_nodes
+            leaving[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
+            leaving += residual
     return beyond, leaving
 
 

@@ -21,7 +21,7 @@ WORTH_A_MESH = 1.05
 # The aim of refinement for readings, as a share of the tolerance, leaves room for errors of more than the bar. There
 # errors add up by their squares: splitting a tetrahedron leaves this share of its square. It is split this often at
 # most before the next solution.
-READING_SAFETY, LEFT, MOST_SPLITS = 0.55, 0.15, 3
+READING_SAFETY, LEFT, MOST_SPLITS = 0.5, 0.15, 3
 
 
 def check_tolerance(tolerance: float, name: str = "tolerance") -> None:

@@ -11,7 +11,7 @@ from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.quadratic.error import read_with_error
+from tetlux.fem.quadratic.error import ReadingError, read_with_error
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
@@ -23,6 +23,8 @@ FARTHEST = 0.05
 FLATNESS = 0.25
 # Circles of a disc, and points on each: Gauss points in the square of the radius, so that areas come out equal.
 CIRCLES, SPOKES = 16, 32
+# Larger meshes are read by linear elements, without an error: quadratic ones take a minute there, and gigabytes.
+MOST_TETRAHEDRA = 400_000
 
 
 @dataclass(frozen=True)
@@ -132,8 +134,8 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
     """
     view = view_of(detector, solution)
     error = model = None
-    if isinstance(solution, Solution) and solution.quadratic is not None:
-        found = read_with_error(solution.quadratic, view.sight)
+    if isinstance(solution, Solution) and is_quadratic(solution):
+        found = estimate_reading(solution, view.sight)
         exitance, error = found.value, found.relative
     else:
         exitance = float(view.sight.weights @ solution.exitance_on(view.sight.points))
@@ -143,9 +145,34 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
     return Reading(view.position, view.normal, exitance, view.area, power, error, model)
 
 
+def is_quadratic(solution: Solution) -> bool:
+    """Whether it is read by quadratic elements: its mesh may be too large for that."""
+    return solution.quadratic is not None and len(solution.mesh.tetrahedra) <= MOST_TETRAHEDRA
+
+
+def estimate_reading(solution: Solution, sight: Sight) -> ReadingError:
+    """The exitance at points of a solution by quadratic elements, with its error.
+
+    Where spread light fades within a tetrahedron linear elements are better, and the error is the difference.
+    """
+    quadratic = solution.quadratic
+    assert quadratic is not None
+    found = read_with_error(quadratic, sight)
+    if not quadratic.has_thin_layers(sight):
+        return found
+    if len(solution.of_lights) > 1:
+        parts = [estimate_reading(part, sight) for part in solution.of_lights]
+        return ReadingError.add(parts)
+    value = float(sight.weights @ solution.exitance_on(sight.points))
+    squares = np.zeros(len(found.squares))
+    squares[quadratic.operator.see(sight).cells[0]] = (value - found.value) ** 2
+    return ReadingError(value, squares, 0.0, 0.0)
+
+
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors, which takes less time together."""
-    if isinstance(solution, Solution) and solution.quadratic is not None:
+    if isinstance(solution, Solution) and is_quadratic(solution):
+        assert solution.quadratic is not None
         solution.quadratic.operator.duals([view_of(detector, solution).sight for detector in detectors])
     return tuple(read(detector, solution) for detector in detectors)
 

@@ -37,7 +37,7 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: Sou
     """Load of source terms, as they are on the mesh of a space, (size,)."""
     mesh, load = space.mesh, np.zeros(space.size)
     if len(terms.points) or len(terms.segments):
-        lines, points, powers = _line_load(space, coefficients, terms.segments)
+        lines, points, powers = line_load(space, coefficients, terms.segments)
         load += lines
         points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
         load += _point_load(space, points, powers)
@@ -67,7 +67,7 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     return load
 
 
-def _line_load(
+def line_load(
     space: QuadraticSpace, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fading beams, by Gauss points along them in every tetrahedron; stretches outside of all as points and powers."""
@@ -116,18 +116,6 @@ class QuadraticPatch:
     def is_fitted(self) -> bool:
         """Whether its charges are fitted to the surface, and subtracted throughout."""
         return isinstance(self.patch, FittedPatch)
-
-
-def quadratic_fitted_patch(operator: QuadraticOperator, patch: FittedPatch) -> QuadraticPatch:
-    """Charges fitted to the surface with their load: that of their interpolant, and ``-∮ r v`` for what is missing.
-
-    r is that of the true surface, at the boundary triangles nearest to its points.
-    """
-    space, violation = operator.space, patch.violation
-    guess = space.interpolate(patch.at_nodes, patch.charges.fluence(space.middles))
-    missing = (-violation.points.areas * violation.residual)[:, None] * functions(patch.weights, TRIANGLE_EDGES)
-    load = sum_by_index(space.faces(operator.mesh.boundary_faces[patch.facets]), missing, space.size)
-    return QuadraticPatch(patch, guess, load + operator.matrix @ guess)
 
 
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
