@@ -49,7 +49,9 @@ def _ply(surface: Surface) -> bytes:
     head = f"ply\nformat ascii 1.0\nelement vertex {len(surface.points)}\nproperty float x\nproperty float y\n"
     head += f"property float z\nelement face {len(surface.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     rows = [" ".join(map(str, row)) for row in surface.points.tolist()]
-    return "\n".join([head + rows[0], *rows[1:], *(f"3 {a} {b} {c}" for a, b, c in surface.faces.tolist()), ""]).encode()
+    return "\n".join(
+        [head + rows[0], *rows[1:], *(f"3 {a} {b} {c}" for a, b, c in surface.faces.tolist()), ""]
+    ).encode()
 
 
 def stl(points: FloatArray, faces: IntArray, claimed: int | None = None) -> bytes:
