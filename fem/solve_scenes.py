@@ -150,6 +150,8 @@ def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], de
     ------
     InputError
     """
+    if not isinstance(detectors, Sequence):
+        raise InputError(f"detectors are given in a list, but {detectors!r} is none; write [detector].")
     if tolerance is not None:
         check_tolerance(tolerance)
     if detector_tolerance is not None:

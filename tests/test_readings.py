@@ -2,6 +2,7 @@
 
 import csv
 import json
+import pickle
 import re
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,13 @@ def test_fluence_inside_has_a_bar(far: Solution) -> None:
     assert fluence[:2] == pytest.approx(right, rel=0.02)
     assert (np.abs(fluence[:2] / right - 1.0) < 4.0 * error[:2]).all()
     assert np.isnan([fluence[2], error[2]]).all()
+
+
+def test_a_solution_that_was_pickled_reads_the_same(far: Solution) -> None:
+    detector = on_ball(np.array([8.0]))[0]
+    received = pickle.loads(pickle.dumps(far))
+    assert read(detector, received).exitance == pytest.approx(read(detector, far).exitance, rel=1e-9)
+    assert received.exitance_at([[0.0, 0.0, RADIUS]]) == far.exitance_at([[0.0, 0.0, RADIUS]])
 
 
 def test_lights_add_up_in_readings() -> None:
@@ -221,6 +229,8 @@ def test_a_mesh_that_is_too_large_is_read_by_linear_elements(far: Solution, monk
             {"detectors": [PointDetector((0, 0, 10))], "detector_tolerance": 2.0},
             "detector_tolerance is 2; give a relative error between",
         ),
+        ({"detectors": PointDetector((0, 0, 10))}, r"are given in a list, but PointDetector\(.*\) is none; write \[det"),
+        ({"detectors": ["top"]}, "'top' is no detector; give PointDetector, DiscDetector or FibreDetector"),
         ({"detectors": [PointDetector((0, 0, 50))]}, r"position \(0, 0, 50\) is 40 mm from the surface"),
     ],
 )

@@ -208,6 +208,8 @@ def view_of(detector: Detector, solution: ExitanceField) -> View:
         reach = FARTHEST * solution.surface.diagonal
         place, normal = _on_surface(solution, "position", detector.position, reach, f"{FARTHEST:.0%} of the diagonal")
         return View(_vector(place), _vector(normal), Sight(place[None], np.ones(1)))
+    if not isinstance(detector, DiscDetector):
+        raise InputError(f"{detector!r} is no detector; give PointDetector, DiscDetector or FibreDetector.")
     place, normal = _on_surface(solution, "center", detector.center, detector.radius, "its radius")
     flat = place + detector.radius * _unit_disc(normal)
     points, _ = solution.surface.project(flat)

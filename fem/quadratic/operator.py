@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -49,6 +50,10 @@ class QuadraticOperator:
     coefficients: Coefficients
     _duals: dict[Sight, FloatArray] = field(default_factory=dict)
     _seen: dict[Sight, Seen] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What solves cannot be pickled, and is made anew when it is needed."""
+        return {name: value for name, value in vars(self).items() if name not in ("_product", "_precondition")}
 
     @cached_property
     def space(self) -> QuadraticSpace:

@@ -23,7 +23,12 @@ class ClosestPoint:
     """
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
+        self._triangles = points, faces
         self._locator = cell_locator(points, faces)
+
+    def __reduce__(self) -> tuple[type["ClosestPoint"], tuple[FloatArray, IntArray]]:
+        """VTK's locator cannot be pickled; it is built anew."""
+        return ClosestPoint, self._triangles
 
     def __call__(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         """Closest points (q, 3) of the triangles to queries (q, 3), and the triangle of each, (q,)."""

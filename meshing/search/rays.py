@@ -2,6 +2,7 @@
 
 from functools import cached_property
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,10 @@ class RayCaster:
         self._corners = points[faces]
         low, high = points.min(axis=0), points.max(axis=0)
         self._origin, self._size = 0.5 * (low + high), float(np.linalg.norm(high - low))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Engines cannot be pickled; one is made anew at the first ray."""
+        return {name: value for name, value in vars(self).items() if name != "_engine"}
 
     @cached_property
     def _engine(self) -> Embree | RayLocator:
