@@ -16,7 +16,7 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
-from tetlux.fem.outcome.detectors import Detector, read_all, view_of
+from tetlux.fem.outcome.detectors import Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes, media_by_channel
@@ -297,7 +297,7 @@ def solve_each(
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
+        aims = Aims(tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors))
     problem = Problem(checked, sources, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
     most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)

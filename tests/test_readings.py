@@ -17,8 +17,8 @@ from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, Region, S
 from tetlux.fem.exact import layered
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.sight import Sight
 from tetlux.meshing import InputError, TetMesh, box, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 
@@ -144,10 +144,10 @@ def test_quadratic_functions_are_integrated_exactly() -> None:
 def test_duals_read_what_solutions_show() -> None:
     """``d . u = z . f``, for loads that have nothing to do with each other."""
     operator = cubes(3)
-    sight = Sight(np.array([[5.0, 1.0, 0.5]]), np.ones(1))
-    load = operator.see(Sight(np.array([[-2.0, 1.0, 3.0]]), np.ones(1), inside=True)).load
-    u, z = operator.solve(load[:, None])[:, 0], operator.duals([sight])[0]
-    assert operator.see(sight).load @ u == pytest.approx(load @ z, rel=1e-5)
+    measurement = Measurement(np.array([[5.0, 1.0, 0.5]]), np.ones(1))
+    load = operator.discretise(Measurement(np.array([[-2.0, 1.0, 3.0]]), np.ones(1), inside=True)).load
+    u, z = operator.solve(load[:, None])[:, 0], operator.duals([measurement])[0]
+    assert operator.discretise(measurement).load @ u == pytest.approx(load @ z, rel=1e-5)
 
 
 def test_curved_edges_hold_volume_and_area_of_a_ball() -> None:

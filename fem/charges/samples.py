@@ -18,14 +18,14 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
 # Candidates to each square of the spacing.
-CANDIDATES = 4.0
+CANDIDATES_PER_SQUARE = 4.0
 # Points that stay are farther apart than this times the spacing.
-APART = 0.8
+LEAST_SEPARATION = 0.8
 # Neighbours looked at when thinning; within that radius there are 8 candidates in the mean.
-NEIGHBOURS = 20
+CHECKED_NEIGHBOURS = 20
 # Cells are no longer than this times the spacing, unless they are whole triangles.
-COARSEST = 1.5
-_CUTS = 40
+LARGEST_CELL = 1.5
+_MOST_CUTS = 40
 
 # The wanted distance between points (n, 3) of the surface, (n,), unit.
 Spacing = Callable[[FloatArray], FloatArray]
@@ -81,7 +81,7 @@ class Cells:
         return np.asarray(0.5 * np.linalg.norm(np.cross(first, second), axis=1))
 
     @property
-    def load(self) -> float:
+    def sample_count(self) -> float:
         """How many squares of the spacing there are."""
         return float((self.areas / self.spacing**2).sum())
 
@@ -89,12 +89,12 @@ class Cells:
         """The same for a spacing so many times as large."""
         return replace(self, spacing=scale * self.spacing)
 
-    def cut(self, spacing: Spacing, size: float = COARSEST) -> "Cells":
+    def cut(self, spacing: Spacing, size: float = LARGEST_CELL) -> "Cells":
         """Cut them until none is longer than `size` times the spacing in its middle."""
         faces, corners, wanted = self.faces, self.corners, self.spacing
         done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-        for cut in range(_CUTS + 1):
-            small = (longest_sides(corners) <= size * wanted) | (cut == _CUTS)
+        for cut in range(_MOST_CUTS + 1):
+            small = (longest_sides(corners) <= size * wanted) | (cut == _MOST_CUTS)
             done.append((faces[small], corners[small], wanted[small]))
             if small.all():
                 break
@@ -112,18 +112,18 @@ def cells_of(surface: Surface, spacing: Spacing) -> Cells:
     return Cells(np.arange(len(corners)), corners, spacing(corners.mean(axis=1)))
 
 
-def draw(surface: Surface, cells: Cells, rng: np.random.Generator, density: float = CANDIDATES) -> Samples:
-    """Draw points from cells, so many to each square of the spacing."""
-    load = cells.areas / cells.spacing**2
-    drawn = np.diff(np.floor(np.cumsum(load) * density + rng.random()), prepend=0.0)
-    own = np.repeat(np.arange(len(load)), drawn.astype(np.int64))
+def draw(surface: Surface, cells: Cells, rng: np.random.Generator) -> Samples:
+    """Draw `CANDIDATES_PER_SQUARE` points from each square of the spacing."""
+    squares = cells.areas / cells.spacing**2
+    drawn = np.diff(np.floor(np.cumsum(squares) * CANDIDATES_PER_SQUARE + rng.random()), prepend=0.0)
+    own = np.repeat(np.arange(len(squares)), drawn.astype(np.int64))
     first, second = rng.random((2, len(own)))
     root = np.sqrt(first)
     weights = np.column_stack([1.0 - root, root * (1.0 - second), root * second])
     flat = np.einsum("qi,qij->qj", weights, cells.corners[own])
     points, normals = surface.on_curve(cells.faces[own], flat)
     wanted = cells.spacing[own]
-    return Samples(points, normals, wanted**2 / density, wanted)
+    return Samples(points, normals, wanted**2 / CANDIDATES_PER_SQUARE, wanted)
 
 
 def thin(samples: Samples, radii: FloatArray) -> BoolArray:
@@ -132,7 +132,7 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     if count < 2:
         return np.ones(count, dtype=bool)
     tree = cKDTree(samples.points)
-    found = tree.query(samples.points, k=min(NEIGHBOURS, count))
+    found = tree.query(samples.points, k=min(CHECKED_NEIGHBOURS, count))
     distance, near = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
     close = distance < np.minimum(radii[:, None], radii[near])
     close &= np.einsum("ij,ikj->ik", samples.normals, samples.normals[near]) > 0.0
@@ -157,7 +157,7 @@ def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Sa
     """Points about a spacing apart, in random order, and the candidates that were not taken."""
     drawn = draw(surface, cells, rng)
     drawn = drawn[rng.permutation(len(drawn))]
-    kept = thin(drawn, APART * drawn.spacing)
+    kept = thin(drawn, LEAST_SEPARATION * drawn.spacing)
     chosen = drawn[kept]
     nearest = np.asarray(cKDTree(chosen.points).query(drawn.points)[1])
     return replace(chosen, areas=sum_by_index(nearest, drawn.areas, len(chosen))), drawn[~kept]

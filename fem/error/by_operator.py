@@ -49,5 +49,6 @@ def estimate_by_operator(
             )
         )
     return Estimate(
-        np.sum([each.shares for each in estimates], axis=0), np.sum([each.power_shares for each in estimates], axis=0)
+        np.sum([each.exitance_indicators for each in estimates], axis=0),
+        np.sum([each.power_indicators for each in estimates], axis=0),
     )

@@ -20,7 +20,14 @@ import numpy as np
 
 from tetlux.fem.error.facets import boundary_facets, interface_facets
 from tetlux.fem.error.layers import boundary_layers, interface_layers
-from tetlux.fem.error.residual import averaging, lumping_error, ripple, root_mean_square, roughness, without_patches
+from tetlux.fem.error.residual import (
+    lumping_error,
+    nodal_averaging,
+    recovered_gradient_difference,
+    ripple_indicators,
+    root_mean_square,
+    subtract_patches,
+)
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients
@@ -35,7 +42,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # Facets of a round body err to one side, and partly against the gradients. With half of their sum the estimate is 0.6
 # to 3 times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
-FACETS = 0.5
+FACET_WEIGHT = 0.5
 # Exited power below this share of the incident power is the residual of the linear solver.
 ROUNDING = 1e-12
 
@@ -46,17 +53,17 @@ class Estimate:
 
     Attributes
     ----------
-    shares, power_shares : (m,) ndarray
+    exitance_indicators, power_indicators : (m,) ndarray
         Shares of the tetrahedra in the relative errors of the exitance and of the total power that leaves.
     """
 
-    shares: FloatArray
-    power_shares: FloatArray
+    exitance_indicators: FloatArray
+    power_indicators: FloatArray
 
     @property
     def error(self) -> float:
         """Relative L2 error of the exitance over the surface."""
-        return float(self.shares.sum())
+        return float(self.exitance_indicators.sum())
 
     __repr__ = one_line
 
@@ -101,29 +108,35 @@ def estimate_error(
         # Where no light leaves, the exitance has no error.
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
     duals = solver.roughly(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
-    mean = averaging(mesh)
-    smooth, rough = without_patches(solution, mean)
+    mean = nodal_averaging(mesh)
+    smooth, rough = subtract_patches(solution, mean)
     slope_error = root_mean_square(rough)
-    beyond, leaving = _beyond_fitted(solution)
+    remainder, outward_flux = _remainder(solution)
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
 
-    def shares_by(dual: FloatArray) -> FloatArray:
+    def indicators_for_dual(dual: FloatArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
-        shares = diffusion * mesh.volumes * slope_error * root_mean_square(roughness(mesh, mean, dual))
-        shares += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
-        shares += _boundary_lumping(mesh, coefficients, smooth, dual)
+        indicators = (
+            diffusion * mesh.volumes * slope_error * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
+        )
+        indicators += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
+        indicators += _boundary_lumping(mesh, coefficients, smooth, dual)
         if fitting is not None:
-            shares += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
-        values = beyond, leaving, dual
-        shares += FACETS * boundary_facets(mesh, coefficients, solution.surface, values, float(shares.sum()), scale)
-        shares += interface_layers(mesh, coefficients, smooth, at_corners)
-        return shares + FACETS * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
+            indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
+        values = remainder, outward_flux, dual
+        indicators += FACET_WEIGHT * boundary_facets(
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale
+        )
+        indicators += interface_layers(mesh, coefficients, smooth, at_corners)
+        return indicators + FACET_WEIGHT * interface_facets(
+            mesh, coefficients, inner, emission, (solution.fluence, dual)
+        )
 
-    shares, power_shares = map_in_threads(shares_by, list(duals.T))
-    shares += ripple(mesh, coefficients, load, norm) + _unseen(solution, norm)
-    return Estimate(shares, power_shares)
+    indicators, power_indicators = map_in_threads(indicators_for_dual, list(duals.T))
+    indicators += ripple_indicators(mesh, coefficients, load, norm) + _unresolved_indicators(solution, norm)
+    return Estimate(indicators, power_indicators)
 
 
 def _dual_loads(
@@ -137,30 +150,30 @@ def _dual_loads(
     return loads
 
 
-def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
+def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
     """What the mesh adds to fitted charges: its fluence, and the net flux of that which leaves, at the nodes (n,)."""
-    mesh, beyond = solution.mesh, solution.fluence
-    leaving = np.zeros(len(mesh.points))
-    leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
+    mesh, remainder = solution.mesh, solution.fluence
+    outward_flux = np.zeros(len(mesh.points))
+    outward_flux[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
-            beyond = beyond - patch.at_nodes
+            remainder = remainder - patch.at_nodes
             robin = 0.5 / patch.charges.medium.boundary_factor
-            leaving[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
-            leaving += patch.residual_at_nodes
-    return beyond, leaving
+            outward_flux[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
+            outward_flux += patch.residual_at_nodes
+    return remainder, outward_flux
 
 
-def _unseen(solution: Solution, norm: float) -> FloatArray:
+def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
     """Shares in what the mesh misses of the residuals of fitted charges, (m,), by the norm of the exitance."""
     mesh = solution.mesh
     square = np.zeros(len(mesh.boundary_faces))
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
             square += patch.unseen()
-    shares = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
-    total = float(np.sqrt(shares.sum()))
-    return np.asarray(shares / (total * norm if total > 0 else 1.0), dtype=np.float64)
+    indicators = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
+    total = float(np.sqrt(indicators.sum()))
+    return np.asarray(indicators / (total * norm if total > 0 else 1.0), dtype=np.float64)
 
 
 def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:

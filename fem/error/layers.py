@@ -3,7 +3,7 @@
 Along the boundary, what `tetlux.fem.operators.fitting` leaves of the error goes with the step of the fluence across
 these tetrahedra and x = k h::
 
-    ∮ D k LAYERS x²/(1 + x²)^(3/2) |phi step| z
+    ∮ D k LAYER_WEIGHT x²/(1 + x²)^(3/2) |phi step| z
 
 Layers along interfaces are not fitted. Linear elements give a flux into them of ``D k s`` times the fluence instead of
 ``D k``, with s = sqrt(1 + (k h/2)²), which makes the dual there too faint by the same factor. They add::
@@ -21,7 +21,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Under diffuse light, on balls of 3 to 100 mean free paths, reduced albedos .09 to .99 and indices 1 and 1.4, the
 # estimate with this is 1.1 to 3.5 times the true error where k h is at most 3, and 4 to 11 times where it is more.
-LAYERS = 0.25
+LAYER_WEIGHT = 0.25
 
 
 def boundary_layers(
@@ -35,9 +35,9 @@ def boundary_layers(
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
     across = fitting.across[faces].mean(axis=1)
     step = _step_across(mesh, cells, faces, smooth)
-    shares = LAYERS * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
-    shares *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
-    return np.asarray(np.bincount(cells, shares, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+    indicators = LAYER_WEIGHT * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
+    indicators *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
+    return np.asarray(np.bincount(cells, indicators, minlength=len(mesh.tetrahedra)), dtype=np.float64)
 
 
 def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
@@ -52,8 +52,8 @@ def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArr
         k = np.sqrt(sigma_a / diffusion)
         over = np.sqrt(1.0 + (0.5 * k * 3.0 * mesh.volumes[side] / areas) ** 2)
         first, second = (_step_across(mesh, side, faces, values[side]) for values in (smooth, dual))
-        shares = diffusion * k * (over - 1.0) * over * areas * first * second
-        total += np.bincount(side, shares, minlength=len(total))
+        indicators = diffusion * k * (over - 1.0) * over * areas * first * second
+        total += np.bincount(side, indicators, minlength=len(total))
     return total
 
 

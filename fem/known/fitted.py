@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_within
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_for_remainder
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import FINER, Places
+from tetlux.fem.charges.places import EQUATION_REFINEMENT, Places
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples
 from tetlux.fem.known.charges import Charges
@@ -99,14 +99,14 @@ def fit_light(
     """
     if not _is_fit(deposit, surface, medium):
         return None
-    drive = Drive(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
+    lights = LightSources(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
     equation = equation_of(medium)
     if places is None:
-        fitted = fit_within(surface, equation, drive, tolerance=tolerance)
+        fitted = fit_for_remainder(surface, equation, lights, tolerance=tolerance)
         if fitted is None:
             return None
     else:
-        fitted = fit_at(places, equation, drive)
+        fitted = fit_at_places(places, equation, lights)
     return FittedLight(_charges(fitted, surface, medium), violation_of(fitted, surface), fitted.places)
 
 
@@ -123,7 +123,7 @@ def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
 
 def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:
     """Sources and charges as one sum."""
-    field, sources = fitted.field, fitted.drive.points
+    field, sources = fitted.field, fitted.lights.points
     depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
     heights = np.asarray(cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
@@ -134,7 +134,9 @@ def violation_of(fitted: FittedCharges, surface: Surface) -> Violation:
     """What the first light's charges violate on the true surface."""
     samples = fitted.places.fitted
     tree = cKDTree(samples.points)
-    points = quadrature(surface, lambda queries: INTEGRATED * FINER * samples.spacing[tree.query(queries)[1]])
+    points = quadrature(
+        surface, lambda queries: INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+    )
     exitance, residual = fitted.field.exitance_and_residual(points.points, points.normals)
     apart = Samples(points.points, points.normals, points.areas, points.spacing / INTEGRATED)
     return Violation(apart, exitance[:, 0], residual[:, 0])

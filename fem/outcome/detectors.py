@@ -12,15 +12,15 @@ from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.error import read_with_error
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
 # How far from the surface a point may be, as a share of the body's diagonal.
-FARTHEST = 0.05
+LARGEST_DISTANCE_SHARE = 0.05
 # How far from a flat disc the surface may run, as a share of its radius: on a sphere, a disc of half its radius.
-FLATNESS = 0.25
+LARGEST_GAP_SHARE = 0.25
 # Circles of a disc, and points on each: Gauss points in the square of the radius, so that areas come out equal.
 CIRCLES, SPOKES = 16, 32
 
@@ -130,35 +130,35 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
         radius; or if the surface is not flat enough for the disc, or ends under it.
     """
-    view = view_of(detector, solution)
+    placed = place_detector(detector, solution)
     error = model = None
     if isinstance(solution, Solution) and solution.quadratic is not None:
-        found = read_with_error(solution.quadratic, view.sight)
+        found = read_with_error(solution.quadratic, placed.measurement)
         exitance, error = found.value, found.relative
     else:
-        exitance = float(view.sight.weights @ solution.exitance_on(view.sight.points))
+        exitance = float(placed.measurement.weights @ solution.exitance_on(placed.measurement.points))
     if isinstance(solution, Solution) and solution.validity is not None:
-        model = float(view.sight.weights @ (1.0 - solution.valid_on(view.sight.points)))
-    power = None if view.area is None else view.share * exitance * view.area
-    return Reading(view.position, view.normal, exitance, view.area, power, error, model)
+        model = float(placed.measurement.weights @ (1.0 - solution.valid_on(placed.measurement.points)))
+    power = None if placed.area is None else placed.share * exitance * placed.area
+    return Reading(placed.position, placed.normal, exitance, placed.area, power, error, model)
 
 
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors, which takes less time together."""
     if isinstance(solution, Solution) and solution.quadratic is not None:
-        solution.quadratic.operator.duals([view_of(detector, solution).sight for detector in detectors])
+        solution.quadratic.operator.duals([place_detector(detector, solution).measurement for detector in detectors])
     return tuple(read(detector, solution) for detector in detectors)
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PlacedDetector:
     """A detector on a body.
 
     Attributes
     ----------
     position, normal : (3,) floats
         Its place on the surface, and the outward unit normal there.
-    sight : Sight
+    measurement : Measurement
         The points that it reads.
     area : float or None
         Of the flat disc, unit²; None for a point.
@@ -168,24 +168,26 @@ class View:
 
     position: Vector
     normal: Vector
-    sight: Sight
+    measurement: Measurement
     area: float | None = None
     share: float = 1.0
 
     __repr__ = one_line
 
 
-def view_of(detector: Detector, solution: ExitanceField) -> View:
+def place_detector(detector: Detector, solution: ExitanceField) -> PlacedDetector:
     """A detector on the body of a solution: see `read`."""
     if isinstance(detector, PointDetector):
-        reach = FARTHEST * solution.surface.diagonal
-        place, normal = _on_surface(solution, "position", detector.position, reach, f"{FARTHEST:.0%} of the diagonal")
-        return View(_vector(place), _vector(normal), Sight(place[None], np.ones(1)))
+        reach = LARGEST_DISTANCE_SHARE * solution.surface.diagonal
+        place, normal = _on_surface(
+            solution, "position", detector.position, reach, f"{LARGEST_DISTANCE_SHARE:.0%} of the diagonal"
+        )
+        return PlacedDetector(_vector(place), _vector(normal), Measurement(place[None], np.ones(1)))
     place, normal = _on_surface(solution, "center", detector.center, detector.radius, "its radius")
     flat = place + detector.radius * _unit_disc(normal)
     points, _ = solution.surface.project(flat)
     gap = float(np.linalg.norm(points - flat, axis=1).max())
-    if gap > FLATNESS * detector.radius:
+    if gap > LARGEST_GAP_SHARE * detector.radius:
         raise InputError(
             f"the disc of radius {detector.radius:.3g} at {as_text(place)} does not lie on the surface, which bends "
             f"away or ends {gap:.3g} {solution.surface.unit} from it; make it smaller or move it."
@@ -195,8 +197,8 @@ def view_of(detector: Detector, solution: ExitanceField) -> View:
     if isinstance(detector, FibreDetector):
         eta = solution.medium.eta
         share = collected_share(eta, detector.numerical_aperture) / collected_share(eta, 1.0)
-    sight = Sight(points, weights)
-    return View(_vector(place), _vector(normal), sight, math.pi * detector.radius**2, share)
+    measurement = Measurement(points, weights)
+    return PlacedDetector(_vector(place), _vector(normal), measurement, math.pi * detector.radius**2, share)
 
 
 def _on_surface(

@@ -13,7 +13,7 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import Boundary
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import read_with_error
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
@@ -267,10 +267,10 @@ class Solution:
             raise InputError("this solution was not made by solve, and has no errors of single points.")
         inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
         inside = inside[self.surface.contains(queries[inside])]
-        sights = [Sight(queries[[i]], np.ones(1), inside=True) for i in inside]
-        self.quadratic.operator.duals(sights)
-        for i, sight in zip(inside, sights, strict=True):
-            reading = read_with_error(self.quadratic, sight)
+        measurements = [Measurement(queries[[i]], np.ones(1), inside=True) for i in inside]
+        self.quadratic.operator.duals(measurements)
+        for i, measurement in zip(inside, measurements, strict=True):
+            reading = read_with_error(self.quadratic, measurement)
             found[:, i] = reading.value, reading.relative
         return found[0], found[1]
 

@@ -11,9 +11,9 @@ boundary and of interfaces are bent onto the true surface, and with them the tet
     space       the functions of a mesh, and how its edges are bent
     assembly    the matrix
     loads       what lights put on the functions
-    sight       what is read: points of the surface, or inside
+    measurement       what is read: points of the surface, or inside
     operator    the matrix with its solver, and the dual solutions of what is read
     solution    the fluence of lights, and what is read of it
-    roughness   what a function does not resolve
+    recovered_gradient_difference   what a function does not resolve
     error       how far off a reading is, by its dual solution
 """

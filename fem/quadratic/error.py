@@ -6,7 +6,7 @@ local error in it. With quadratic elements and their gradients averaged by R ove
     eta_K = D ∫_K (grad phi_h - R grad phi_h) . (grad z_h - R grad z_h)
 
 These have either sign and cancel mostly, like the steps of a random walk, but not all: the error is
-``SIZE sqrt(sum eta_K² + (SUM sum eta_K)²)``.
+``RANDOM_SCALE sqrt(sum eta_K² + (CORRELATED_WEIGHT sum eta_K)²)``.
 Points that lie off the mesh, where its bent facets miss the true surface, add what the fluence changes by on the way.
 """
 
@@ -15,16 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import at_cells
-from tetlux.fem.quadratic.roughness import roughness
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.measurement import Measurement
+from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
 # Calibrated so that the true error is within twice the bar for 95 % of readings (`tests.benchmarks.readings`).
-SIZE, SUM = 0.55, 0.4
+RANDOM_SCALE, CORRELATED_WEIGHT = 0.55, 0.4
 # The share of a reading that is always added: what gradients do not show, such as how far the surface is known.
-LEAST = 5e-4
+LEAST_RELATIVE_ERROR = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class ReadingError:
     @property
     def error(self) -> float:
         """Estimated error, W/unit²."""
-        return float(np.sqrt(self.squares.sum() + self.sum**2 + (LEAST * self.value) ** 2))
+        return float(np.sqrt(self.squares.sum() + self.sum**2 + (LEAST_RELATIVE_ERROR * self.value) ** 2))
 
     @property
     def relative(self) -> float:
@@ -58,19 +58,19 @@ class ReadingError:
     __repr__ = one_line
 
 
-def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
+def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> ReadingError:
     """What is read and how far it is off."""
     operator = solution.operator
     mesh, space = operator.mesh, operator.space
-    dual = operator.duals([sight])[0]
-    local = np.einsum("mij,mij->m", solution.unresolved, roughness(space, dual)) / 4.0
+    dual = operator.duals([measurement])[0]
+    local = np.einsum("mij,mij->m", solution.gradient_difference, recovered_gradient_difference(space, dual)) / 4.0
     local *= operator.coefficients.diffusion * mesh.volumes
-    value = solution.read(sight)
-    seen = operator.see(sight)
-    squares = (SIZE * local) ** 2
-    if not sight.inside:
+    value = solution.read(measurement)
+    discrete = operator.discretise(measurement)
+    squares = (RANDOM_SCALE * local) ** 2
+    if not measurement.inside:
         # Along the normal fluence changes by itself over the extrapolation length.
-        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, seen.cells)
-        off = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
-        squares[seen.cells[0]] += off**2
-    return ReadingError(value, squares, SIZE * SUM * float(local.sum()))
+        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, discrete.cells)
+        off = float(np.abs(measurement.weights) @ (discrete.distances_from_mesh * steepness)) * abs(value)
+        squares[discrete.cells[0]] += off**2
+    return ReadingError(value, squares, RANDOM_SCALE * CORRELATED_WEIGHT * float(local.sum()))

@@ -9,19 +9,19 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.quadratic.loads import QuadraticPatch, quadratic_fitted_patch, quadratic_load, quadratic_patch
+from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.roughness import roughness
-from tetlux.fem.quadratic.sight import Seen, Sight
+from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
 # Charges are subtracted where they are at most this many times brighter than the fluence.
-BRIGHTER = 4.0
+LARGEST_BRIGHTNESS_RATIO = 4.0
 
 
 @dataclass(frozen=True, eq=False)
-class QuadraticLights:
+class QuadraticScene:
     """The lights of a scene on a mesh; solved for when something is read.
 
     Attributes
@@ -29,23 +29,23 @@ class QuadraticLights:
     operator : QuadraticOperator
     deposits : tuple of Deposit
         What each light leaves on the mesh.
-    linear : tuple of tuple of Patch
+    linear_patches : tuple of tuple of Patch
         The patches of each light in linear elements.
-    guesses : tuple of (n,) ndarray
+    linear_fluences : tuple of (n,) ndarray
         The fluence of each light in linear elements, by which patches are chosen anew.
     """
 
     operator: QuadraticOperator
     deposits: tuple[Deposit, ...]
-    linear: tuple[tuple[Patch, ...], ...]
-    guesses: tuple[FloatArray, ...]
+    linear_patches: tuple[tuple[Patch, ...], ...]
+    linear_fluences: tuple[FloatArray, ...]
 
     @cached_property
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
         return tuple(
-            tuple(_patch(self.operator, patch, guess) for patch in own)
-            for own, guess in zip(self.linear, self.guesses, strict=True)
+            tuple(_patch(self.operator, patch, fluence) for patch in own)
+            for own, fluence in zip(self.linear_patches, self.linear_fluences, strict=True)
         )
 
     @cached_property
@@ -63,7 +63,9 @@ class QuadraticLights:
         # Fitted charges are far brighter near the light than what is missing, which is all that is solved for.
         fitted = np.column_stack(
             [
-                np.sum([np.zeros(self.operator.space.size), *(each.guess for each in own if each.is_fitted)], axis=0)
+                np.sum(
+                    [np.zeros(self.operator.space.size), *(each.interpolant for each in own if each.is_fitted)], axis=0
+                )
                 for own in self.patches
             ]
         )
@@ -76,15 +78,17 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
     """A patch in quadratic elements, by the fluence (n,) of its light in linear elements."""
     if isinstance(patch, FittedPatch):
         return quadratic_fitted_patch(operator, patch)
-    return quadratic_patch(operator, _widened(patch, fluence))
+    return quadratic_patch(operator, _widen(patch, fluence))
 
 
-def _widened(patch: Patch, fluence: FloatArray) -> Patch:
+def _widen(patch: Patch, fluence: FloatArray) -> Patch:
     """The patch of tetrahedra where charges are not much brighter than the fluence (n,) in linear elements.
 
     Its borders, across which the fluence jumps, are then farther from the light than those of linear elements.
     """
-    wide = patch_of(patch.mesh, patch.charges, patch.at_nodes <= BRIGHTER * np.abs(fluence), patch.at_nodes)
+    wide = patch_of(
+        patch.mesh, patch.charges, patch.at_nodes <= LARGEST_BRIGHTNESS_RATIO * np.abs(fluence), patch.at_nodes
+    )
     return wide if wide.cells.sum() > patch.cells.sum() else patch
 
 
@@ -94,71 +98,73 @@ class QuadraticSolution:
 
     Attributes
     ----------
-    of : QuadraticLights
+    scene : QuadraticScene
     lights : tuple of int
     """
 
-    of: QuadraticLights
+    scene: QuadraticScene
     lights: tuple[int, ...]
 
     @property
     def operator(self) -> QuadraticOperator:
         """The operator."""
-        return self.of.operator
+        return self.scene.operator
 
     @cached_property
     def fluence(self) -> FloatArray:
         """Fluence (size,), W/unit²."""
-        return np.asarray(self.of.fluence[:, self.lights].sum(axis=1))
+        return np.asarray(self.scene.fluence[:, self.lights].sum(axis=1))
 
     @property
     def patches(self) -> list[QuadraticPatch]:
         """Their patches."""
-        return [patch for light in self.lights for patch in self.of.patches[light]]
+        return [patch for light in self.lights for patch in self.scene.patches[light]]
 
     @cached_property
-    def unresolved(self) -> FloatArray:
-        """`roughness` of the fluence less what is known of it in closed form, (m, 4, 3)."""
+    def gradient_difference(self) -> FloatArray:
+        """`recovered_gradient_difference` of the fluence less what is known of it in closed form, (m, 4, 3)."""
         space = self.operator.space
-        rough = roughness(space, self.fluence)
+        rough = recovered_gradient_difference(space, self.fluence)
         for patch in self.patches:
             inside = np.flatnonzero(patch.patch.cells)
-            rough[inside] -= roughness(space, patch.guess)[inside]
+            rough[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
         return rough
 
     @cached_property
-    def rest(self) -> FloatArray:
+    def residual(self) -> FloatArray:
         """What is left of the load, (size,), W."""
-        load = self.of.loads[:, self.lights].sum(axis=1)
+        load = self.scene.loads[:, self.lights].sum(axis=1)
         return np.asarray(load - self.operator.matrix @ self.fluence)
 
-    def read(self, sight: Sight) -> float:
+    def read(self, measurement: Measurement) -> float:
         """The mean exitance, W/unit², or fluence inside."""
-        seen = self.operator.see(sight)
-        dual = self.operator.duals([sight])[0]
-        values = seen.scale * self.at(seen)
-        if not sight.inside:
-            values += self._unscattered(seen)
-        return float(sight.weights @ values + self.rest @ dual)
+        discrete = self.operator.discretise(measurement)
+        dual = self.operator.duals([measurement])[0]
+        values = discrete.scale * self.fluence_at(discrete)
+        if not measurement.inside:
+            values += self._unscattered(discrete)
+        return float(measurement.weights @ values + self.residual @ dual)
 
-    def at(self, seen: Seen) -> FloatArray:
+    def fluence_at(self, discrete: DiscreteMeasurement) -> FloatArray:
         """Fluence at points, (q,), W/unit²."""
-        fluence, points = seen.values(self.fluence), seen.sight.points
+        fluence, points = discrete.values(self.fluence), discrete.measurement.points
         for patch in self.patches:
-            inside = np.flatnonzero(patch.patch.cells[seen.cells])
+            inside = np.flatnonzero(patch.patch.cells[discrete.cells])
             if len(inside):
-                fluence[inside] += patch.patch.charges.fluence(points[inside]) - seen.values(patch.guess)[inside]
+                fluence[inside] += (
+                    patch.patch.charges.fluence(points[inside]) - discrete.values(patch.interpolant)[inside]
+                )
         return fluence
 
-    def _unscattered(self, seen: Seen) -> FloatArray:
+    def _unscattered(self, discrete: DiscreteMeasurement) -> FloatArray:
         """Exitance beside ``phi/(2A)`` under diffuse light, (q,), as `Solution.exitance` has it."""
         mesh = self.operator.mesh
-        given = sum(self.of.deposits[light].terms.transmitted_irradiance for light in self.lights)
+        given = sum(self.scene.deposits[light].terms.transmitted_irradiance for light in self.lights)
         if not np.any(given):
-            return np.zeros(len(seen.cells))
+            return np.zeros(len(discrete.cells))
         transmitted = np.zeros(len(mesh.points))
         transmitted[mesh.boundary_nodes] = given
         share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.operator.coefficients.outer.eta)[1])
-        return np.asarray(share * (transmitted[seen.places[:, :3]] * seen.hats[:, :3]).sum(axis=1))
+        return np.asarray(share * (transmitted[discrete.dofs[:, :3]] * discrete.shape_values[:, :3]).sum(axis=1))
 
     __repr__ = one_line

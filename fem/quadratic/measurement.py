@@ -1,18 +1,18 @@
-"""`Sight`: what a reading looks at, points of the surface or inside, and what it is on a mesh."""
+"""`Measurement`: what a reading looks at, points of the surface or inside, and what it is on a mesh."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, functions
+from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_functions
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class Measurement:
     """A mean over points: of ``phi/(2A)`` on the surface, or of the fluence inside.
 
     Attributes
@@ -36,58 +36,58 @@ class Sight:
         return hash(self._key)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Sight) and self._key == other._key
+        return isinstance(other, Measurement) and self._key == other._key
 
-    def on(self, space: QuadraticSpace, coefficients: Coefficients) -> "Seen":
+    def discretise(self, space: QuadraticSpace, coefficients: Coefficients) -> "DiscreteMeasurement":
         """What it is on a mesh."""
         if self.inside:
             cells, weights = space.within(self.points)
-            return Seen(self, space, 1.0, cells, space.cells[cells], functions(weights))
+            return DiscreteMeasurement(self, space, 1.0, cells, space.cells[cells], shape_functions(weights))
         face, weights = space.on_boundary(self.points)
         mesh = space.mesh
-        places, hats = space.faces(mesh.boundary_faces[face]), functions(weights, TRIANGLE_EDGES)
-        return Seen(self, space, coefficients.robin, mesh.boundary_cells[face], places, hats)
+        dofs, shape_values = space.faces(mesh.boundary_faces[face]), shape_functions(weights, TRIANGLE_EDGES)
+        return DiscreteMeasurement(self, space, coefficients.robin, mesh.boundary_cells[face], dofs, shape_values)
 
     __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """A sight on a mesh.
+class DiscreteMeasurement:
+    """A measurement on a mesh.
 
     Attributes
     ----------
-    sight : Sight
+    measurement : Measurement
     space : QuadraticSpace
     scale : float
         From fluence to what is read.
     cells : (q,) ndarray
         The tetrahedron at each point.
-    places, hats : (q, c) ndarray
+    dofs, shape_values : (q, c) ndarray
         Functions there, and their values.
     """
 
-    sight: Sight
+    measurement: Measurement
     space: QuadraticSpace
     scale: float
     cells: IntArray
-    places: IntArray
-    hats: FloatArray
+    dofs: IntArray
+    shape_values: FloatArray
 
     @property
     def load(self) -> FloatArray:
         """What it reads of each function, (size,)."""
-        values = self.scale * self.sight.weights[:, None] * self.hats
-        return sum_by_index(self.places, values, self.space.size)
+        values = self.scale * self.measurement.weights[:, None] * self.shape_values
+        return sum_by_index(self.dofs, values, self.space.size)
 
     def values(self, function: FloatArray) -> FloatArray:
         """A function (size,) at the points, (q,)."""
-        return np.asarray((function[self.places] * self.hats).sum(axis=1))
+        return np.asarray((function[self.dofs] * self.shape_values).sum(axis=1))
 
     @property
-    def away(self) -> FloatArray:
+    def distances_from_mesh(self) -> FloatArray:
         """How far each point is from where the mesh has it, (q,), unit."""
-        there = self.hats[..., None] * self.space.corners_and_bends(self.places)
-        return np.asarray(np.linalg.norm(there.sum(axis=1) - self.sight.points, axis=1))
+        there = self.shape_values[..., None] * self.space.corners_and_bends(self.dofs)
+        return np.asarray(np.linalg.norm(there.sum(axis=1) - self.measurement.points, axis=1))
 
     __repr__ = one_line

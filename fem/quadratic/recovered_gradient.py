@@ -7,7 +7,7 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.topology import EDGES
 
 
-def roughness(space: QuadraticSpace, function: FloatArray) -> FloatArray:
+def recovered_gradient_difference(space: QuadraticSpace, function: FloatArray) -> FloatArray:
     """The averaged gradient less the gradient at the corners of each tetrahedron, (m, 4, 3), of a function (size,).
 
     Gradients are averaged over the tetrahedra of one region around a node, weighted by volume; across an interface they
@@ -22,6 +22,6 @@ def roughness(space: QuadraticSpace, function: FloatArray) -> FloatArray:
         slopes[:, j] += steepness * hats[:, i]
     curved = space.curved
     if len(curved):
-        slopes[curved] = (slopes[curved, :, None] @ space.straightening)[:, :, 0]
-    groups, average = space.averaging
+        slopes[curved] = (slopes[curved, :, None] @ space.inverse_jacobians)[:, :, 0]
+    groups, average = space.nodal_averaging
     return np.asarray((average @ slopes.reshape(-1, 3))[groups] - slopes)
