@@ -1,4 +1,4 @@
-"""Integrals over a smooth surface: points of it and the areas that they stand for."""
+"""Quadrature over a smooth surface."""
 
 import numpy as np
 
@@ -7,15 +7,16 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
-# Cells longer than this share of the spacing have three points, the middles of their sides (exact for quadratics).
+# Cells up to this share of the spacing have one point; longer ones have the middles of their sides, exact for
+# quadratics.
 LARGEST_ONE_POINT_CELL = 0.5
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
-# Share of a cell's sides over which its stretching is told.
+# Step of the finite difference for the area, as a share of a cell's sides.
 DIFFERENCE_STEP = 1e-5
 
 
 def quadrature(surface: Surface, spacing: Spacing) -> Samples:
-    """Points of the smooth surface and the areas they stand for, to integrate what changes over a spacing."""
+    """Points and weights on the smooth surface, to integrate functions that vary over a spacing."""
     cells = cells_of(surface, spacing).cut(spacing, 1.0)
     coarse = longest_sides(cells.corners) > LARGEST_ONE_POINT_CELL * cells.spacing
     fine, rule = np.flatnonzero(~coarse), np.repeat(np.flatnonzero(coarse), 3)
@@ -31,7 +32,7 @@ def quadrature(surface: Surface, spacing: Spacing) -> Samples:
 
 
 def _map_to_surface(surface: Surface, cells: Cells, own: IntArray, flat: FloatArray, shares: FloatArray) -> Samples:
-    """Points of cells taken to the smooth surface, with the area that their share of the cell has there."""
+    """Points of cells mapped to the smooth surface, and their shares of the cells' areas there as weights."""
     faces, corners = cells.faces[own], cells.corners[own]
     points, normals = surface.on_curve(faces, flat)
     sides = [corners[:, i] - corners[:, 0] for i in (1, 2)]

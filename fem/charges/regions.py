@@ -1,8 +1,8 @@
-"""Charges in a body of several even regions: each region has its own, outside it.
+"""Charges in a body of homogeneous regions: each region has charges of its own, outside it.
 
-Charges of a region lie beyond its outer surface and within its inner ones, so that they obey its equation inside it.
-On the body's surface they are fitted to ``D dphi/dn + phi/(2A) = 0``, on the surface of an inner region to phi and
-``D dphi/dn`` being the same on both sides. Rows of phi are divided by 2A, so that all are W/unit².
+Charges of a region lie outside its outer surface and inside the surfaces of regions within it, so that they solve its
+equation in it. They are fitted to ``D dphi/dn + phi/(2A) = 0`` on the body's surface, and to the continuity of phi and
+``D dphi/dn`` on the surface of an inner region. Equations for phi are divided by 2A, so that all are in W/unit².
 """
 
 from collections.abc import Sequence
@@ -30,21 +30,21 @@ from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 
-# Light that went deep is faint: rows far from the source weigh more than in one medium. Reading at 30° of a four-layer
-# head by 1,050 charges, error in % and that of the whole for powers of .75 / 1.25 / 1.5: -.99, .0045 / -.75, .0047 /
-# -.66, .0049; at 45° 1.0 / .03 / -.19.
+# Equations are weighted by this power of the distance from the light, larger than in one medium, since light from deep
+# regions is faint. Four-layer head, 1,050 charges: error in % of the reading at 30°, and of the exitance, for powers of
+# .75 / 1.25 / 1.5: -.99, .0045 / -.75, .0047 / -.66, .0049; of the reading at 45°: 1.0 / .03 / -.19.
 DISTANCE_EXPONENT = 1.25
 # Only the long waves of the residual at an inner interface reach the body's surface: this is their length over that of
 # waves at the body's surface. Estimate over error on 24 random balls of two or three layers: .26 to 1.9 with 1, .89 to
 # 3.8 with 3.
 INNER_RIPPLE_FACTOR = 3.0
-# A last step to the most charges is taken if that is so many times more.
+# A last fit with the most charges is made if these are at least this many times those of the fit before.
 LEAST_LAST_FACTOR = 1.2
 
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """The outer surface of a region.
+    """The outer surface of a region, or of the body.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Interface:
     inside : int
         The region.
     outside : int or None
-        The region round it; none of the body itself.
+        The region around it; None for the body itself.
     """
 
     surface: Surface
@@ -62,15 +62,15 @@ class Interface:
 
 @dataclass(frozen=True, eq=False)
 class InterfacePlaces:
-    """Places at an interface.
+    """Positions of charges on both sides of an interface.
 
     Attributes
     ----------
     interface : Interface
     places : Places
-        Of charges of the region inside, which lie beyond the interface.
+        Of charges of the region inside, which lie outside the interface.
     charges_inside : (c, 3) ndarray
-        Charges of the region outside, which lie within it.
+        Charges of the region outside, which lie inside the interface.
     """
 
     interface: Interface
@@ -80,7 +80,7 @@ class InterfacePlaces:
 
 @dataclass(frozen=True, eq=False)
 class RegionSources:
-    """Point sources: places (p, 3), the region of each (p,), and their powers (p, s) by s lights, W."""
+    """Point sources: positions (p, 3), regions (p,), and powers (p, s) in s lights, W."""
 
     points: FloatArray
     regions: IntArray
@@ -89,12 +89,12 @@ class RegionSources:
 
 @dataclass(frozen=True, eq=False)
 class FittedRegions:
-    """Charges of each region, fitted.
+    """Fitted charges of each region.
 
     Attributes
     ----------
     fields : tuple of ChargeField
-        Of each region, the body's own first: its sources, then its charges.
+        Of the region around all others, then of regions 1, 2, ...: sources, then charges.
     places : tuple of InterfacePlaces
     errors : ErrorEstimates
     """
@@ -107,7 +107,7 @@ class FittedRegions:
 def interface_places(
     interfaces: Sequence[Interface], light: RegionSources, count: int, height: float = HEIGHT_ROUGH
 ) -> list[InterfacePlaces]:
-    """Places of about `count` charges of all regions together."""
+    """Positions of about `count` charges of all regions together."""
     rng = np.random.default_rng(0)
     spacings = [distance_from(interface.surface, light.points) for interface in interfaces]
     inner = sum(interface.outside is not None for interface in interfaces)
@@ -131,12 +131,12 @@ def interface_places(
 def boundary_equations(
     interface: Interface, samples: Samples, equations: Sequence[Equation], charges: Sequence[FloatArray]
 ) -> list[NumberArray]:
-    """What unit charges of each region, (c, 3) each, violate at samples (m,) of an interface, W/unit².
+    """Boundary or interface equations at samples (m,) for unit charges of each region, (c, 3) each, W/unit².
 
     Returns
     -------
     list of (m, c) or (2 m, c) ndarray
-        On the body's surface what does not flow out, and on an inner one the steps of ``phi/(2A)`` and ``D dphi/dn``.
+        On the body's surface ``D dphi/dn + phi/(2A)``; on others the jumps of ``phi/(2A)`` and of ``D dphi/dn``.
     """
     rows = 1 if interface.outside is None else 2
     found: list[NumberArray] = []
@@ -161,19 +161,19 @@ def fit_regions(
     tolerance: float,
     most: int = MOST_CHARGES,
 ) -> FittedRegions:
-    """Fit charges until the estimated error of the exitance is within the tolerance, or there are enough.
+    """Fit charges until the estimated error of the exitance is within the tolerance, or there are `most` charges.
 
     Parameters
     ----------
     interfaces : sequence of Interface
         The body's surface first, then those of regions 1, 2, ...
     equations : sequence of Equation
-        Of the body's own region, 0, and of the others.
+        Of region 0, around all others, and of regions 1, 2, ...
     light : RegionSources
     tolerance : float
         Relative L2 error of the exitance.
     most : int
-        Charges at which it ends in any case, about.
+        Approximate number of charges at which fitting ends in any case.
     """
     count = min(FEWEST_CHARGES * (2 * len(interfaces) - 1), most)
     best = fit_regions_at(interface_places(interfaces, light, count), equations, light)
@@ -189,7 +189,7 @@ def fit_regions(
 def fit_regions_at(
     places: Sequence[InterfacePlaces], equations: Sequence[Equation], light: RegionSources
 ) -> FittedRegions:
-    """Fit charges of all regions at given places."""
+    """Fit the strengths of charges of all regions at given positions."""
     regions = range(len(equations))
     charges = [np.vstack([np.zeros((0, 3)), *(_charges_at(each, region) for each in places)]) for region in regions]
     mine = [light.regions == region for region in regions]

@@ -1,9 +1,9 @@
-"""Points spread over a surface, densely where light changes within little space: where charges and equations go.
+"""Points on a surface at a variable spacing, for charges and equations.
 
-The surface is cut into cells about as large as the wanted spacing. Candidates are drawn from these cells in their
-order, each cell as often as its area asks for, and then thinned: a candidate stays unless one of higher priority that
-stays is too near (Poisson-disc sampling by dart throwing; with a radius that varies, Mitchell et al. 2012). Points that
-face away from each other, on the two sides of a plate, do not thin each other.
+The surface is cut into cells about as large as the wanted spacing. Candidates are drawn from the cells in proportion to
+area over the square of the spacing, and then thinned: a candidate stays unless an earlier one that stays is too near
+(Poisson-disc sampling by dart throwing; with a radius that varies, Mitchell et al. 2012). Points on opposite sides of a
+plate, whose normals point away from each other, do not thin each other.
 """
 
 from collections.abc import Callable
@@ -17,13 +17,13 @@ from tetlux.meshing.surface.subdivide import quarter_triangles
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
-# Candidates to each square of the spacing.
+# Candidates in each square of the spacing.
 CANDIDATES_PER_SQUARE = 4.0
-# Points that stay are farther apart than this times the spacing.
+# Least distance between two points that stay, over the spacing.
 LEAST_SEPARATION = 0.8
-# Neighbours looked at when thinning; within that radius there are 8 candidates in the mean.
+# Nearest candidates that may remove one; within the least distance there are 8 on average.
 CHECKED_NEIGHBOURS = 20
-# Cells are no longer than this times the spacing, unless they are whole triangles.
+# Longest side of a cell, over the spacing in its middle.
 LARGEST_CELL = 1.5
 _MOST_CUTS = 40
 
@@ -40,7 +40,7 @@ class Samples:
     points, normals : (n, 3) ndarray
         Outward unit normals.
     areas : (n,) ndarray
-        What each stands for, unit².
+        Quadrature weight of each, unit².
     spacing : (n,) ndarray
         Wanted distance to the next one, unit.
     """
@@ -82,15 +82,15 @@ class Cells:
 
     @property
     def sample_count(self) -> float:
-        """How many squares of the spacing there are."""
+        """Number of points: squares of the spacing that fit into the cells."""
         return float((self.areas / self.spacing**2).sum())
 
     def scaled(self, scale: float) -> "Cells":
-        """The same for a spacing so many times as large."""
+        """The same cells for a spacing times a factor."""
         return replace(self, spacing=scale * self.spacing)
 
     def cut(self, spacing: Spacing, size: float = LARGEST_CELL) -> "Cells":
-        """Cut them until none is longer than `size` times the spacing in its middle."""
+        """Cut cells in four until none is longer than `size` times the spacing in its middle."""
         faces, corners, wanted = self.faces, self.corners, self.spacing
         done: list[tuple[IntArray, FloatArray, FloatArray]] = []
         for cut in range(_MOST_CUTS + 1):
@@ -101,7 +101,7 @@ class Cells:
             faces, corners = np.repeat(faces[~small], 4), quarter_triangles(corners[~small])
             wanted = spacing(corners.mean(axis=1))
         faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
-        # Parts of one triangle side by side, so that drawing in order spreads points evenly.
+        # Parts of one triangle become neighbours, so that stratified drawing covers each triangle evenly.
         order = np.argsort(faces, kind="stable")
         return Cells(faces[order], corners[order], wanted[order])
 
@@ -127,7 +127,7 @@ def draw(surface: Surface, cells: Cells, rng: np.random.Generator) -> Samples:
 
 
 def thin(samples: Samples, radii: FloatArray) -> BoolArray:
-    """Which of some samples in random order stay, so that none is within the radius (n,) of an earlier one."""
+    """Whether each sample stays, (n,), so that none lies within the radius (n,) of an earlier one."""
     count = len(samples)
     if count < 2:
         return np.ones(count, dtype=bool)
@@ -142,7 +142,7 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     late, early = first[earlier], second[earlier]
     kept, open_ = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     while open_.any():
-        # One stays once all earlier ones near it have gone.
+        # A sample stays once all earlier samples near it are removed.
         waiting = np.zeros(count, dtype=bool)
         waiting[late[open_[early]]] = True
         stays = open_ & ~waiting
@@ -154,7 +154,7 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
 
 
 def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
-    """Points about a spacing apart, in random order, and the candidates that were not taken."""
+    """Points about a spacing apart, in random order, and the candidates that were removed."""
     drawn = draw(surface, cells, rng)
     drawn = drawn[rng.permutation(len(drawn))]
     kept = thin(drawn, LEAST_SEPARATION * drawn.spacing)

@@ -1,4 +1,4 @@
-"""`ChargeSolution`: light in a body of even regions, by charges fitted to their surfaces, without a mesh."""
+"""`ChargeSolution`: light in a body of homogeneous regions, by charges fitted to their surfaces, without a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -29,14 +29,14 @@ from tetlux.meshing.tets.regions import region_at
 
 @dataclass(frozen=True)
 class LightLedger:
-    """What is known of a light before it diffuses.
+    """Power of a light that does not enter diffusion, and its diffuse irradiance.
 
     Attributes
     ----------
     ledger : Power
-        What of it meets the body, is reflected at once, absorbed before it was ever scattered, or passes through, W.
+        Incident, specularly reflected, absorbed before the first scattering, and passed through the body, W.
     irradiance, transmitted : float
-        Diffuse light on the outside, and what of it passes to the inside, W/unit².
+        Diffuse irradiance on the outside, and the part of it that is transmitted to the inside, W/unit².
     """
 
     ledger: Power
@@ -54,13 +54,13 @@ class ChargeSolution:
     medium : Medium
         Of the body.
     interfaces : tuple of Interface
-        The body's surface, and those of its regions.
+        The body's surface, then those of its regions.
     fields : tuple of ChargeField
-        In the body's own region and in the others, each with a column of strengths for each light.
+        In the region around all others, and in regions 1, 2, ...; each with a column of strengths for each light.
     samples : tuple of Samples
         Points of each interface at which charges were fitted.
     sources : (s,) ndarray
-        Power of each light's points, W.
+        Power of the point sources of each light, W.
     ledgers : tuple of LightLedger
         Of each light.
     errors : ErrorEstimates
@@ -69,7 +69,7 @@ class ChargeSolution:
         Seconds spent on surface, solve, and total.
     warnings : list of str
     readings : tuple of Reading
-        What the detectors read that were given to `tetlux.fem.solve`, in their order.
+        Of the detectors that were given to `tetlux.fem.solve`, in their order.
     """
 
     surface: Surface
@@ -128,22 +128,22 @@ class ChargeSolution:
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
-        """Points of the body's surface (n, 3), and how far apart charges are above them (n,), unit."""
+        """Points of the body's surface (n, 3), and the spacing of charges above them (n,), unit."""
         return self.samples[0].points, EQUATION_REFINEMENT * self.samples[0].spacing
 
     @property
     def charges(self) -> int:
-        """How many there are, sources included."""
+        """Number of charges, sources included."""
         return sum(len(each.positions) for each in self.fields)
 
     @property
     def fluence(self) -> FloatArray:
-        """Refused: it is that at the nodes of a mesh."""
+        """Refused: this is the fluence at the nodes of a mesh, and there is no mesh."""
         raise InputError('model "charges" has no mesh, nor fluence at its nodes; ask fluence_at(points).')
 
     @cached_property
     def of_lights(self) -> "tuple[ChargeSolution, ...]":
-        """What each light adds, in their order, if there are several."""
+        """The solution of each light, in their order; empty if there is only one."""
         count = len(self.ledgers)
         return tuple(self._of_light(light) for light in range(count)) if count > 1 else ()
 
@@ -162,8 +162,8 @@ class ChargeSolution:
     def power(self) -> Power:
         """The ledger, W.
 
-        What exits is the integral of the exitance. What is absorbed is, by Gauss's theorem, what sources give and what
-        flows into each region through its interfaces: the ledger balances as far as the conditions there hold.
+        The exited power is the integral of the exitance. The absorbed power is, by Gauss's theorem, the power of the
+        sources plus the net inflow of each region. The ledger balances as far as the interface conditions hold.
         """
         area, diffused, inflow = self._flows
         known = [ledger.ledger for ledger in self.ledgers]
@@ -206,7 +206,7 @@ class ChargeSolution:
 
     @property
     def _unscattered(self) -> float:
-        """Exitance beside ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
+        """Exitance in addition to ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
         share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1])
         return share * sum(ledger.transmitted for ledger in self.ledgers)
 
@@ -226,7 +226,7 @@ def charge_solution(
     tolerance: float = 0.02,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
-    """Solve for point sources and diffuse light in a body of even regions.
+    """Solve for point sources and diffuse light in a body of homogeneous regions.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def charge_solution(
     points : (p, 3) ndarray
         Sources inside the body.
     powers : (p, s) ndarray
-        What each of s lights puts into each of them, W.
+        Powers of the sources in each of s lights, W.
     ledgers : sequence of LightLedger
         Of each light; diffuse light is for a body without regions.
     inner : sequence of (Surface, Medium)
@@ -244,7 +244,7 @@ def charge_solution(
     tolerance : float
         Wanted relative L2 error of the exitance.
     most : int
-        Charges at which fitting ends in any case, about.
+        Approximate number of charges at which fitting ends in any case.
 
     Returns
     -------

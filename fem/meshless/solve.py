@@ -1,4 +1,4 @@
-"""Lights in a body of even regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
+"""Lights in a body of homogeneous regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,9 +27,10 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.nesting import check_regions
 
-# Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
+# Least distance of a source from the surface of a region, in mean free paths. The error is .1 % at this distance and 50
+# % on the surface.
 LEAST_DISTANCE_TO_INTERFACE = 1e-3
-# An exitance below zero by less than this share of its maximum is not worth a sentence.
+# Negative exitance of less than this share of its maximum gives no warning.
 NEGLIGIBLE_DIP = 1e-6
 _INSTEAD = 'solve it with model "full".'
 
@@ -43,7 +44,7 @@ def solve_with_charges(
     tolerance: float = 0.02,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
-    """Solve for lights in a body of even regions, without a mesh.
+    """Solve for lights in a body of homogeneous regions, without a mesh.
 
     Parameters
     ----------
@@ -115,7 +116,7 @@ def solve_with_charges(
 
 
 def _below_zero(solution: ChargeSolution) -> list[str]:
-    """What to say where the exitance is below zero: there it is less than its error."""
+    """A warning where the exitance is below zero: there it is less than its error."""
     points, areas = solution.samples[0].points, solution.samples[0].areas
     exitance = solution.exitance_on(points)
     below = exitance < -NEGLIGIBLE_DIP * exitance.max()
@@ -165,7 +166,7 @@ def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -
 
 
 def homogeneous_medium(medium: AnyMedium) -> Medium:
-    """The medium, if it does not vary.
+    """The medium, if it is homogeneous.
 
     Raises
     ------
@@ -178,7 +179,7 @@ def homogeneous_medium(medium: AnyMedium) -> Medium:
 
 
 def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Surface]) -> None:
-    """Refuse what a light leaves in a body, unless that is points and even diffuse light.
+    """Refuse a light unless it leaves point sources or uniform diffuse light in the body.
 
     Parameters
     ----------
