@@ -33,7 +33,7 @@ MOST_CHARGES = 1600
 # Estimate in % by 300 charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037
 # / .050, hare .43 / .46, rocker-arm .63 / .93.
 SMOOTH_ESTIMATE = 0.003
-# The spacing is proportional to the local residual to minus this power. Error in % by 300 charges on ball, torus, hare,
+# The spacing is multiplied by the local residual to minus this power. Error in % by 300 charges on ball, torus, hare,
 # spot for a power and a NOISE_FACTOR: 0: .004, .16, .81, 2.6; .4 and 1: .017, .037, .46, 1.6; .5 and 2: .005, .043,
 # .50, 1.8.
 REFINEMENT_EXPONENT = 0.5
@@ -54,7 +54,7 @@ ASSUMED_RATE = 2.0
 LEAST_GROWTH = 1.4
 # The number of charges grows by at most this factor from fit to fit.
 MOST_GROWTH = 2.2
-# A fit with a larger estimated error is not subtracted: its remainder is as hard to solve for as the light itself.
+# A fit with a larger estimated error does not help finite elements, and is not used.
 LARGEST_USEFUL_ESTIMATE = 0.2
 
 

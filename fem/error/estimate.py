@@ -1,16 +1,16 @@
-"""The error of the exitance, and the share of each tetrahedron in it.
+"""The error of the exitance, and an indicator of the contribution of each tetrahedron to it.
 
 The dual-weighted residual (Becker & Rannacher 2001): the system is solved once more with the exitance itself as its
-load. This dual solution z is the weight of a local error in the exitance. A second dual, with an even load, gives the
-weight of a local error in the total power that leaves. For either of them these add up:
+load. This dual solution z is the weight of a local residual in the error of the exitance. A second dual, with a uniform
+load, gives the weight in the error of the total exited power. The indicators of either dual are the sum of:
 
 * the residual within tetrahedra (`tetlux.fem.error.residual`),
 * layers thinner than their tetrahedra (`tetlux.fem.error.layers`),
 * flat facets in place of curved surfaces (`tetlux.fem.error.facets`),
-* ripples of what fitted charges violate at the boundary that are finer than facets (`tetlux.fem.known.fitted_patch`),
-  which hardly change the total.
+* the part of the residual of fitted charges that the facets do not resolve (`tetlux.fem.known.fitted_patch`), which
+  hardly changes the total power.
 
-All terms are moduli, so that errors that cancel are counted.
+All terms are absolute values, so that errors do not cancel in the estimate.
 """
 
 from collections.abc import Sequence
@@ -39,11 +39,11 @@ from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Facets of a round body err to one side, and partly against the gradients. With half of their sum the estimate is 0.6
-# to 3 times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
+# Weight of the indicators of facets, whose errors partly cancel those of gradients. With it the estimate is 0.6 to 3
+# times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACET_WEIGHT = 0.5
-# Exited power below this share of the incident power is the residual of the linear solver.
+# Exited power below this share of the incident power is rounding error of the linear solver.
 ROUNDING = 1e-12
 
 
@@ -54,7 +54,7 @@ class Estimate:
     Attributes
     ----------
     exitance_indicators, power_indicators : (m,) ndarray
-        Shares of the tetrahedra in the relative errors of the exitance and of the total power that leaves.
+        Indicators of the tetrahedra; they sum to the relative errors of the exitance and of the total exited power.
     """
 
     exitance_indicators: FloatArray
@@ -84,7 +84,7 @@ def estimate_error(
     ----------
     solution : Solution
     whole : Solution
-        The solution that it is part of, or itself: errors are relative to its exitance.
+        The solution that `solution` is a part of, or `solution` itself: errors are relative to its exitance.
     coefficients : Coefficients
         Of the mesh of the solution.
     solver : Solver
@@ -109,8 +109,8 @@ def estimate_error(
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
     duals = solver.roughly(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
     mean = nodal_averaging(mesh)
-    smooth, rough = subtract_patches(solution, mean)
-    slope_error = root_mean_square(rough)
+    smooth, difference = subtract_patches(solution, mean)
+    gradient_error = root_mean_square(difference)
     remainder, outward_flux = _remainder(solution)
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
@@ -119,7 +119,10 @@ def estimate_error(
     def indicators_for_dual(dual: FloatArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
         indicators = (
-            diffusion * mesh.volumes * slope_error * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
+            diffusion
+            * mesh.volumes
+            * gradient_error
+            * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
         )
         indicators += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
         indicators += _boundary_lumping(mesh, coefficients, smooth, dual)
@@ -142,7 +145,7 @@ def estimate_error(
 def _dual_loads(
     mesh: TetMesh, coefficients: Coefficients, exitance: FloatArray, norm: float, total: float
 ) -> FloatArray:
-    """Loads of the two duals (n, 2): of the exitance, by its L2 norm, and of all that leaves, by its integral."""
+    """Loads of the two duals, (n, 2): for the L2 error of the exitance, and for the error of the exited power."""
     loads = np.zeros((len(mesh.points), 2))
     robin, areas = coefficients.robin, mesh.boundary_node_areas
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
@@ -151,7 +154,7 @@ def _dual_loads(
 
 
 def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
-    """What the mesh adds to fitted charges: its fluence, and the net flux of that which leaves, at the nodes (n,)."""
+    """Fluence less that of fitted charges, and its net flux out of the body, at the nodes, (n,) each."""
     mesh, remainder = solution.mesh, solution.fluence
     outward_flux = np.zeros(len(mesh.points))
     outward_flux[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
@@ -165,7 +168,7 @@ def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
 
 
 def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
-    """Shares in what the mesh misses of the residuals of fitted charges, (m,), by the norm of the exitance."""
+    """Indicators of the residuals of fitted charges that facets do not resolve, (m,), over the norm of the exitance."""
     mesh = solution.mesh
     square = np.zeros(len(mesh.boundary_faces))
     for patch in solution.patches:
@@ -177,7 +180,7 @@ def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
 
 
 def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
-    """Shares in the error of lumping the boundary term, (m,)."""
+    """Indicators of the error of lumping the boundary term, (m,)."""
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     corners = (mesh.tetrahedra[cells][:, None, :] == faces[:, :, None]).argmax(axis=2)
     on_faces = lumping_error(np.take_along_axis(smooth[cells], corners, axis=1), dual[faces])

@@ -1,10 +1,10 @@
-"""The error of flat facets that stand for a curved boundary or interface.
+"""The error of flat facets in place of a curved boundary or interface.
 
 A boundary that lies a distance delta away adds the shape derivative of the weak form::
 
     ∮ |delta| [ D |grad_t phi . grad_t z| + sigma_a phi z + |kappa - 1/zb| J z ]
 
-with J the net flux that leaves and kappa twice the mean curvature. An interface between regions adds, with jumps [.]
+with J the net outward flux and kappa twice the mean curvature. An interface between regions adds, with jumps [.]
 across it::
 
     ∮ |delta| [ |[D]| |grad_t phi . grad_t z| + |[1/D]| |D dphi/dn D dz/dn| + |[sigma_a]| phi z + |[Q0]| z ]
@@ -21,12 +21,13 @@ from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import owners
 
-# Facets that could add no more than the first share of the rest are not measured. The distance of a facet from a smooth
-# surface is at most the second share of its longest edge.
-NEGLIGIBLE_SHARE, LARGEST_DISTANCE_RATIO = 0.02, 0.2
-# Farther from the surface than this share of its longest edge, a facet is not a chord of a smooth surface.
+# Facets are not measured if together they can add at most this share of all other indicators.
+NEGLIGIBLE_SHARE = 0.02
+# Largest distance of a facet from a smooth surface, over its longest edge.
+LARGEST_DISTANCE_RATIO = 0.2
+# A facet farther from the surface than this, over its longest edge, is no chord of a smooth surface.
 LARGEST_CHORD_RATIO = 0.1
-# The mean distance of a paraboloid from a triangle through three of its points, over the distance at the middle.
+# Mean distance of a paraboloid from a triangle through three of its points, over the distance at the triangle's middle.
 MEAN_DISTANCE_RATIO = 0.75
 
 
@@ -35,20 +36,20 @@ def boundary_facets(
     coefficients: Coefficients,
     surface: Surface,
     values: tuple[FloatArray, FloatArray, FloatArray],
-    rest: float,
+    others: float,
     absorption_scale: float | FloatArray,
 ) -> FloatArray:
-    """Shares in the error of flat facets of the boundary, (m,).
+    """Indicators of the error of flat facets of the boundary, (m,).
 
     Parameters
     ----------
     values : tuple of three (n,) ndarray
-        At the nodes: the fluence, the net flux that leaves, and the dual.
-    rest : float
-        The sum of all other indicators: facets that could add little to it are not measured.
+        At the nodes: the fluence, the net outward flux, and the dual.
+    others : float
+        The sum of all other indicators; facets that can add little to it are not measured.
     absorption_scale : float or (m,) ndarray
-        A fitted layer moves with the facets, so that only their curvature matters to it: the other terms are scaled by
-        this.
+        Scale of the terms other than curvature: a fitted layer moves with the facets, and depends on their curvature
+        only.
     """
     fluence, outward_flux, dual = values
     faces, cells = mesh.boundary_faces, mesh.boundary_cells
@@ -66,10 +67,10 @@ def boundary_facets(
     length = longest_sides(corners)
     most = LARGEST_DISTANCE_RATIO * length * areas * (along + scale * outflow / extrapolation)
     order = np.argsort(most)
-    measured = order[np.cumsum(most[order]) > NEGLIGIBLE_SHARE * rest]
+    measured = order[np.cumsum(most[order]) > NEGLIGIBLE_SHARE * others]
     distance = mesh.boundary_distances(surface, measured)
     # A sphere through the corners of an equilateral triangle is h²/6R above its middle. A facet farther away has a
-    # node that could not be moved onto the surface, and its distance says nothing of the curvature.
+    # node that could not be moved onto the surface, and its distance does not depend on the curvature.
     curvature = np.where(
         distance < LARGEST_CHORD_RATIO * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0
     )
@@ -85,7 +86,7 @@ def interface_facets(
     emission: float | FloatArray,
     values: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
-    """Shares in the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
+    """Indicators of the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
     total = np.zeros(len(mesh.tetrahedra))
     if len(inner) == 0:
         return total

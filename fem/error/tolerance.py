@@ -32,7 +32,7 @@ MOST_SPLITS = 3
 
 
 def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
-    """Refuse a tolerance that is no sensible relative error.
+    """Refuse a tolerance that is not between 0.0001 and 1.
 
     Raises
     ------

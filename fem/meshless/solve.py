@@ -175,7 +175,7 @@ def homogeneous_medium(medium: AnyMedium) -> Medium:
     """
     if isinstance(medium, Medium):
         return medium
-    raise InputError(f'the medium varies within the body, and model "charges" has even ones; {_INSTEAD}')
+    raise InputError(f'the medium varies within the body, and model "charges" needs homogeneous ones; {_INSTEAD}')
 
 
 def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Surface]) -> None:
@@ -200,7 +200,7 @@ def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Su
     if np.any(terms.emission):
         raise InputError(f'{name} emits light throughout, and model "charges" has points; {_INSTEAD}')
     if np.ndim(terms.irradiance) or np.ndim(terms.transmitted_irradiance):
-        raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
+        raise InputError(f'{name} is not uniform over the surface, as model "charges" needs it; {_INSTEAD}')
     if terms.irradiance and body.only_medium is None:
         raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
     _check_apart(terms.points, body.outer, inner)

@@ -17,12 +17,15 @@ from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
-# How far from the surface a point may be, as a share of the body's diagonal.
+# Largest distance of a point detector from the surface, as a share of the body's diagonal.
 LARGEST_DISTANCE_SHARE = 0.05
-# How far from a flat disc the surface may run, as a share of its radius: on a sphere, a disc of half its radius.
+# Largest distance between a disc and the surface, as a share of the disc's radius; on a sphere it is reached by a disc
+# of half the sphere's radius.
 LARGEST_GAP_SHARE = 0.25
-# Circles of a disc, and points on each: Gauss points in the square of the radius, so that areas come out equal.
-CIRCLES, SPOKES = 16, 32
+# Number of circles of quadrature points on a disc, at Gauss points of the square of the radius.
+CIRCLES = 16
+# Number of quadrature points on each circle.
+SPOKES = 32
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class PointDetector:
 
 @dataclass(frozen=True)
 class DiscDetector:
-    """Reads what leaves through a round patch, at any angle.
+    """Reads the light that leaves through a flat disc at any angle.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ class DiscDetector:
 
 @dataclass(frozen=True)
 class FibreDetector(DiscDetector):
-    """Reads what a fibre collects that stands on the surface, at right angles to it.
+    """Reads the light that a fibre at right angles to the surface collects.
 
     Parameters
     ----------
@@ -107,13 +110,13 @@ Detector = PointDetector | DiscDetector | FibreDetector
 def read(detector: Detector, solution: ExitanceField) -> Reading:
     """Read a detector.
 
-    A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
-    the disc's. A fibre collects up to the angle whose sine is its aperture, out of radiance that goes with
-    ``F_t(eta, theta)`` and adds up to the exitance; it changes nothing of the light that it reads.
+    The exitance of a disc is a mean over the flat disc that touches the surface, taken at the surface points nearest to
+    the points of the disc. A fibre collects radiance up to the angle whose sine is its numerical aperture. The radiance
+    is proportional to ``F_t(eta, theta)``, and its flux is the exitance. Detectors do not change the light in the body.
 
-    What a solution on a mesh is read by are quadratic elements on the same mesh, which are solved for at the first
-    reading: see `tetlux.fem.quadratic`. Far from the light they are ten times nearer to the truth than the linear
-    elements of `Solution.exitance`.
+    Readings of a solution on a mesh come from quadratic elements on the same mesh, which are solved for at the first
+    reading: see `tetlux.fem.quadratic`. Far from the light their error is a tenth of that of the linear elements of
+    `Solution.exitance`.
 
     Parameters
     ----------
@@ -144,7 +147,7 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
 
 
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
-    """`read` several detectors, which takes less time together."""
+    """`read` several detectors; this is faster than reading one after another."""
     if isinstance(solution, Solution) and solution.quadratic is not None:
         solution.quadratic.operator.duals([place_detector(detector, solution).measurement for detector in detectors])
     return tuple(read(detector, solution) for detector in detectors)
@@ -157,13 +160,13 @@ class PlacedDetector:
     Attributes
     ----------
     position, normal : (3,) floats
-        Its place on the surface, and the outward unit normal there.
+        Its position on the surface, and the outward unit normal there.
     measurement : Measurement
-        The points that it reads.
+        The points at which it reads.
     area : float or None
         Of the flat disc, unit²; None for a point.
     share : float
-        Of what leaves there that it collects.
+        Collected share of the exitance.
     """
 
     position: Vector
@@ -176,7 +179,7 @@ class PlacedDetector:
 
 
 def place_detector(detector: Detector, solution: ExitanceField) -> PlacedDetector:
-    """A detector on the body of a solution: see `read`."""
+    """Place a detector on the body of a solution: see `read`."""
     if isinstance(detector, PointDetector):
         reach = LARGEST_DISTANCE_SHARE * solution.surface.diagonal
         place, normal = _on_surface(
@@ -205,13 +208,13 @@ def _on_surface(
     solution: ExitanceField, name: str, given: Vector, reach: float, what: str
 ) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
-    wanted = as_vector(given, name)
-    (place,), (normal,) = solution.surface.project(wanted[None])
-    away = float(np.linalg.norm(wanted - place))
-    if away > reach:
+    position = as_vector(given, name)
+    (place,), (normal,) = solution.surface.project(position[None])
+    distance = float(np.linalg.norm(position - place))
+    if distance > reach:
         raise InputError(
-            f"the detector's {name} {as_text(wanted)} is {away:.3g} {solution.surface.unit} from the surface, more "
-            f"than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
+            f"the detector's {name} {as_text(position)} is {distance:.3g} {solution.surface.unit} from the surface, "
+            f"more than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
         )
     return place, normal
 
@@ -219,9 +222,9 @@ def _on_surface(
 def _unit_disc(normal: FloatArray) -> FloatArray:
     """Points (CIRCLES * SPOKES, 3) of the unit disc across a normal, circle by circle."""
     radius = np.sqrt(0.5 * (np.polynomial.legendre.leggauss(CIRCLES)[0] + 1.0))
-    # Every other circle is turned, so that points do not line up.
-    turn = 0.5 * (np.arange(CIRCLES) % 2)
-    angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + turn[:, None])
+    # Every other circle is rotated by half a step, so that points do not line up.
+    rotation = 0.5 * (np.arange(CIRCLES) % 2)
+    angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + rotation[:, None])
     across, up = perpendicular_axes(normal)
     spread = np.cos(angle)[:, :, None] * across + np.sin(angle)[:, :, None] * up
     return np.asarray((radius[:, None, None] * spread).reshape(-1, 3))

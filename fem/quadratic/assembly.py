@@ -1,4 +1,4 @@
-"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of functions."""
+"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of loads."""
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
@@ -17,19 +17,19 @@ from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
-# Curved tetrahedra that are integrated at once.
+# Number of curved tetrahedra that are integrated at once.
 BLOCK = 2048
 
 
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
-    """The matrix of a space, (size, size), symmetric, by its `element_matrices`."""
+    """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
     boundary_matrices = coefficients.robin * face_matrices(space, faces)
     return csr_array(_assemble(space.cells, elements, space.size) + _assemble(faces, boundary_matrices, space.size))
 
 
 def _assemble(dofs: IntArray, values: FloatArray, size: int) -> csr_array:
-    """The sum of element matrices (m, c, c) at dofs (m, c)."""
+    """The sum of element matrices (m, c, c) by their DOF numbers (m, c)."""
     count = dofs.shape[1]
     rows = np.repeat(dofs.astype(np.int32), count, axis=1).ravel()
     columns = np.tile(dofs.astype(np.int32), count).ravel()
@@ -37,7 +37,7 @@ def _assemble(dofs: IntArray, values: FloatArray, size: int) -> csr_array:
 
 
 def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> FloatArray:
-    """Matrices of the tetrahedra of a mesh, without its boundary, (m, 10, 10)."""
+    """Matrices of the tetrahedra of a mesh, without boundary terms, (m, 10, 10)."""
     mesh, curved = space.mesh, space.curved
     every = np.arange(len(mesh.tetrahedra))
     diffusion, sigma_a = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma_a))
@@ -61,9 +61,9 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
 def gradients(
     space: QuadraticSpace, cells: IntArray, barycentric: FloatArray, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gradients of the functions of tetrahedra, (c, q, 10, 3), and volumes, (c, q), at points of a rule (q,).
+    """Gradients of shape functions, (c, q, 10, 3), and volumes, (c, q), at quadrature points of tetrahedra.
 
-    The points are barycentric coordinates, (q, 4) for all tetrahedra or (c, q, 4) for each.
+    The barycentric coordinates of the points are (q, 4) for all tetrahedra or (c, q, 4) for each; weights are (q,).
     """
     slopes = shape_derivatives(barycentric) @ space.mesh.hat_gradients[cells][:, None]
     jacobians = space.jacobians(cells, barycentric)
@@ -72,7 +72,7 @@ def gradients(
 
 
 def face_matrices(space: QuadraticSpace, faces: IntArray) -> FloatArray:
-    """Integrals of products of the functions over triangles (f, 6), (f, 6, 6)."""
+    """Integrals of products of shape functions over triangles with DOF numbers (f, 6), (f, 6, 6)."""
     shape_values = shape_functions(TRIANGLE_RULE[0], TRIANGLE_EDGES)
     areas = TRIANGLE_RULE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE_RULE[0]), axis=2)
     pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 36)
@@ -80,7 +80,7 @@ def face_matrices(space: QuadraticSpace, faces: IntArray) -> FloatArray:
 
 
 def face_normals(space: QuadraticSpace, faces: IntArray, barycentric: FloatArray) -> FloatArray:
-    """Normals of triangles (f, 6) at barycentric coordinates (q, 3), as long as their area, (f, q, 3)."""
+    """Normals of triangles (f, 6) at barycentric coordinates (q, 3), with the area as length, (f, q, 3)."""
     slopes = np.einsum("qap,fai->fqpi", shape_derivatives(barycentric, TRIANGLE_EDGES), space.corners_and_bends(faces))
     return np.asarray(0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0]))
 

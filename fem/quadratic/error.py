@@ -1,13 +1,13 @@
-"""The error of what is read, and the share of each tetrahedron in it.
+"""The error of a reading, and the contribution of each tetrahedron to it.
 
-A detector's reading is linear in the fluence, and a dual solution z, with the reading as its load, is the weight of a
-local error in it. With quadratic elements and their gradients averaged by R over nodes, in each tetrahedron K::
+A reading is linear in the fluence. The dual solution z, whose load is the reading, is the weight of a local residual in
+it. With R the average of gradients over the tetrahedra around a node, the contribution of a tetrahedron K is::
 
     eta_K = D ∫_K (grad phi_h - R grad phi_h) . (grad z_h - R grad z_h)
 
-These have either sign and cancel mostly, like the steps of a random walk, but not all: the error is
-``RANDOM_SCALE sqrt(sum eta_K² + (CORRELATED_WEIGHT sum eta_K)²)``.
-Points that lie off the mesh, where its bent facets miss the true surface, add what the fluence changes by on the way.
+Contributions have either sign and cancel mostly, like the steps of a random walk. The estimated error is
+``RANDOM_SCALE sqrt(sum eta_K² + (CORRELATED_WEIGHT sum eta_K)²)``. Where bent facets differ from the true surface, the
+change of the fluence over that distance is added.
 """
 
 from dataclasses import dataclass
@@ -21,24 +21,27 @@ from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
-# Calibrated so that the true error is within twice the bar for 95 % of readings (`tests.benchmarks.readings`).
-RANDOM_SCALE, CORRELATED_WEIGHT = 0.55, 0.4
-# The share of a reading that is always added: what gradients do not show, such as how far the surface is known.
+# Factor of all contributions. With it the true error is at most twice the estimated error for 95 % of readings
+# (`tests.benchmarks.readings`).
+RANDOM_SCALE = 0.55
+# Weight of the sum of contributions, which do not cancel entirely, beside the root of their squares.
+CORRELATED_WEIGHT = 0.4
+# Relative error that is always added, for errors that gradients do not show, such as those of the surface itself.
 LEAST_RELATIVE_ERROR = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
 class ReadingError:
-    """A reading and its error.
+    """A reading and its estimated error.
 
     Attributes
     ----------
     value : float
         W/unit².
     squares : (m,) ndarray
-        Squares of what tetrahedra add to its error.
+        Squares of the contributions of tetrahedra to its error.
     sum : float
-        What they add together, by their signs, W/unit².
+        Weighted sum of the signed contributions, W/unit².
     """
 
     value: float
@@ -52,14 +55,14 @@ class ReadingError:
 
     @property
     def relative(self) -> float:
-        """Estimated relative error; infinite if nothing is read."""
+        """Estimated relative error; infinite if the reading is 0."""
         return self.error / abs(self.value) if self.value else np.inf
 
     __repr__ = one_line
 
 
 def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> ReadingError:
-    """What is read and how far it is off."""
+    """The value of a measurement and its estimated error."""
     operator = solution.operator
     mesh, space = operator.mesh, operator.space
     dual = operator.duals([measurement])[0]
@@ -69,7 +72,7 @@ def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> Re
     discrete = operator.discretise(measurement)
     squares = (RANDOM_SCALE * local) ** 2
     if not measurement.inside:
-        # Along the normal fluence changes by itself over the extrapolation length.
+        # Along the normal the relative change of the fluence over the extrapolation length is 1.
         steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, discrete.cells)
         off = float(np.abs(measurement.weights) @ (discrete.distances_from_mesh * steepness)) * abs(value)
         squares[discrete.cells[0]] += off**2

@@ -1,4 +1,4 @@
-"""`Measurement`: what a reading looks at, points of the surface or inside, and what it is on a mesh."""
+"""`Measurement`: weighted points of the surface or inside the body; `DiscreteMeasurement`: the same on a mesh."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from tetlux.meshing.describe import one_line
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """A mean over points: of ``phi/(2A)`` on the surface, or of the fluence inside.
+    """A weighted mean over points: of ``phi/(2A)`` on the surface, or of the fluence inside.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Measurement:
         return isinstance(other, Measurement) and self._key == other._key
 
     def discretise(self, space: QuadraticSpace, coefficients: Coefficients) -> "DiscreteMeasurement":
-        """What it is on a mesh."""
+        """Express the measurement by the shape functions of a mesh."""
         if self.inside:
             cells, weights = space.within(self.points)
             return DiscreteMeasurement(self, space, 1.0, cells, space.cells[cells], shape_functions(weights))
@@ -60,11 +60,11 @@ class DiscreteMeasurement:
     measurement : Measurement
     space : QuadraticSpace
     scale : float
-        From fluence to what is read.
+        Ratio of the measured quantity to the fluence.
     cells : (q,) ndarray
         The tetrahedron at each point.
     dofs, shape_values : (q, c) ndarray
-        Functions there, and their values.
+        Numbers of the shape functions at each point, and their values.
     """
 
     measurement: Measurement
@@ -76,18 +76,18 @@ class DiscreteMeasurement:
 
     @property
     def load(self) -> FloatArray:
-        """What it reads of each function, (size,)."""
+        """The measurement of each basis function, (size,)."""
         values = self.scale * self.measurement.weights[:, None] * self.shape_values
         return sum_by_index(self.dofs, values, self.space.size)
 
     def values(self, function: FloatArray) -> FloatArray:
-        """A function (size,) at the points, (q,)."""
+        """Values of a function (size,) at the points, (q,)."""
         return np.asarray((function[self.dofs] * self.shape_values).sum(axis=1))
 
     @property
     def distances_from_mesh(self) -> FloatArray:
-        """How far each point is from where the mesh has it, (q,), unit."""
-        there = self.shape_values[..., None] * self.space.corners_and_bends(self.dofs)
-        return np.asarray(np.linalg.norm(there.sum(axis=1) - self.measurement.points, axis=1))
+        """Distance of each point from the point of the mesh that stands for it, (q,), unit."""
+        on_mesh = self.shape_values[..., None] * self.space.corners_and_bends(self.dofs)
+        return np.asarray(np.linalg.norm(on_mesh.sum(axis=1) - self.measurement.points, axis=1))
 
     __repr__ = one_line

@@ -1,4 +1,4 @@
-"""`QuadraticOperator`: the matrix of quadratic elements, its solver, and the dual solutions of what is read."""
+"""`QuadraticOperator`: the matrix of quadratic elements, its solver, and the dual solutions of measurements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,12 +20,12 @@ from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Relative residual of solutions and of duals. A reading is corrected by what is left of the load, weighted by its dual,
-# so that it is off by about the product of the two.
+# Relative residual at which the iteration stops, for solutions and duals. A reading is corrected by the residual of the
+# solution times the dual, so that its relative error is about the square of this.
 STOP_RESIDUAL = 1e-7
-# Columns that are iterated on side by side.
+# Number of right-hand sides that are iterated together.
 COLUMNS_PER_GROUP = 4
-# Of how many loads a solver of the linear part should think, roughly.
+# Number of right-hand sides for which the solver of the linear part is chosen.
 EXPECTED_RIGHT_HAND_SIDES = 10
 
 
@@ -37,9 +37,9 @@ class QuadraticOperator:
     ----------
     mesh : TetMesh
     surface : Surface
-        What the mesh stands for.
+        The true surface of the body.
     inner : sequence of Surface
-        Of its regions.
+        True surfaces of the regions.
     coefficients : Coefficients
     """
 
@@ -52,7 +52,7 @@ class QuadraticOperator:
 
     @cached_property
     def space(self) -> QuadraticSpace:
-        """The functions."""
+        """The finite-element space."""
         return quadratic_space(self.mesh, self.surface, self.inner)
 
     @cached_property
@@ -73,7 +73,7 @@ class QuadraticOperator:
     def _precondition(self) -> Preconditioner:
         """A solver of the linear part, and the diagonal of the bubbles.
 
-        The two parts meet at an angle that is the same however fine the mesh is (Yserentant 1986): 50 iterations.
+        The condition number does not depend on the size of tetrahedra (Yserentant 1986): about 50 iterations.
         """
         nodes = len(self.mesh.points)
         assembly = Assembly(self.mesh)
@@ -90,7 +90,7 @@ class QuadraticOperator:
     def solve(self, loads: FloatArray) -> FloatArray:
         """Solutions (size, k) for loads (size, k), to relative residuals of about 1e-7."""
         product, precondition = self._product, self._precondition
-        # In units in which the iteration stops at the aim.
+        # Loads are scaled so that the iteration stops at STOP_RESIDUAL.
         size = np.sqrt(dots(loads, loads)) * STOP_RESIDUAL / krylov.AIM
         size[size == 0] = 1.0
         scaled = loads / size
@@ -102,13 +102,13 @@ class QuadraticOperator:
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 
     def discretise(self, measurement: Measurement) -> DiscreteMeasurement:
-        """A measurement on the mesh."""
+        """A measurement on the mesh; each is made once."""
         if measurement not in self._discretised:
             self._discretised[measurement] = measurement.discretise(self.space, self.coefficients)
         return self._discretised[measurement]
 
     def duals(self, measurements: Sequence[Measurement]) -> list[FloatArray]:
-        """Dual solutions (size,) of what is read; each is solved for once."""
+        """Dual solutions (size,) of measurements; each is solved for once."""
         new = [measurement for measurement in dict.fromkeys(measurements) if measurement not in self._duals]
         if new:
             loads = np.column_stack([self.discretise(measurement).load for measurement in new])

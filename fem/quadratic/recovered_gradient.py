@@ -1,4 +1,4 @@
-"""How much the gradient of a quadratic function jumps between tetrahedra, which shows what it does not resolve."""
+"""The difference between averaged and own gradients: an estimate of their error (Zienkiewicz & Zhu 1987)."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ from tetlux.meshing.tets.topology import EDGES
 def recovered_gradient_difference(space: QuadraticSpace, function: FloatArray) -> FloatArray:
     """The averaged gradient less the gradient at the corners of each tetrahedron, (m, 4, 3), of a function (size,).
 
-    Gradients are averaged over the tetrahedra of one region around a node, weighted by volume; across an interface they
-    jump.
+    Gradients are averaged over the tetrahedra of one region around a node, weighted by volume. They are not averaged
+    across an interface, where they jump.
     """
     mesh = space.mesh
     values, hats = function[space.cells], mesh.hat_gradients

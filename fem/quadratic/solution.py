@@ -1,4 +1,4 @@
-"""`QuadraticSolution`: the fluence of lights in quadratic elements, and what is read of it."""
+"""`QuadraticSolution`: the fluence of lights in quadratic elements, and measurements of it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,23 +16,23 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
-# Charges are subtracted where they are at most this many times brighter than the fluence.
+# Charges are subtracted where their fluence is at most this many times the fluence itself.
 LARGEST_BRIGHTNESS_RATIO = 4.0
 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticScene:
-    """The lights of a scene on a mesh; solved for when something is read.
+    """The lights of a scene on a mesh, solved for at the first reading.
 
     Attributes
     ----------
     operator : QuadraticOperator
     deposits : tuple of Deposit
-        What each light leaves on the mesh.
+        Of each light on the mesh.
     linear_patches : tuple of tuple of Patch
         The patches of each light in linear elements.
     linear_fluences : tuple of (n,) ndarray
-        The fluence of each light in linear elements, by which patches are chosen anew.
+        The fluence of each light in linear elements, which determines its quadratic patches.
     """
 
     operator: QuadraticOperator
@@ -59,8 +59,8 @@ class QuadraticScene:
 
     @cached_property
     def fluence(self) -> FloatArray:
-        """The fluence of each light, with interpolants where it is subtracted, (size, k), W/unit²."""
-        # Fitted charges are far brighter near the light than what is missing, which is all that is solved for.
+        """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
+        # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
         fitted = np.column_stack(
             [
                 np.sum(
@@ -84,7 +84,7 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
 def _widen(patch: Patch, fluence: FloatArray) -> Patch:
     """The patch of tetrahedra where charges are not much brighter than the fluence (n,) in linear elements.
 
-    Its borders, across which the fluence jumps, are then farther from the light than those of linear elements.
+    Its faces, across which the fluence jumps, are then farther from the light than those of the linear patch.
     """
     wide = patch_of(
         patch.mesh, patch.charges, patch.at_nodes <= LARGEST_BRIGHTNESS_RATIO * np.abs(fluence), patch.at_nodes
@@ -94,7 +94,7 @@ def _widen(patch: Patch, fluence: FloatArray) -> Patch:
 
 @dataclass(frozen=True, eq=False)
 class QuadraticSolution:
-    """Some of the lights of a scene, together.
+    """The sum of some lights of a scene.
 
     Attributes
     ----------
@@ -122,22 +122,22 @@ class QuadraticSolution:
 
     @cached_property
     def gradient_difference(self) -> FloatArray:
-        """`recovered_gradient_difference` of the fluence less what is known of it in closed form, (m, 4, 3)."""
+        """`recovered_gradient_difference` of the fluence less the charges of patches, (m, 4, 3)."""
         space = self.operator.space
-        rough = recovered_gradient_difference(space, self.fluence)
+        difference = recovered_gradient_difference(space, self.fluence)
         for patch in self.patches:
             inside = np.flatnonzero(patch.patch.cells)
-            rough[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
-        return rough
+            difference[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
+        return difference
 
     @cached_property
     def residual(self) -> FloatArray:
-        """What is left of the load, (size,), W."""
+        """Load less the matrix times the fluence, (size,), W."""
         load = self.scene.loads[:, self.lights].sum(axis=1)
         return np.asarray(load - self.operator.matrix @ self.fluence)
 
     def read(self, measurement: Measurement) -> float:
-        """The mean exitance, W/unit², or fluence inside."""
+        """The value of a measurement: exitance, or fluence inside, W/unit²."""
         discrete = self.operator.discretise(measurement)
         dual = self.operator.duals([measurement])[0]
         values = discrete.scale * self.fluence_at(discrete)
@@ -146,7 +146,7 @@ class QuadraticSolution:
         return float(measurement.weights @ values + self.residual @ dual)
 
     def fluence_at(self, discrete: DiscreteMeasurement) -> FloatArray:
-        """Fluence at points, (q,), W/unit²."""
+        """Fluence at the points of a measurement, (q,), W/unit²."""
         fluence, points = discrete.values(self.fluence), discrete.measurement.points
         for patch in self.patches:
             inside = np.flatnonzero(patch.patch.cells[discrete.cells])
@@ -157,7 +157,7 @@ class QuadraticSolution:
         return fluence
 
     def _unscattered(self, discrete: DiscreteMeasurement) -> FloatArray:
-        """Exitance beside ``phi/(2A)`` under diffuse light, (q,), as `Solution.exitance` has it."""
+        """Exitance in addition to ``phi/(2A)`` under diffuse light, (q,), as in `Solution.exitance`."""
         mesh = self.operator.mesh
         given = sum(self.scene.deposits[light].terms.transmitted_irradiance for light in self.lights)
         if not np.any(given):

@@ -43,7 +43,7 @@ def corner_groups(mesh: TetMesh) -> IntArray:
         return mesh.tetrahedra
     first = int(mesh.regions.min())
     keys = mesh.tetrahedra * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
-    return np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
+    return np.asarray(np.unique(keys, return_inverse=True)[1].reshape(keys.shape))
 
 
 def region_at(points: FloatArray, regions: Sequence[Surface]) -> IntArray:
