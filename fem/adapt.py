@@ -8,7 +8,7 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
-from tetlux.fem.grading import grade_between, grade_mesh, places_to_resolve
+from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
@@ -141,8 +141,10 @@ def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Repor
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.not_fitted])
-        mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
+        for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
+            deposits = [deposit for sources in problem.sources for deposit in sources.deposits_if(fitted=fitted)]
+            lit = places_to_resolve(deposits)
+            mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, longest=longest, inner=scenes.inner)
         if aims.readings is not None:
             seen = np.array([view.position for view in aims.views])
             every, _ = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])

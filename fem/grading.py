@@ -26,6 +26,9 @@ MOST_LIT = 32
 # Longest edge of a tetrahedron on the first mesh, relative to its distance from the nearest source, or to the length
 # to resolve there if that is larger. The error then is some per cent, and its estimate good to a factor of three.
 LONGEST_EDGE = 1.0
+# Where charges are fitted the error needs no such edges, but values at nodes should show the light: 10 to 60 % more
+# nodes than the mesher's own.
+LONGEST_IF_FITTED = 1.5
 
 
 def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:

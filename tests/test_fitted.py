@@ -56,6 +56,15 @@ def test_a_ball_is_right_and_the_estimate_honest(ball: Surface, albedo: float, e
     assert abs(solution.power.balance_error) < 1e-9
 
 
+def test_exitance_between_nodes_where_light_fades_within_a_facet(ball: Surface) -> None:
+    """Charges are below zero there; the linear function beside a bright node is hundreds of times too large."""
+    medium = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
+    solution = solve(ball, medium, [PointSource((0.0, 0.0, RADIUS - 1.0))])
+    # Measured .002; with the linear function .13.
+    assert ball_error(solution, medium, 1.0) < 0.01
+    assert (solution.exitance_on(along_the_meridian(500)) >= 0.0).all()
+
+
 def test_finite_elements_add_what_charges_lack() -> None:
     """The same few charges come nearer to the truth on a finer mesh; so does the power that leaves."""
     ring, source = torus(10.0, 4.0), [PointSource((13.0, 0.0, 0.0))]
@@ -116,8 +125,8 @@ def test_what_cannot_be_fitted_has_the_half_space(ball: Surface, ball_mesh: TetM
     for beam in (wide, line):
         assert not is_fitted(solve(ball, TISSUE, [beam], mesh=ball_mesh))
     shallow = PointSource((0.0, 0.0, RADIUS - 1e-4))
-    for light, medium in ((shallow, TISSUE), (source, varying)):
-        assert not is_fitted(solve(ball, medium, [light], mesh=ball_mesh))
+    for point, medium in ((shallow, TISSUE), (source, varying)):
+        assert not is_fitted(solve(ball, medium, [point], mesh=ball_mesh))
     assert not is_fitted(solve(ball, TISSUE, [source], mesh=ball_mesh, subtract="half-space"))
     assert MOST_SOURCES < 127  # as many thin beams as a wide one is at least
 
@@ -150,7 +159,8 @@ def test_nothing_is_below_zero_where_there_is_hardly_light() -> None:
     solution = solve(hare, TISSUE, [PencilBeam((-40.0, 0.0, 12.0), (1.0, 0.0, 0.0))])
     assert is_fitted(solution)
     assert solution.fluence.min() >= 0.0
-    assert solution.exitance_on(hare.points).min() >= 0.0
+    # Rounding of barycentric coordinates alone.
+    assert solution.exitance_on(hare.points).min() >= -1e-20
     assert abs(solution.power.balance_error) < 1e-9
 
 

@@ -21,6 +21,7 @@ from tetlux.fem import (
     VaryingMedium,
     solve,
 )
+from tetlux.fem.media.coefficients import coefficients_on
 from tetlux.meshing import InputError, TetMesh, box, mesh_from_arrays, refine
 
 TISSUE, FLUID = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4), Medium(sigma_a=0.004, sigma_s_prime=0.3, eta=1.4)
@@ -143,6 +144,12 @@ def test_a_void_is_said_by_its_label() -> None:
 def test_labels_and_media_that_do_not_go_together(media: Any, words: str) -> None:
     with pytest.raises(InputError, match=words):
         solve(HEAD, media, LIGHT)
+
+
+def test_a_system_refuses_a_medium_of_a_label_that_the_mesh_does_not_have() -> None:
+    mesh = replace(HEAD, regions=np.ones(len(TETRAHEDRA), dtype=np.int64), labels={1: "tissue"})
+    with pytest.raises(InputError, match=r"the mesh has no label 7; its labels are 1 \(tissue\)"):
+        coefficients_on(mesh, {1: TISSUE, 7: TISSUE})
 
 
 def test_media_by_label_need_a_mesh_and_no_regions() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fuzz.surfaces import bulging, cube_of_quads
 from tetlux.cases.cli import main
 from tetlux.meshing import InputError, Surface, box, cylinder, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -178,6 +179,20 @@ def test_of_two_sides_the_finer_is_kept() -> None:
         assert "kept one side of a two-sided surface, and removed the 320 triangles of the other." in surface.repairs
 
 
+@pytest.mark.parametrize("apart", [1e-6, 1e-5], ids=["merged in part", "cracked"])
+@pytest.mark.parametrize("turned", [0, 1])
+def test_a_second_side_in_pieces_is_a_side(apart: float, turned: int) -> None:
+    """Each face of the second cube has corners of its own, nearly those of the first, and some triangles are turned."""
+    random = np.random.default_rng(5)
+    (points, first), (others, second) = (cube_of_quads(random, bulging) for _ in range(2))
+    second[turned:] = turned_over(second[turned:])
+    moved = others + random.normal(scale=apart, size=others.shape)
+    surface = surface_from_arrays(*together((points, first), (moved, second)))
+    assert surface.volume == pytest.approx(surface_from_arrays(points, first).volume, rel=0.01)
+    assert len(surface.faces) == len(first)
+    assert surface.warnings == ()
+
+
 def test_an_open_body_whose_sides_differ_is_capped_as_one() -> None:
     top = CUBE.points[:, 2].max()
     sides = [faces[(CUBE.points[faces][:, :, 2] < top).any(axis=1)] for faces in (CUBE.faces, OTHER)]
@@ -347,6 +362,14 @@ CONCAVE = {
 }
 
 
+def test_corners_of_a_very_long_rim_are_not_cut() -> None:
+    """Every third vertex is triangulated first; without the corners among them 3e-4 of the area is folded."""
+    star = outline(CONCAVE["star"], 53)
+    corners = star[triangulate_polygon(star)]
+    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2]
+    assert np.abs(twice).sum() == pytest.approx(np.cross(star, np.roll(star, -1, axis=0))[:, 2].sum(), rel=1e-9)
+
+
 @pytest.mark.parametrize("count", [1, 10, 40])
 @pytest.mark.parametrize("name", CONCAVE)
 def test_the_cap_of_a_concave_flat_rim_does_not_leave_it(name: str, count: int) -> None:
@@ -405,6 +428,14 @@ def test_a_small_body_is_no_speck_and_is_meshed() -> None:
     corners = mesh.points[mesh.tetrahedra[beyond]]
     volumes = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
     assert volumes.sum() == pytest.approx(1.0, rel=0.1)
+
+
+def test_what_is_thin_but_a_part_of_the_volume_is_no_speck() -> None:
+    """A plate below the mesher's resolution that has 1 % of the volume is not dropped without a warning."""
+    plate = box((20.0, 20.0, 0.1), center=(0.0, 0.0, 14.0))
+    surface = surface_from_arrays(*together((POINTS, FACES), (plate.points, plate.faces)))
+    assert surface.repairs == ()
+    assert surface.volume == pytest.approx(BALL.volume + 40.0)
 
 
 def test_bodies_of_one_size_are_no_specks() -> None:

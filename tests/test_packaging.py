@@ -223,6 +223,14 @@ def test_a_command_that_does_not_exist_gets_the_nearest(capsys: pytest.CaptureFi
     assert 'there is no command "runn"; did you mean "run"? the commands are run, check' in capsys.readouterr().err
 
 
+def test_the_exit_code_is_that_of_the_command(installed: dict[str, str]) -> None:
+    for module in ("tetlux", "tetlux.cases"):
+        command = [sys.executable, "-m", module, "check", "missing.yaml"]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=installed)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert done.stderr.startswith("tetlux: missing.yaml")
+
+
 def test_the_module_is_the_command() -> None:
     done = subprocess.run(
         [sys.executable, "-m", "tetlux.cases", "check", "sphere"], capture_output=True, text=True, check=False

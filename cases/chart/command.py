@@ -96,5 +96,5 @@ def _methods(report: Callable[[str], None]) -> list[Method]:
 def _warm_up() -> None:
     """Make short runs first, so that imports do not count in the runs that are timed."""
     ball, medium = sphere(10.0, subdivisions=2), Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
-    for subtract in ("nothing", "half-space"):
+    for subtract in ("nothing", "half-space", "fitted"):
         solve(ball, medium, [PointSource((0.0, 0.0, 9.0))], tolerance=0.5, subtract=subtract, cache=False)

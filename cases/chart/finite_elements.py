@@ -129,5 +129,12 @@ FINITE_ELEMENTS = (
         _on_mesh(_uniform_mesh, "half-space"),
         _has_point_sources,
     ),
-    Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("half-space"), quick=2),
+    Method(
+        "half-space subtracted, adaptive",
+        "tolerance",
+        (0.05, 0.02, 0.01, 0.005, 0.002, 0.001),
+        _adaptive("half-space"),
+        _has_point_sources,
+    ),
+    Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("fitted"), quick=2),
 )

@@ -1,9 +1,10 @@
-"""Methods of the chart without a mesh: the dipole, the half-space, and Monte Carlo."""
+"""Methods of the chart without a mesh: charges fitted to the surface, the dipole, the half-space, and Monte Carlo."""
 
 import importlib.util
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from tetlux.cases.chart.methods import Method, Outcome, fastest_run
 from tetlux.fem.exact import dipole, half_space, monte_carlo
 from tetlux.fem.exact.registry import polar_angle
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Slab, Sphere
 
@@ -35,6 +37,22 @@ def _half_space_method(
         return Outcome(total, time.perf_counter() - started)
 
     return lambda benchmark, _: fastest_run(benchmark, lambda: run(benchmark))
+
+
+def _charges(benchmark: Benchmark, tolerance: float) -> Outcome:
+    """Fit charges until their own estimate meets a tolerance."""
+
+    def run() -> Outcome:
+        # A copy, which has no cached results of earlier runs.
+        surface = replace(benchmark.case.surface)
+        started = time.perf_counter()
+        solution = solve(surface, benchmark.case.medium, benchmark.case.lights, model="charges", tolerance=tolerance)
+        solution.exitance  # noqa: B018 - computed at first access
+        seconds = time.perf_counter() - started
+        exitance = solution.exitance_at(benchmark.samples.points)
+        return Outcome(exitance, seconds, solution.charges, None, solution.error_estimate)
+
+    return fastest_run(benchmark, run)
 
 
 def _monte_carlo(benchmark: Benchmark, photons: float) -> Outcome:
@@ -89,6 +107,13 @@ def has_monte_carlo() -> bool:
 
 
 MESHLESS = (
+    Method(
+        "charges",
+        "tolerance",
+        (0.02, 0.005, 0.002, 0.001, 0.0005),
+        _charges,
+        lambda benchmark: benchmark.has_point_sources and isinstance(benchmark.case.medium, Medium),
+    ),
     Method(
         "dipole alone",
         "",

@@ -52,6 +52,8 @@ class Style(NamedTuple):
 
 STYLES = {
     OURS: Style("#d1203f", "o", width=3.0, size=9.5),
+    "charges": Style("#f06292", "p", width=2.2, size=9.0),
+    "half-space subtracted, adaptive": Style("#ef8a2c", "h"),
     "half-space subtracted, uniform": Style("#ef8a2c", "s"),
     "free-space subtracted, adaptive": Style("#b8860b", "D"),
     "P1, adaptive": Style("#12355b", "^"),

@@ -160,10 +160,16 @@ def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
     outward_flux[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
-            remainder = remainder - patch.at_nodes
+            # At the border of the patch the mesh holds all of the fluence.
+            known, residual = patch.at_nodes, patch.residual_at_nodes
+            if not patch.is_whole:
+                known, residual = known.copy(), residual.copy()
+                border = mesh.tetrahedra[~patch.cells]
+                known[border] = residual[border] = 0.0
+            remainder = remainder - known
             robin = 0.5 / patch.charges.medium.boundary_factor
-            outward_flux[mesh.boundary_nodes] -= robin * patch.at_nodes[mesh.boundary_nodes]
-            outward_flux += patch.residual_at_nodes
+            outward_flux[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
+            outward_flux += residual
     return remainder, outward_flux
 
 

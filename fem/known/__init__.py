@@ -6,10 +6,10 @@ or less, for which finite elements solve throughout the body: see `tetlux.fem.kn
 
 **The half-space** is for all other point sources. Near a source the fluence is that of a half-space with a Robin
 boundary (`tetlux.fem.exact.half_space`): the source, its mirror image, and a line of sinks above the image (Bryan
-1890). With the line cut into points, this is a sum of screened charges ``q e^{-k r}/(4 pi D r)``: one inside the body,
-the others outside. Such a sum G solves the diffusion equation inside the body whatever the strengths of the charges
-outside. Cutting the line into few points, or leaving out charges that would lie in another part of the body, therefore
-adds no error: G is then only a poorer guess of the fluence.
+1890). With the line cut into points, this too is a sum G of screened charges: one inside the body, the others outside.
+It solves the diffusion equation inside the body whatever the strengths of the charges outside. Cutting the line into
+few points, or leaving out charges that would lie in another part of the body, therefore adds no error: G is then only a
+poorer guess of the fluence.
 
 Finite elements solve for the rest. G is used on a patch of tetrahedra only, those where it is a good guess. There the
 fluence is ``phi_h = u_h + (G - I_h G)``, with ``I_h G`` the linear interpolant of G: u_h is the fluence at the nodes,

@@ -10,21 +10,22 @@ a mesh by nearest points. u is some hundredths of the light or less, and smooth 
 apart: a coarse mesh will do, and is refined where u asks for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_for_remainder
+from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.places import EQUATION_REFINEMENT, Places
 from tetlux.fem.charges.quadrature import quadrature
-from tetlux.fem.charges.samples import Samples
+from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
@@ -36,6 +37,10 @@ SHALLOWEST = 1e-3
 MOST_SOURCES = 30
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
+# Charges are subtracted where they are off by at most this share of the exitance, on average over so many points of the
+# surface. On a hare the far half, five decades darker than the entry, is left to finite elements: charges are off by
+# once or twice the exitance there.
+ACCURATE, AVERAGED = 0.3, 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +72,33 @@ class FittedLight:
     violation : Violation
     places : Places
         Where charges were put and fitted; for the same light in other coefficients.
+    accurate : (q,) ndarray of bool
+        Whether the charges are accurate at each point of `violation`.
+    surface : Surface
+        What they were fitted to.
     """
 
     charges: Charges
     violation: Violation
     places: Places
+    accurate: BoolArray
+    surface: Surface
+
+    def accurate_at(self, points: FloatArray) -> BoolArray:
+        """Whether the charges are accurate at the point of `violation` nearest to each of some points (n, 3), (n,)."""
+        if self.accurate.all():
+            return np.ones(len(points), dtype=bool)
+        return np.asarray(self.accurate[cKDTree(self.violation.points.points).query(points)[1]])
+
+    def violation_within(self, wanted: Spacing) -> Violation:
+        """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
+        return violation_of(self.charges, self.places.fitted, self.surface, wanted)
 
     __repr__ = one_line
 
 
 def fit_light(
-    deposit: Deposit, surface: Surface, medium: Medium, *, tolerance: float, places: Places | None = None
+    deposit: Deposit, surface: Surface, medium: Medium, *, tolerance: float, like: FittedLight | None = None
 ) -> FittedLight | None:
     """Fit charges to the points of a deposit.
 
@@ -88,8 +109,8 @@ def fit_light(
     medium : Medium
     tolerance : float
         Relative L2 error of the exitance, of charges and finite elements together.
-    places : Places, optional
-        Where to put charges; chosen if not given.
+    like : FittedLight, optional
+        The same light in other coefficients: charges are put where its are, and are accurate where its are.
 
     Returns
     -------
@@ -101,13 +122,25 @@ def fit_light(
         return None
     lights = LightSources(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
     equation = equation_of(medium)
-    if places is None:
+    if like is None:
         fitted = fit_for_remainder(surface, equation, lights, tolerance=tolerance)
         if fitted is None:
             return None
     else:
-        fitted = fit_at_places(places, equation, lights)
-    return FittedLight(_charges(fitted, surface, medium), violation_of(fitted, surface), fitted.places)
+        fitted = fit_at_places(like.places, equation, lights)
+    charges = _charges(fitted, surface, medium)
+    violation = violation_of(charges, fitted.places.fitted, surface)
+    accurate = like.accurate if like is not None else _accurate(violation, medium)
+    return FittedLight(charges, violation, fitted.places, accurate, surface)
+
+
+def _accurate(violation: Violation, medium: Medium) -> BoolArray:
+    """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
+    points = violation.points
+    nearest = cKDTree(points.points).query(points.points, k=min(AVERAGED, len(points.points)))[1]
+    errors = exitance_error(equation_of(medium), violation.residual, points.spacing)
+    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(violation.exitance[nearest]).mean(axis=1)
+    return np.asarray(error <= ACCURATE * exitance)
 
 
 def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
@@ -130,13 +163,18 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def violation_of(fitted: FittedCharges, surface: Surface) -> Violation:
-    """What the first light's charges violate on the true surface."""
-    samples = fitted.places.fitted
+def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Violation:
+    """What charges violate on the true surface, at points that follow from samples where they were fitted."""
     tree = cKDTree(samples.points)
-    points = quadrature(
-        surface, lambda queries: INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+
+    def spacing(queries: FloatArray) -> FloatArray:
+        own = INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        return own if wanted is None else np.minimum(own, wanted(queries))
+
+    points = quadrature(surface, spacing)
+    fluence, flux = equation_of(charges.medium).traces(
+        points.points, points.normals, charges.positions, charges.strengths
     )
-    exitance, residual = fitted.field.exitance_and_residual(points.points, points.normals)
-    apart = Samples(points.points, points.normals, points.areas, points.spacing / INTEGRATED)
-    return Violation(apart, exitance[:, 0], residual[:, 0])
+    exitance = 0.5 / charges.medium.boundary_factor * fluence
+    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
+    return Violation(apart, exitance, flux + exitance)

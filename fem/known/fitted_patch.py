@@ -1,26 +1,30 @@
 """`FittedPatch`: fitted charges on one mesh, what they leave to it, and what of that it does not see."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.fitted import FittedLight, Violation
-from tetlux.fem.known.patch import Patch
-from tetlux.fem.known.patch_terms import PatchTerms
+from tetlux.fem.known.patch import Patch, holds_sources
+from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
+from tetlux.fem.operators.assembly import Mass
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
 SHORTER = 0.65
+# Facets shorter than this times the distance of the points at which the violation is integrated have more points.
+FINE = 1.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedPatch(Patch):
-    """All tetrahedra of a mesh, with charges that are fitted to the true surface.
+    """The tetrahedra of a mesh where charges that are fitted to the true surface are accurate: mostly all.
 
     Parameters
     ----------
@@ -37,15 +41,29 @@ class FittedPatch(Patch):
     weights: FloatArray
 
     @cached_property
+    def is_whole(self) -> bool:
+        """Whether it is all tetrahedra of the mesh."""
+        return bool(self.cells.all())
+
+    def extend(self) -> "FittedPatch":
+        """The same on all tetrahedra of the mesh."""
+        return self if self.is_whole else replace(self, cells=np.ones(len(self.cells), dtype=bool))
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """The areas that points of the surface stand for, (q,), unit²; 0 where they are not of the patch."""
+        areas = self.violation.points.areas
+        return areas if self.is_whole else areas * self.cells[self.mesh.boundary_cells[self.facets]]
+
+    @cached_property
     def load(self) -> FloatArray:
-        """``-∮ r v`` (n,), W."""
-        missing = -self.violation.points.areas * self.violation.residual
-        return self._at_nodes(missing)
+        """``-∮ r v`` over the surface of the patch, (n,), W."""
+        return self._at_nodes(-self.areas * self.violation.residual)
 
     @cached_property
     def residual_at_nodes(self) -> FloatArray:
         """The residual that the mesh sees, averaged around each node, (n,), W/unit²; 0 at nodes inside."""
-        area = self._at_nodes(self.violation.points.areas)
+        area = self._at_nodes(self.areas)
         return np.divide(-self.load, area, out=np.zeros(len(area)), where=area > 0)
 
     def unseen(self) -> FloatArray:
@@ -59,7 +77,7 @@ class FittedPatch(Patch):
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
         length = SHORTER * np.minimum(self.violation.points.spacing, sides[self.facets])
         missed = exitance_error(equation_of(self.charges.medium), self.violation.residual - seen, length)
-        square = self.violation.points.areas * missed**2
+        square = self.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
 
     def _at_nodes(self, values: FloatArray) -> FloatArray:
@@ -70,18 +88,30 @@ class FittedPatch(Patch):
 
 def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
     """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
-    everywhere, points = np.ones(len(mesh.tetrahedra), dtype=bool), light.violation.points.points
+    points = light.violation.points
     if coarse is None:
         at_nodes = light.charges.fluence(mesh.points)
-        _, facets, weights = mesh.closest_boundary(points)
     else:
         # Nodes of the coarse mesh come first.
         new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
         at_nodes = np.concatenate([coarse.at_nodes, new])
+    if coarse is None or coarse.violation is not light.violation:
+        _, facets, weights = mesh.closest_boundary(points.points)
+    else:
         facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
         others = np.flatnonzero(facets < 0)
-        _, facets[others], weights[others] = mesh.closest_boundary(points[others])
-    return FittedPatch(mesh, light.charges, everywhere, at_nodes, light.violation, facets, weights)
+        _, facets[others], weights[others] = mesh.closest_boundary(points.points[others])
+    violation = light.violation
+    corners = mesh.points[mesh.boundary_faces]
+    sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
+    nearest = apart[cKDTree(points.points).query(corners.mean(axis=1))[1]]
+    if (sides < FINE * nearest).any():
+        limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
+        violation = light.violation_within(lambda queries: limits[tree.query(queries)[1]])
+        _, facets, weights = mesh.closest_boundary(violation.points.points)
+    cells = light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1)
+    patch = FittedPatch(mesh, light.charges, cells, at_nodes, violation, facets, weights)
+    return patch if patch.is_whole or holds_sources(patch) else patch.extend()
 
 
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
@@ -96,7 +126,7 @@ def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
     return np.where(after[found] == before, found, -1)
 
 
-def fitted_terms(patch: FittedPatch, absorbing: FloatArray) -> PatchTerms:
+def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Mass) -> PatchTerms:
     """The load of what is missing, and the ledger of the charges less that of their values at the nodes.
 
     Parameters
@@ -104,14 +134,20 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray) -> PatchTerms:
     patch : FittedPatch
     absorbing : (n,) ndarray
         Power absorbed for a fluence of 1 at each node, unit².
+    mass : {"lumped", "consistent"}
+        As in the system matrix.
 
     Returns
     -------
     PatchTerms
-        Its load is that of ``u = phi - G``, not of the fluence itself.
+        Where the patch is whole, its load is that of ``u = phi - G``, not of the fluence itself.
     """
     mesh, charges, violation = patch.mesh, patch.charges, patch.violation
-    areas = violation.points.areas
+    areas = patch.areas
+    if not patch.is_whole:
+        leaving = areas @ violation.exitance
+        through = areas @ (violation.residual - violation.exitance)
+        return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
     exited, inflow = float(areas @ violation.exitance), float(areas @ (violation.residual - violation.exitance))
     robin = 0.5 / charges.medium.boundary_factor
     at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])

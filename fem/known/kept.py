@@ -8,11 +8,11 @@ is left to other ways if it was then.
 from dataclasses import dataclass, field
 from weakref import WeakKeyDictionary
 
-from tetlux.fem.charges.places import Places
+from tetlux.fem.known.fitted import FittedLight
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Places serve for a light that is so many times deeper or shallower than the one they were chosen for.
+# A fit serves for a light that is so many times deeper or shallower than the one they were chosen for.
 OTHER_DEPTH = 1.5
 
 
@@ -23,21 +23,21 @@ class KeptPlaces:
     Attributes
     ----------
     choices : dict
-        By the light's name: the depths that it was solved for, unit, and the places chosen, None if it was not fitted.
+        By the light's name: the depths that it was solved for, unit, and the fit, None if it was not fitted.
     """
 
-    choices: dict[str, list[tuple[float, Places | None]]] = field(default_factory=dict)
+    choices: dict[str, list[tuple[float, FittedLight | None]]] = field(default_factory=dict)
 
-    def find(self, light: str, depth: float) -> tuple[bool, Places | None]:
-        """Whether there was a choice for a light at about this depth, and the places."""
-        for known, places in self.choices.get(light, []):
+    def find(self, light: str, depth: float) -> tuple[bool, FittedLight | None]:
+        """Whether there was a choice for a light at about this depth, and the fit."""
+        for known, fit in self.choices.get(light, []):
             if known <= OTHER_DEPTH * depth and depth <= OTHER_DEPTH * known:
-                return True, places
+                return True, fit
         return False, None
 
-    def keep(self, light: str, depth: float, places: Places | None) -> None:
+    def keep(self, light: str, depth: float, fit: FittedLight | None) -> None:
         """Remember a choice."""
-        self.choices.setdefault(light, []).append((depth, places))
+        self.choices.setdefault(light, []).append((depth, fit))
 
     __repr__ = one_line
 

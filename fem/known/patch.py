@@ -106,8 +106,7 @@ def _is_sound(patch: Patch) -> bool:
     mesh, charges, cells = patch.mesh, patch.charges, patch.cells
     places = charges.positions[: charges.sources]
     foot, face, _ = mesh.closest_boundary(places)
-    cells_of = _point_cells(mesh, places, foot, face)
-    if (cells_of < 0).any() or not cells[cells_of].all():
+    if not _holds(patch, places, foot, face):
         return False
     if (np.linalg.norm(foot - places, axis=1) < RESOLVED * _sizes(mesh, face)).any():
         return False
@@ -122,6 +121,19 @@ def _is_sound(patch: Patch) -> bool:
     inner = mesh.points[faces[~on_boundary]]
     distances, _ = cKDTree(charges.positions).query(inner.mean(axis=1))
     return bool((longest_sides(inner) <= COARSEST_INNER * distances).all())
+
+
+def holds_sources(patch: Patch) -> bool:
+    """Whether all sources lie inside a patch."""
+    places = patch.charges.positions[: patch.charges.sources]
+    foot, face, _ = patch.mesh.closest_boundary(places)
+    return _holds(patch, places, foot, face)
+
+
+def _holds(patch: Patch, places: FloatArray, foot: FloatArray, face: IntArray) -> bool:
+    """Whether all points (q, 3) lie inside a patch, by the nearest of the boundary and the triangle there (q,)."""
+    cells = _point_cells(patch.mesh, places, foot, face)
+    return bool((cells >= 0).all() and patch.cells[cells].all())
 
 
 def _sizes(mesh: TetMesh, faces: IntArray) -> FloatArray:

@@ -42,7 +42,26 @@ class PatchTerms:
     __repr__ = one_line
 
 
-def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
+@dataclass(frozen=True, eq=False)
+class BoundaryIntegrals:
+    """Integrals of charges over the part of the true surface that bounds a patch.
+
+    Attributes
+    ----------
+    load : (n,) ndarray
+        ``∮ (D dG/dn + G/(2A)) v``, W.
+    leaving, through : float
+        ``∮ G/(2A)`` and ``∮ D dG/dn``, W.
+    """
+
+    load: FloatArray
+    leaving: float
+    through: float
+
+    __repr__ = one_line
+
+
+def patch_terms(patch: Patch, mass: Mass, surface: BoundaryIntegrals | None = None) -> PatchTerms:
     """Assemble the terms of a patch.
 
     Parameters
@@ -50,6 +69,8 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     patch : Patch
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, as in the system matrix.
+    surface : BoundaryIntegrals, optional
+        In place of integrals over the boundary facets of the mesh.
 
     Returns
     -------
@@ -61,10 +82,15 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)
     faces, on_boundary = patch.faces
-    out_of_faces, through = _integrals(mesh.points[faces], charges)
     robin = 1.0 / (2.0 * medium.boundary_factor)
-    leaving = robin * out_of_faces * on_boundary[:, None]
-    load = -sum_by_index(faces, through + leaving, count)
+    integrated = np.ones(len(faces), dtype=bool) if surface is None else ~on_boundary
+    value, through = _integrals(mesh.points[faces[integrated]], charges)
+    leaving = robin * value * on_boundary[integrated, None]
+    load = -sum_by_index(faces[integrated], through + leaving, count)
+    leaves, flows = float(leaving.sum()), float(through.sum())
+    if surface is not None:
+        load -= surface.load
+        leaves, flows = leaves + surface.leaving, flows + surface.through
     # a(I_h G, v): stiffness, absorption and boundary terms of the patch, times G at the nodes.
     inside = slice(None) if patch.cells.all() else np.flatnonzero(patch.cells)
     cells = mesh.tetrahedra[inside]
@@ -79,9 +105,9 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     load += sum_by_index(cells, stiff + absorbed, count) + sum_by_index(faces, exited, count)
     return PatchTerms(
         load,
-        exited=float(leaving.sum() - exited.sum()),
+        exited=leaves - float(exited.sum()),
         # Gauss: of the power of the sources, the patch absorbs what does not flow out through its faces.
-        absorbed=float(sources.powers.sum() + through.sum() - absorbed.sum()),
+        absorbed=float(sources.powers.sum() + flows - absorbed.sum()),
     )
 
 

@@ -58,10 +58,9 @@ class Sources:
         """What a user should know of the lights."""
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
-    @property
-    def not_fitted(self) -> list[Deposit]:
-        """Of the lights that are not fitted, which a mesh has to resolve."""
-        return [deposit for light, deposit in enumerate(self.deposits) if light not in self.fitted]
+    def deposits_if(self, *, fitted: bool) -> list[Deposit]:
+        """Of the lights that charges are fitted to, or of the others."""
+        return [deposit for light, deposit in enumerate(self.deposits) if (light in self.fitted) == fitted]
 
     @property
     def dips(self) -> bool:
@@ -141,12 +140,12 @@ def _fitted(
         return None
     if kept is None:
         return fit_light(deposit, body.surface, medium, tolerance=tolerance)
-    chosen, places = kept.find(repr(light), deposit.hints.resolution)
-    if chosen and places is None:
+    chosen, like = kept.find(repr(light), deposit.hints.resolution)
+    if chosen and like is None:
         return None
-    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, places=places)
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, like=like)
     if not chosen:
-        kept.keep(repr(light), deposit.hints.resolution, None if found is None else found.places)
+        kept.keep(repr(light), deposit.hints.resolution, found)
     return found
 
 

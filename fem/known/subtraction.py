@@ -55,7 +55,7 @@ def subtract_on(mesh: TetMesh, light: int, charges: Charges, mass: Mass, good: B
 def subtract_fitted(
     light: int, fitted: FittedLight, operator: Operator, mass: Mass, before: Sequence[Patch] = ()
 ) -> Subtraction:
-    """Subtract fitted charges of a light; its load is then that of what is missing.
+    """Subtract fitted charges of a light; where it is whole, its load is that of what is missing.
 
     Parameters
     ----------
@@ -73,4 +73,4 @@ def subtract_fitted(
     """
     ours = (each for each in before if isinstance(each, FittedPatch) and each.charges is fitted.charges)
     patch = fitted_patch(operator.mesh, fitted, next(ours, None))
-    return Subtraction(light, patch, fitted_terms(patch, operator.absorbing), mass)
+    return Subtraction(light, patch, fitted_terms(patch, operator.absorbing, mass), mass)

@@ -204,9 +204,10 @@ class Solution:
         shares = below & (known >= 0) & (guessed > 0)
         fluence[shares] = linear[shares] * known[shares] / guessed[shares]
         if any(isinstance(patch, FittedPatch) for patch in self.patches):
-            # They may be below zero where they are off by more than there is light.
+            # They may be below zero where they are off by more than there is light; beside a bright node the linear
+            # function is far larger than either.
             rest = below & ~shares
-            fluence[rest] = linear[rest]
+            fluence[rest] = np.minimum(linear[rest], np.abs(known[rest]))
         return np.asarray(fluence)
 
     def fluence_at(self, points: FloatArray) -> NumberArray:

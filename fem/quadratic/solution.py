@@ -77,7 +77,7 @@ class QuadraticScene:
 def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> QuadraticPatch:
     """A patch in quadratic elements, by the fluence (n,) of its light in linear elements."""
     if isinstance(patch, FittedPatch):
-        return quadratic_fitted_patch(operator, patch)
+        return quadratic_fitted_patch(operator, patch.extend())
     return quadratic_patch(operator, _widen(patch, fluence))
 
 

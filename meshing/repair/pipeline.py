@@ -123,7 +123,12 @@ def _connect(
     points, faces = drop_second_sides(points, faces, repairs)
     points, faces = compact(points, single_faces(points, faces, repairs))
     _check_solid(points, faces, name, rounding, least=1)
-    return stitch(points, faces, repairs)
+    joined, stitched = stitch(points, faces, repairs)
+    if stitched is faces:
+        return joined, stitched
+    # A second side in pieces is recognised once its seams are stitched.
+    joined, stitched = drop_second_sides(joined, stitched, repairs)
+    return compact(joined, single_faces(joined, stitched, repairs))
 
 
 def _check_solid(points: FloatArray, faces: IntArray, name: str, rounding: float, least: int) -> None:

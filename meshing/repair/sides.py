@@ -20,6 +20,9 @@ ON_SHEET, BULGE, LEAST_AREA = 1e-5, 0.05, 0.5
 DEEP = 0.1
 # Two triangles that meet at an edge with less than this angle between them, radians, are two sides at their rim.
 FOLDED = 0.5
+# The winding counts as consistent if, of the edges with an even number of triangles, all but this share are traversed
+# equally often in both directions: a few triangles may be turned over. Edges with an odd number lie at cracks and holes.
+UNBALANCED = 0.1
 # Surfaces of more sheets are not searched.
 MOST_SHEETS = 200
 
@@ -106,8 +109,8 @@ def _sheets(points: FloatArray, faces: IntArray) -> IntArray:
     """The sheet of each triangle, (m,): triangles that continue each other across edges.
 
     Two triangles that fold back on each other do not. Where more than two meet at an edge, pairs continue each other:
-    those that are farthest from folded, of equal ones those that come first in the file. If the winding is consistent,
-    only those that traverse the edge in opposite directions continue each other.
+    those that are farthest from folded, of equal ones those that come first in the file. If the winding is consistent
+    at nearly all edges, only those that traverse the edge in opposite directions continue each other.
     """
     edges = Edges(faces)
     across = _across(points, faces)
@@ -119,7 +122,8 @@ def _sheets(points: FloatArray, faces: IntArray) -> IntArray:
     crowded = crowded[np.lexsort([crowded % len(faces), edges.edge[crowded]])]
     first = np.flatnonzero(np.diff(edges.edge[crowded], prepend=-1))
     # Greater than any difference of cosines.
-    alike = 4.0 if (edges.balance == 0).all() else 1e-6
+    balance = edges.balance[edges.triangles % 2 == 0]
+    alike = 4.0 if np.count_nonzero(balance) <= UNBALANCED * len(balance) else 1e-6
     for sides in np.split(crowded, first[1:]) if len(crowded) else []:
         links.append(_continuing(across[sides], edges.start[sides], sides, alike))
     return components(len(faces), np.concatenate(links) % len(faces))

@@ -51,8 +51,10 @@ detectors:
   - {name: here, point: [0, 0, 5]}
   - {name: there, disc: {center: [5, 0, 0], radius: 1}}
   - {name: fibre, fibre: {center: [0, 5, 0], radius: 0.5, numerical_aperture: 0.4}}
+tolerance: {exitance: 0.05, detectors: 0.02}
 camera: {position: [0, 0, 50]}
 outputs: [surface, volume, picture]
+sweep: {tolerance.detectors: [0.02, 0.01], detectors.0.point.0: [0, 1]}
 """,
         """
 surface: {box: {size: [10, 10, 10]}}
@@ -75,6 +77,9 @@ medium:
   phase: {two_term: {g1: 0.9, g2: -0.3, share: 0.9}}
   eta: 1.33
 lights: [{pencil: {origin: [0, 0, 20], direction: [0, 0, -1], radius: 1.0, deposit: line}}]
+detectors: [{name: here, disc: {center: [0, 0, 5], radius: 1}}]
+tolerance: {detectors: 0.02}
+up: [0, 1, 0]
 """,
         """
 mesh:
@@ -123,12 +128,14 @@ NUMBERS = [
 ]
 KEYS: list[Any] = [
     *("", "x", "Name", "surfaces", "sphere", "file", "scale", "radius", "power", "spot", "sweep", "material", "images"),
+    *("exitance", "detectors", "tolerance", "model", "holes", "up", "mesh", "labels"),
     *("volume", "array", "phase", "g", "sigma_s", "eta", "region", 1, None, True, 1.5, "?one", "?list", "<<", "=", "é"),
     *("a.b", "__class__", "model_config", "kinds", "a\nb", "x" * 300),
 ]
 SWEPT = [
     *("medium.sigma_a", "lights.0.pencil.power", "lights.²", "lights.-1.name", "lights.99", "lights", "name", "sweep"),
     *("", ".", "..", "surface.slab.width", "surface.file", "outputs.0", "unit", "medium.", "medium.sigma_a.x", "x/y"),
+    *("tolerance.exitance", "tolerance.detectors", "tolerance.everywhere", "model", "mesh.labels.1", "up.0"),
     *("lights.0", "lights." + "9" * 30, "regions.0.name", "channels.0", "lights.٣", "medium.material", "name.x"),
 ]
 scalars = st.one_of(

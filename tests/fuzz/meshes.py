@@ -121,9 +121,9 @@ def broken() -> Iterator[tuple[str, bytes]]:
     yield "curved", vtu(np.random.default_rng(0).normal(size=(10, 3)), np.arange(10)[None], [1], kind="tetra10")
 
 
-def damaged() -> Iterator[tuple[str, str, bytes]]:
+def damaged(seed: int = 0) -> Iterator[tuple[str, str, bytes]]:
     """Files of several programs, cut off and with wrong bytes, lines and words."""
-    random = np.random.default_rng(0)
+    random = np.random.default_rng((0, seed))
     mesh = TetMesh(POINTS, TETRAHEDRA, regions=LABELS, labels={1: "skin", 2: "bone"})
     plain = meshio.Mesh(POINTS, [("tetra", TETRAHEDRA)], cell_data={"medit:ref": [LABELS.astype(np.int32)]})
     tags = {"gmsh:physical": [LABELS.astype(np.int32)], "gmsh:geometrical": [LABELS.astype(np.int32)]}
@@ -134,6 +134,9 @@ def damaged() -> Iterator[tuple[str, str, bytes]]:
         ("msh", "gmsh 2.2 text", _gmsh_text()),
         ("mesh", "medit", written(plain, "mesh")),
         ("vtk", "vtk", written(plain, "vtk")),
+        ("mesh", "medit of second order", _medit_of_second_order()),
+        ("su2", "su2", _su2(4)),
+        ("su2", "su2 of second order", _su2(10)),
         ("inp", "abaqus", written(meshio.Mesh(POINTS, [("tetra", TETRAHEDRA)]), "inp")),
     ]
     for suffix, name, content in files:
@@ -161,6 +164,33 @@ def _gmsh_text() -> bytes:
     rows = zip(LABELS.tolist(), (TETRAHEDRA + 1).tolist(), strict=True)
     lines += [f"{i} 4 2 {label} 1 {' '.join(map(str, row))}" for i, (label, row) in enumerate(rows, 1)]
     return "\n".join([*lines, "$EndElements", ""]).encode()
+
+
+def _second_order() -> tuple[Any, Any]:
+    """Points and (m, 10) corners and mid-edge nodes; each tetrahedron has mid-edge nodes of its own."""
+    a, b = np.array([[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]]).T
+    middles = 0.5 * (POINTS[TETRAHEDRA[:, a]] + POINTS[TETRAHEDRA[:, b]])
+    numbers = len(POINTS) + np.arange(middles.shape[0] * 6).reshape(-1, 6)
+    return np.vstack([POINTS, middles.reshape(-1, 3)]), np.hstack([TETRAHEDRA, numbers])
+
+
+def _rows(rows: Any) -> str:
+    return "\n".join(" ".join(map(str, row)) for row in np.asarray(rows).tolist())
+
+
+def _medit_of_second_order() -> bytes:
+    points, cells = _second_order()
+    text = f"MeshVersionFormatted 2\nDimension 3\nVertices\n{len(points)}\n"
+    text += "".join(f"{x} {y} {z} 0\n" for x, y, z in points.tolist())
+    text += f"TrianglesP2\n1\n1 2 3 {len(POINTS) + 1} {len(POINTS) + 2} {len(POINTS) + 3} 7\n"
+    return f"{text}TetrahedraP2\n{len(cells)}\n{_rows(np.column_stack([cells + 1, LABELS]))}\nEnd\n".encode()
+
+
+def _su2(nodes: int) -> bytes:
+    points, cells = _second_order() if nodes == 10 else (POINTS, TETRAHEDRA)
+    rows = np.column_stack([np.full(len(cells), {4: 10, 10: 24}[nodes]), cells, np.arange(len(cells))])
+    text = f"NDIME= 3\nNELEM= {len(cells)}\n{_rows(rows)}\nNPOIN= {len(points)}\n{_rows(points)}\n"
+    return f"{text}NMARK= 1\nMARKER_TAG= side\nMARKER_ELEMS= 1\n5 0 1 4\n".encode()
 
 
 def tables() -> Iterator[tuple[str, dict[str, bytes]]]:

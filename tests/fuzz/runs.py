@@ -97,9 +97,9 @@ def write_surface(folder: Path, malformed: Malformed, tolerance: float = 0.02) -
     return path
 
 
-def check_surfaces(folder: Path) -> Iterator[Outcome]:
-    """Read, mend and check each of the surfaces."""
-    for malformed in surfaces():
+def check_surfaces(folder: Path, number: int = 0) -> Iterator[Outcome]:
+    """Read, mend and check each of the surfaces of a seed."""
+    for malformed in surfaces(number):
         path = write_surface(folder, malformed)
         yield outcome_of(f"surface: {malformed.name}", ["check", str(path)])
 
@@ -135,9 +135,9 @@ def run_surfaces(folder: Path, limit: float, names: Collection[str] = ()) -> Ite
         yield Outcome(name, process.exitcode, words.strip(), violation, time.perf_counter() - started)
 
 
-def check_volumes(folder: Path) -> Iterator[Outcome]:
+def check_volumes(folder: Path, number: int = 0) -> Iterator[Outcome]:
     """Read each file of coefficients, each image and each mesh, and solve on the meshes that are let pass."""
-    for malformed in volumes():
+    for malformed in volumes(number):
         file = folder / f"data.{malformed.suffix}"
         file.write_bytes(malformed.content)
         path = folder / "case.yaml"

@@ -44,6 +44,16 @@ def exported(surface: Surface, kind: str) -> bytes:
     return data.encode() if isinstance(data, str) else data
 
 
+def _ply(surface: Surface) -> bytes:
+    """As text."""
+    head = f"ply\nformat ascii 1.0\nelement vertex {len(surface.points)}\nproperty float x\nproperty float y\n"
+    head += f"property float z\nelement face {len(surface.faces)}\nproperty list uchar int vertex_indices\nend_header\n"
+    rows = [" ".join(map(str, row)) for row in surface.points.tolist()]
+    return "\n".join(
+        [head + rows[0], *rows[1:], *(f"3 {a} {b} {c}" for a, b, c in surface.faces.tolist()), ""]
+    ).encode()
+
+
 def stl(points: FloatArray, faces: IntArray, claimed: int | None = None) -> bytes:
     """A binary STL, whose head may claim another number of triangles."""
     rows = np.zeros(len(faces), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
@@ -130,9 +140,9 @@ def _layer(thickness: float) -> Arrays:
     return np.vstack([points, upper]), np.vstack([faces[:, ::-1], faces + count, hem[:, ::-1]])
 
 
-def bodies() -> Iterator[tuple[str, Arrays]]:
+def bodies(seed: int = 0) -> Iterator[tuple[str, Arrays]]:
     """Surfaces that are open, tangled, turned, doubled, nested or hardly there, about 20 across."""
-    random = np.random.default_rng(6)
+    random = np.random.default_rng((6, seed))
     ball = sphere(10.0, subdivisions=2)
     cube, fine = box((14.0, 14.0, 14.0)), sphere(10.0, subdivisions=3)
     p, f = arrays_of(ball)
@@ -318,9 +328,9 @@ def placed() -> Iterator[Malformed]:
         yield Malformed(f"a ball in a unit {20 / size:g} off", "stl", exported(ball, "stl"), size)
 
 
-def files() -> Iterator[Malformed]:
+def files(seed: int = 0) -> Iterator[Malformed]:
     """Files that are cut short, full of nonsense, wrongly named, or that lie about what they hold."""
-    random = np.random.default_rng(7)
+    random = np.random.default_rng((7, seed))
     ball = sphere(10.0, subdivisions=2)
     p, f = arrays_of(ball)
     kinds = ("stl", "obj", "ply", "off", "glb", "3mf")
@@ -344,12 +354,22 @@ def files() -> Iterator[Malformed]:
         for other in kinds:
             if other != kind:
                 yield Malformed(f"{kind} that is {other}", kind, right[other])
+    texts = {"stl": text, "obj": right["obj"], "off": right["off"], "ply": _ply(ball)}
+    for kind, content in texts.items():
+        yield Malformed(f"{kind} in capitals", kind, content.upper())
+        yield Malformed(f"{kind} in lower case", kind, content.lower())
+        for coding in ("utf-16", "utf-16-le", "utf-16-be", "utf-32"):
+            wide = content.decode().encode(coding)
+            yield Malformed(f"{kind} in {coding}", kind, wide)
+            yield Malformed(f"{kind} in {coding}, cut within a character", kind, wide[: len(wide) // 3 | 1])
+            spoilt = bytearray(wide)
+            for at in random.integers(0, len(spoilt), 20):
+                spoilt[at] = random.integers(0, 256)
+            yield Malformed(f"{kind} in {coding} with wrong bytes", kind, bytes(spoilt))
     for share in (0.1, 0.5, 0.95):
         yield Malformed(f"STL text cut at {share:.0%}", "stl", text[: int(share * len(text))])
     yield Malformed("STL text with commas", "stl", text.replace(b".", b","))
     yield Malformed("STL text of nan", "stl", text.replace(b"vertex ", b"vertex nan "))
-    yield Malformed("STL text in capitals", "stl", text.upper())
-    yield Malformed("STL text in UTF-16", "stl", text.decode().encode("utf-16"))
     yield Malformed("STL text with a name in latin-1", "stl", b"solid pl\xe4tt" + text[text.index(b"\n") :])
     yield Malformed("a binary STL that begins with solid", "stl", b"solid".ljust(80) + right["stl"][80:])
     for claimed in (0, 1, len(f) - 1, len(f) + 1, 2**31, 2**32 - 1):
@@ -376,7 +396,6 @@ def files() -> Iterator[Malformed]:
     yield Malformed("OBJ whose material is a device", "obj", b"mtllib /dev/zero\n" + right["obj"])
     yield Malformed("OBJ whose material is missing", "obj", b"mtllib none.mtl\nusemtl x\n" + right["obj"])
     yield Malformed("OBJ whose material is up there", "obj", b"mtllib ../../../../etc/passwd\n" + right["obj"])
-    yield Malformed("OBJ in UTF-16", "obj", right["obj"].decode().encode("utf-16"))
     yield Malformed("OBJ in latin-1", "obj", b"# gr\xf6\xdfe\no pl\xe4tt\n" + right["obj"])
     yield Malformed("OBJ with a byte order mark", "obj", b"\xef\xbb\xbf" + right["obj"])
     yield Malformed("OBJ with carriage returns", "obj", right["obj"].replace(b"\n", b"\r"))
@@ -475,9 +494,36 @@ def _half_split(surface: Surface, count: int, random: np.random.Generator, stray
     return np.array(points), np.array(faces)
 
 
-def exports() -> Iterator[tuple[str, Arrays]]:
+def bulging(places: FloatArray) -> FloatArray:
+    return np.asarray(10.0 * places / np.linalg.norm(places, axis=1, keepdims=True))
+
+
+def flat(places: FloatArray) -> FloatArray:
+    return 8.0 * places
+
+
+def cube_of_quads(random: np.random.Generator, shape: Callable[[FloatArray], FloatArray], count: int = 5) -> Arrays:
+    """A cube of quads, moved by `shape`, each cut along either of its diagonals."""
+    i, j = (k.ravel() for k in np.meshgrid(*[np.linspace(-1.0, 1.0, count + 1)] * 2, indexing="ij"))
+    square = np.column_stack([i, j, np.ones_like(i)])
+    sides = [sign * np.roll(square, axis, axis=1) for axis in range(3) for sign in (1, -1)]
+    corner = (np.arange(count)[:, None] * (count + 1) + np.arange(count)).ravel()
+    a, b, c, d = corner, corner + count + 1, corner + count + 2, corner + 1
+    parts = []
+    for side in sides:
+        cut = random.random(len(corner))[:, None] < 0.5
+        first = np.where(cut, np.column_stack([a, b, c]), np.column_stack([a, b, d]))
+        faces = np.vstack([first, np.where(cut, np.column_stack([a, c, d]), np.column_stack([b, c, d]))])
+        points = shape(side)
+        normals = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
+        outward = np.einsum("ij,ij->i", normals, points[faces].mean(axis=1)) > 0
+        parts.append((points, np.where(outward[:, None], faces, faces[:, ::-1])))
+    return together(*parts)
+
+
+def exports(seed: int = 0) -> Iterator[tuple[str, Arrays]]:
     """What CAD programs, scanners and modellers write: T-junctions, two sides, corners nearly at one place, specks."""
-    random = np.random.default_rng(8)
+    random = np.random.default_rng((8, seed))
     ball, cube = sphere(10.0, subdivisions=2), box((14.0, 14.0, 14.0))
     p, f = arrays_of(ball)
     for surface, what in ((ball, "ball"), (cube, "cube")):
@@ -494,6 +540,16 @@ def exports() -> Iterator[tuple[str, Arrays]]:
         )
     stitched = _half_split(ball, 20, random, 0.0)
     yield "T-junctions on both sides", (stitched[0], np.vstack([stitched[1], stitched[1][:, ::-1]]))
+    for shape in (bulging, flat):
+        one, other = cube_of_quads(random, shape), cube_of_quads(random, shape)
+        for stray in (0.0, 1e-9, 1e-6, 1e-4, 1e-2):
+            moved = other[0] + random.normal(scale=stray, size=other[0].shape)
+            yield f"{shape.__name__} sides of other diagonals, {stray:g} off", together(one, (moved, other[1][:, ::-1]))
+        for share in (0.02, 0.5, 0.98):
+            some = other[1][random.random(len(other[1])) < share]
+            yield f"{share:.0%} of {shape.__name__} sides on other diagonals", (one[0], np.vstack([one[1], some]))
+        turned = np.where(random.random(len(other[1]))[:, None] < 0.5, other[1], other[1][:, ::-1])
+        yield f"{shape.__name__} sides of other diagonals, in any winding", together(one, (other[0], turned))
     soup = p[f].reshape(-1, 3)
     for gap in (0.2e-7, 0.5e-7, 1e-7, 2e-7, 1e-6, 1e-5):
         apart = soup + random.choice([0.0, gap * 34.6], size=soup.shape)
@@ -522,11 +578,11 @@ OPEN = (
 )
 
 
-def surfaces() -> Iterator[Malformed]:
-    """All of them."""
-    for name, (points, faces) in (*bodies(), *exports()):
+def surfaces(seed: int = 0) -> Iterator[Malformed]:
+    """All of them; what is random in them depends on the seed."""
+    for name, (points, faces) in (*bodies(seed), *exports(seed)):
         yield Malformed(name, "off", off(points, faces))
         if name.startswith(OPEN):
             yield Malformed(f"{name}, holes closed", "off", off(points, faces), holes="close")
     yield from placed()
-    yield from files()
+    yield from files(seed)

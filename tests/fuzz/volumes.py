@@ -223,8 +223,8 @@ def meshes() -> Iterator[tuple[str, bytes]]:
     yield "blocks that lie", content.replace(content[content.find(b"AQAAA") :][:16], big[:16])
 
 
-def volumes() -> Iterator[MalformedVolume]:
-    """All of them, each for what it may be named in a case as."""
+def volumes(seed: int = 0) -> Iterator[MalformedVolume]:
+    """All of them, each for what it may be named in a case as; what is random in them depends on the seed."""
     for name, content in arrays():
         yield MalformedVolume(f"array, {name}", ARRAY, "npy", content)
     for name, suffix, content in images():
@@ -234,7 +234,7 @@ def volumes() -> Iterator[MalformedVolume]:
         yield MalformedVolume(f"volume, {name}", VOLUME, "vtu", content)
     for name, content in broken():
         yield MalformedVolume(f"mesh, {name}", MESH, "vtu", content)
-    for suffix, name, content in damaged():
+    for suffix, name, content in damaged(seed):
         yield MalformedVolume(f"mesh, {name}", MESH, suffix, content)
     for name, files in tables():
         yield MalformedVolume(f"mesh, NIRFAST, {name}", MESH, "node", files["node"], files)
