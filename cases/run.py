@@ -26,7 +26,8 @@ from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.scenes import media_by_scene
-from tetlux.fem.solve import solve, solve_each
+from tetlux.fem.solve import solve
+from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh

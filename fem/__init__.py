@@ -27,7 +27,8 @@ from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetec
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Power, Solution
-from tetlux.fem.solve import solve, solve_each
+from tetlux.fem.solve import solve
+from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.hints import MeshHints
 from tetlux.fem.sources.ledger import Ledger

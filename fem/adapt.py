@@ -12,8 +12,8 @@ from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, g
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
-from tetlux.fem.outcome.detectors import PlacedDetector
-from tetlux.fem.quadratic.error import ReadingError, read_with_error
+from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
+from tetlux.fem.quadratic.error import ReadingError
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import Step
@@ -71,7 +71,7 @@ class Aims:
         assert quadratic is not None
         # All duals at once.
         quadratic.operator.duals([view.measurement for view in self.views])
-        return [read_with_error(quadratic, view.measurement) for view in self.views]
+        return [estimate_reading(step.solution, view.measurement) for view in self.views]
 
 
 @dataclass(frozen=True, eq=False)

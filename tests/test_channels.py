@@ -26,7 +26,7 @@ from tetlux.fem import (
 from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.solve import solve_each
+from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
 from tetlux.meshing.arrays import FloatArray

@@ -7,7 +7,7 @@ import pytest
 
 from tests.conftest import TISSUE
 from tetlux.cases.shipped import library_folder
-from tetlux.fem import Medium, PencilBeam, PointSource, Region, System, VaryingMedium, solve, solve_each
+from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, Region, System, VaryingMedium, solve, solve_each
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.known.fitted import MOST_SOURCES
@@ -86,6 +86,23 @@ def test_finite_elements_add_what_charges_lack() -> None:
     assert second < 0.8 * first
     for solution in solutions:
         assert solution.power.exited == pytest.approx(best.power.exited, rel=2e-3)
+
+
+def test_readings_where_facets_are_finer_than_charges_are_apart() -> None:
+    """What charges violate is integrated as finely as facets; at points of the charges' own the reading is 10 % off."""
+    radius, gamma = 30.0, 1.1
+    medium, body = Medium(sigma_a=0.05, sigma_s_prime=1.0, eta=1.3), sphere(radius)
+    place = radius * np.array([np.sin(gamma), 0.0, np.cos(gamma)])
+    mesh = tetrahedralize(body)
+    for within in (7.0,) * 4 + (3.0,) * 4:
+        near = np.linalg.norm(mesh.points[mesh.tetrahedra].mean(axis=1) - place, axis=1) < within
+        mesh = refine(mesh, near, body)
+    x, y, z = place.tolist()
+    source, detector = PointSource((0.0, 0.0, radius - 1.0)), PointDetector((x, y, z))
+    reading = solve(body, medium, [source], mesh=mesh, detectors=[detector]).readings[0]
+    truth = exact_sphere.point_exitance(medium, radius=radius, source_radius=radius - 1.0, gamma=np.array([gamma]))[0]
+    assert reading.relative_error is not None
+    assert abs(reading.exitance / truth - 1.0) < 3.0 * reading.relative_error < 0.03
 
 
 def test_readings_are_smooth_in_the_medium_on_a_mesh_that_was_solved_on(ball: Surface) -> None:

@@ -13,7 +13,7 @@ from PIL import Image
 from tests.conftest import TISSUE
 from tests.meshes_made import cube_of_cubes
 from tetlux.cases.cli import main
-from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, Region, Solution, read, solve
+from tetlux.fem import DiffuseLight, Medium, PencilBeam, PointDetector, PointSource, Region, Solution, read, solve
 from tetlux.fem.exact import layered
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.coefficients import coefficients_of
@@ -193,6 +193,23 @@ def test_a_reading_is_smooth_in_the_coefficients_where_patches_are_kept(far: Sol
     gamma = 14.0 / RADIUS
     right = [exact.point_exitance(medium, radius=RADIUS, source_radius=RADIUS - DEPTH, gamma=gamma) for medium in media]
     assert np.diff(np.log(found)) == pytest.approx(np.diff(np.log(right)), rel=0.03)
+
+
+def test_light_that_fades_within_a_tetrahedron_is_read_by_linear_elements_and_says_so() -> None:
+    """Quadratic elements overshoot by a factor of three there; linear ones are fitted to the layer."""
+    absorber = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
+    solution = solve(sphere(10.0), absorber, [DiffuseLight(1.0)], tolerance=0.9, detectors=on_ten()[:1])
+    (reading,) = solution.readings
+    assert reading.exitance == solution.exitance_on(np.array([reading.position]))[0]
+    assert reading.relative_error is not None
+    assert reading.relative_error > 0.2
+
+
+def test_a_mesh_that_is_too_large_is_read_by_linear_elements(far: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tetlux.fem.outcome.detectors.MOST_TETRAHEDRA", 100)
+    reading = read(on_ball(ARCS)[1], far)
+    assert reading.relative_error is None
+    assert reading.exitance == far.exitance_on(np.array([reading.position]))[0]
 
 
 @pytest.mark.parametrize(

@@ -442,3 +442,18 @@ def test_a_region_that_would_keep_the_mesher_busy_for_minutes_is_refused() -> No
     check_regions(sphere(10.0), [sphere(0.2, subdivisions=2)])
     with pytest.raises(InputError, match=r"region 2 is 0\.1\d* mm across, less than 0\.5% of the body"):
         check_regions(sphere(10.0), [sphere(0.2, subdivisions=2), sphere(0.04, center=(3.0, 0.0, 0.0))])
+
+
+def test_nested_regions_are_decimated_as_the_body_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four spheres of 5,120 triangles each: the mesher is given a sixth of them."""
+    given: list[int] = []
+
+    def count_triangles(_: FloatArray, faces: IntArray, **__: Any) -> None:
+        given.append(len(faces))
+        raise RunError("enough")
+
+    monkeypatch.setattr(mesher, "run_pytetwild", count_triangles)
+    with pytest.raises(RunError, match="enough"):
+        tetrahedralize(sphere(40.0), regions=[sphere(radius) for radius in (36.0, 34.0, 30.0)], cache=False)
+    assert len(given) == 1
+    assert given[0] < 5120

@@ -18,7 +18,7 @@ from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab
-from tetlux.fem.solve import solve_each
+from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing import RunError
 from tetlux.meshing.files.meshes import read_mesh
 

@@ -23,7 +23,7 @@ POWER_AIM_SHARE = 0.4
 REFINE_ABOVE = 1.05
 # The estimated error of a reading that refinement aims at, as a share of the tolerance; it leaves room for true errors
 # above the estimate.
-READING_AIM_SHARE = 0.55
+READING_AIM_SHARE = 0.5
 # Share of the square of a tetrahedron's error in a reading that one split is assumed to leave; squares add up to that
 # of the reading.
 SQUARE_LEFT_AFTER_SPLIT = 0.15

@@ -12,7 +12,7 @@ from tetlux.fem.known.fitted import FittedLight, Violation
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Mass
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -109,7 +109,7 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
         limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
         violation = light.violation_within(lambda queries: limits[tree.query(queries)[1]])
         _, facets, weights = mesh.closest_boundary(violation.points.points)
-    cells = light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1)
+    cells: BoolArray = np.asarray(light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1))
     patch = FittedPatch(mesh, light.charges, cells, at_nodes, violation, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
 

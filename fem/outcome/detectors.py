@@ -11,7 +11,7 @@ from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.quadratic.error import read_with_error
+from tetlux.fem.quadratic.error import ReadingError, read_with_error
 from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
@@ -26,6 +26,9 @@ LARGEST_GAP_SHARE = 0.25
 CIRCLES = 16
 # Number of quadrature points on each circle.
 SPOKES = 32
+# Most tetrahedra of a mesh that is read by quadratic elements; on larger ones these take a minute and gigabytes. Larger
+# meshes are read by linear elements, without an error.
+MOST_TETRAHEDRA = 400_000
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,8 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
     """
     placed = place_detector(detector, solution)
     error = model = None
-    if isinstance(solution, Solution) and solution.quadratic is not None:
-        found = read_with_error(solution.quadratic, placed.measurement)
+    if isinstance(solution, Solution) and is_quadratic(solution):
+        found = estimate_reading(solution, placed.measurement)
         exitance, error = found.value, found.relative
     else:
         exitance = float(placed.measurement.weights @ solution.exitance_on(placed.measurement.points))
@@ -146,9 +149,34 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
     return Reading(placed.position, placed.normal, exitance, placed.area, power, error, model)
 
 
+def is_quadratic(solution: Solution) -> bool:
+    """Whether a solution is read by quadratic elements: its mesh may be too large."""
+    return solution.quadratic is not None and len(solution.mesh.tetrahedra) <= MOST_TETRAHEDRA
+
+
+def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingError:
+    """The exitance at points of a solution by quadratic elements, with its error.
+
+    Where distributed light decays within a tetrahedron, linear elements are better; the error is the difference.
+    """
+    quadratic = solution.quadratic
+    assert quadratic is not None
+    found = read_with_error(quadratic, measurement)
+    if not quadratic.has_thin_layers(measurement):
+        return found
+    if len(solution.of_lights) > 1:
+        parts = [estimate_reading(part, measurement) for part in solution.of_lights]
+        return ReadingError.add(parts)
+    value = float(measurement.weights @ solution.exitance_on(measurement.points))
+    squares = np.zeros(len(found.squares))
+    squares[quadratic.operator.discretise(measurement).cells[0]] = (value - found.value) ** 2
+    return ReadingError(value, squares, 0.0, 0.0)
+
+
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors; this is faster than reading one after another."""
-    if isinstance(solution, Solution) and solution.quadratic is not None:
+    if isinstance(solution, Solution) and is_quadratic(solution):
+        assert solution.quadratic is not None
         solution.quadratic.operator.duals([place_detector(detector, solution).measurement for detector in detectors])
     return tuple(read(detector, solution) for detector in detectors)
 

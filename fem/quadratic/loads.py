@@ -38,7 +38,7 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: Sou
     """Load of source terms, as they are on the mesh of a space, (size,)."""
     mesh, load = space.mesh, np.zeros(space.size)
     if len(terms.points) or len(terms.segments):
-        lines, points, powers = _line_load(space, coefficients, terms.segments)
+        lines, points, powers = line_load(space, coefficients, terms.segments)
         load += lines
         points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
         load += _point_load(space, points, powers)
@@ -68,7 +68,7 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     return load
 
 
-def _line_load(
+def line_load(
     space: QuadraticSpace, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Load of attenuated beams, (size,); points and powers of their parts outside the mesh.
@@ -120,18 +120,6 @@ class QuadraticPatch:
     def is_fitted(self) -> bool:
         """Whether the charges are fitted to the surface, and subtracted in the whole body."""
         return isinstance(self.patch, FittedPatch)
-
-
-def quadratic_fitted_patch(operator: QuadraticOperator, patch: FittedPatch) -> QuadraticPatch:
-    """Charges fitted to the surface, with the load of their interpolant, and ``-∮ r v`` for the remainder.
-
-    The residual r is taken on the true surface, and applied to the boundary triangles nearest to its points.
-    """
-    space, violation = operator.space, patch.violation
-    interpolant = space.interpolate(patch.at_nodes, patch.charges.fluence(space.middles))
-    remainder = (-violation.points.areas * violation.residual)[:, None] * shape_functions(patch.weights, TRIANGLE_EDGES)
-    load = sum_by_index(space.faces(operator.mesh.boundary_faces[patch.facets]), remainder, space.size)
-    return QuadraticPatch(patch, interpolant, load + operator.matrix @ interpolant)
 
 
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:

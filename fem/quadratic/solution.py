@@ -7,8 +7,9 @@ import numpy as np
 
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
+from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.media.fresnel import moments
-from tetlux.fem.quadratic.loads import QuadraticPatch, quadratic_fitted_patch, quadratic_load, quadratic_patch
+from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
@@ -18,6 +19,10 @@ from tetlux.meshing.describe import one_line
 
 # Charges are subtracted where their fluence is at most this many times the fluence itself.
 LARGEST_BRIGHTNESS_RATIO = 4.0
+# A beam of at least this many rays is broad.
+LEAST_RAYS_OF_BROAD_BEAM = 16
+# Layers with a larger k h are thin. Under diffuse light the error of quadratic elements is .1 % at 1.4 and 200 % at 9.
+LARGEST_RESOLVED_KH = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +63,17 @@ class QuadraticScene:
         )
 
     @cached_property
+    def broad_beams(self) -> FloatArray:
+        """Load of the rays of broad beams on bubbles, for each light, (size, k), W."""
+        space, coefficients = self.operator.space, self.operator.coefficients
+        found = np.zeros((space.size, len(self.deposits)))
+        for light, deposit in enumerate(self.deposits):
+            if len(deposit.terms.segments) >= LEAST_RAYS_OF_BROAD_BEAM:
+                found[:, light], *_ = line_load(space, coefficients, deposit.terms.segments)
+        found[: len(space.mesh.points)] = 0.0
+        return found
+
+    @cached_property
     def fluence(self) -> FloatArray:
         """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
         # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
@@ -75,10 +91,12 @@ class QuadraticScene:
 
 
 def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> QuadraticPatch:
-    """A patch in quadratic elements, by the fluence (n,) of its light in linear elements."""
-    if isinstance(patch, FittedPatch):
-        return quadratic_fitted_patch(operator, patch.extend())
-    return quadratic_patch(operator, _widen(patch, fluence))
+    """A patch in quadratic elements, by the fluence (n,) of its light in linear elements.
+
+    The residual of fitted charges is integrated over the bent facets. With the quadrature points of linear elements, a
+    reading of a thousandth of the largest had an error of 4 %.
+    """
+    return quadratic_patch(operator, patch.extend() if isinstance(patch, FittedPatch) else _widen(patch, fluence))
 
 
 def _widen(patch: Patch, fluence: FloatArray) -> Patch:
@@ -115,6 +133,23 @@ class QuadraticSolution:
         """Fluence (size,), W/unit²."""
         return np.asarray(self.scene.fluence[:, self.lights].sum(axis=1))
 
+    def has_thin_layers(self, measurement: Measurement) -> bool:
+        """Whether distributed light decays within a tetrahedron there.
+
+        Quadratic elements then overshoot, while linear ones are fitted to such layers: see
+        `tetlux.fem.operators.fitting`.
+        """
+        if not any(
+            self.scene.deposits[light].terms.is_distributed and not self.scene.linear_patches[light]
+            for light in self.lights
+        ):
+            return False
+        cells, coefficients = self.operator.discretise(measurement).cells, self.operator.coefficients
+        diffusion, sigma_a = (at_cells(each, cells) for each in (coefficients.diffusion, coefficients.sigma_a))
+        # The edge of a regular tetrahedron of this volume.
+        edges = (6.0 * np.sqrt(2.0) * self.operator.mesh.volumes[cells]) ** (1.0 / 3.0)
+        return bool((np.sqrt(sigma_a / diffusion) * edges > LARGEST_RESOLVED_KH).any())
+
     @property
     def patches(self) -> list[QuadraticPatch]:
         """Their patches."""
@@ -129,6 +164,11 @@ class QuadraticSolution:
             inside = np.flatnonzero(patch.patch.cells)
             difference[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
         return difference
+
+    @property
+    def broad_beams(self) -> FloatArray:
+        """Load of the rays of broad beams on bubbles, (size,), W."""
+        return np.asarray(self.scene.broad_beams[:, self.lights].sum(axis=1))
 
     @cached_property
     def residual(self) -> FloatArray:

@@ -20,8 +20,8 @@ ON_SHEET, BULGE, LEAST_AREA = 1e-5, 0.05, 0.5
 DEEP = 0.1
 # Two triangles that meet at an edge with less than this angle between them, radians, are two sides at their rim.
 FOLDED = 0.5
-# The winding counts as consistent if, of the edges with an even number of triangles, all but this share are traversed
-# equally often in both directions: a few triangles may be turned over. Edges with an odd number lie at cracks and holes.
+# The winding counts as consistent if all but this share of the edges with an even number of triangles are traversed
+# equally often in both directions: a few triangles may be turned over. Edges with an odd number lie at cracks, holes.
 UNBALANCED = 0.1
 # Surfaces of more sheets are not searched.
 MOST_SHEETS = 200
