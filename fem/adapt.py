@@ -11,12 +11,12 @@ from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
-from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import View
 from tetlux.fem.quadratic.error import ReadingError, read_with_error
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import Step
+from tetlux.fem.system import MeshSolution
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
@@ -25,15 +25,15 @@ from tetlux.meshing.tets.refine import refine_often
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
 # After this many seconds in the mesher a progress line appears.
-SLOW = 8.0
+PROGRESS_AFTER_SECONDS = 8.0
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
-SceneSolver = Callable[[int, Step | None], Step]
+SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
 
 
 @dataclass(frozen=True, eq=False)
-class Aims:
+class Tolerances:
     """What a mesh is refined for.
 
     Attributes
@@ -50,7 +50,7 @@ class Aims:
     readings: float | None = None
     views: tuple[View, ...] = ()
 
-    def assess(self, steps: Sequence[Step]) -> "Assessment":
+    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
         """Say how far steps on one mesh are from the aims."""
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
@@ -66,7 +66,7 @@ class Aims:
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
         return Assessment(worst, splits, words)
 
-    def _read(self, step: Step) -> list[ReadingError]:
+    def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
         # All duals at once.
@@ -103,7 +103,7 @@ class Problem:
         The body and the media of each scene.
     sources : list of Sources
         The lights of each scene.
-    mass : {"lumped", "consistent"}
+    lumping : {"lumped", "consistent"}
     limit : bool
         Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
     watch : Stopwatch
@@ -111,7 +111,7 @@ class Problem:
 
     scenes: Scenes
     sources: list[Sources]
-    mass: Mass
+    lumping: Lumping
     limit: bool
     watch: Stopwatch
 
@@ -129,13 +129,13 @@ class Problem:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
         assembly = Assembly(mesh)
         systems = {
-            media: self.scenes.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
             for media in dict.fromkeys(self.media)
         }
         return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
 
 
-def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+def first_mesh(problem: Problem, aims: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
     """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
@@ -158,7 +158,7 @@ def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Repor
 def _report_if_slow(report: Report) -> Iterator[None]:
     """Report once that the mesher is still running, if it takes long."""
     words = f"still tetrahedralizing: thin parts and small regions take long; given up after {TIME_LIMIT:g} s"
-    timer = Timer(SLOW, report, [words])
+    timer = Timer(PROGRESS_AFTER_SECONDS, report, [words])
     timer.daemon = True
     timer.start()
     try:
@@ -167,7 +167,9 @@ def _report_if_slow(report: Report) -> Iterator[None]:
         timer.cancel()
 
 
-def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report) -> list[Step]:
+def solve_and_refine(
+    mesh: TetMesh, problem: Problem, aims: Tolerances, most_tetrahedra: int, report: Report
+) -> list[MeshSolution]:
     """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
 
     Parameters
@@ -175,7 +177,7 @@ def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedr
     mesh : TetMesh
         To begin with.
     problem : Problem
-    aims : Aims
+    aims : Tolerances
     most_tetrahedra : int
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
@@ -183,7 +185,7 @@ def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedr
 
     Returns
     -------
-    list of Step
+    list of MeshSolution
         One for each scene, all on the same mesh.
     """
     # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.

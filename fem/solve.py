@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, overload
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Aims, Problem, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
 from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
@@ -15,7 +15,7 @@ from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.notes import notes_on, notes_on_readings
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detectors import Detector, read_all, view_of
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
@@ -38,7 +38,7 @@ def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of
     detectors: Sequence[Detector] = ...,
     detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
-    mass: Mass = ...,
+    mass: Lumping = ...,
     subtract: Subtract = ...,
     limit: bool = ...,
     most_tetrahedra: int = ...,
@@ -59,7 +59,7 @@ def solve(
     detectors: Sequence[Detector] = ...,
     detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
-    mass: Mass = ...,
+    mass: Lumping = ...,
     subtract: Subtract = ...,
     limit: bool = ...,
     most_tetrahedra: int = ...,
@@ -91,7 +91,7 @@ def solve(
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
-    mass: Mass = "lumped",
+    mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
@@ -213,7 +213,7 @@ def solve_each(
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
-    mass: Mass = "lumped",
+    mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
@@ -297,7 +297,7 @@ def solve_each(
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
+        aims = Tolerances(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
     problem = Problem(checked, sources, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
     most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)

@@ -19,7 +19,7 @@ from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel,
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.models.model import Model
-from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.operators.fitting import fitting_of
 from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
@@ -42,7 +42,7 @@ LOADS_OF_A_LIGHT = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class MeshSolution:
     """A solution on one mesh, its error, and at which nodes each of its charges is a good guess."""
 
     solution: Solution
@@ -79,7 +79,7 @@ class System:
     mesh: TetMesh
     medium: AnyMedium | MediaByLabel
     surface: Surface | None = None
-    mass: Mass = "lumped"
+    mass: Lumping = "lumped"
     expected: int = 1
     regions: tuple[Region, ...] = ()
     assembly: Assembly | None = None
@@ -164,15 +164,15 @@ class System:
         solution = self._solve(sources, watch, None).whole
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
-    def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
+    def step(self, sources: Sources, watch: Stopwatch, before: MeshSolution | None = None) -> MeshSolution:
         """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
         solved = self._solve(sources, watch, before)
         with watch.stage("solve"):
             inner = [region.surface for region in self.regions]
             estimate = estimate_by_operator(solved.loads, solved.of_lights, solved.whole, inner)
-        return Step(replace(solved.whole, error_estimate=estimate.error), estimate, solved.good)
+        return MeshSolution(replace(solved.whole, error_estimate=estimate.error), estimate, solved.good)
 
-    def _solve(self, sources: Sources, watch: Stopwatch, before: Step | None) -> "_Solved":
+    def _solve(self, sources: Sources, watch: Stopwatch, before: MeshSolution | None) -> "_Solved":
         """From deposits to loads and patches, to one linear system for all of them, to a solution for each light."""
         with watch.stage("assemble"):
             loads = self._loads(sources)
@@ -232,7 +232,7 @@ class System:
         emission = deposit.terms.emission * share[self.mesh.regions]
         return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
-    def _subtractions(self, sources: Sources, before: Step | None) -> list[Subtraction]:
+    def _subtractions(self, sources: Sources, before: MeshSolution | None) -> list[Subtraction]:
         """What is subtracted: the charges, each where it was a good guess on the mesh before, or else everywhere."""
         mesh = self.mesh
         good: Sequence[BoolArray | None] = [None] * len(sources.charges)

@@ -68,7 +68,7 @@ def test_a_mesh_that_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(memory, "available", lambda: 1.01 * needed)
     solve(mesh, TISSUE, light)
     monkeypatch.setattr(memory, "available", lambda: 0.9 * needed)
-    monkeypatch.setattr("tetlux.fem.operators.assembly.Assembly.of", lambda *_: pytest.fail("assembled"))
+    monkeypatch.setattr("tetlux.fem.operators.assembly.Assembly.assemble", lambda *_: pytest.fail("assembled"))
     with pytest.raises(RunError, match=r"3,072 tetrahedra need about 0.0831 GB .* and 0.0748 GB are available"):
         solve(mesh, TISSUE, light)
 

@@ -305,7 +305,7 @@ def test_a_body_too_thin_for_the_mesher_is_refused_before() -> None:
 
 
 def test_a_word_is_said_of_a_slow_mesher(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["tetlux.fem.adapt"], "SLOW", 0.01)
+    monkeypatch.setattr(sys.modules["tetlux.fem.adapt"], "PROGRESS_AFTER_SECONDS", 0.01)
     words: list[str] = []
     solve(sphere(10.0, subdivisions=2), TISSUE, [DiffuseLight(1.0)], tolerance=0.5, cache=False, report=words.append)
     assert words[0].startswith("still tetrahedralizing: ")

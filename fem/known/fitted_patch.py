@@ -10,6 +10,7 @@ from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.fitted import FittedLight, Violation
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.known.patch_terms import PatchTerms
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
@@ -113,7 +114,7 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray) -> PatchTerms:
     mesh, charges, violation = patch.mesh, patch.charges, patch.violation
     areas = violation.points.areas
     exited, inflow = float(areas @ violation.exitance), float(areas @ (violation.residual - violation.exitance))
-    robin = 0.5 / charges.medium.boundary_factor
+    robin = boundary_condition_of(charges.medium).robin
     at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
     # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.
     absorbed = float(charges.strengths[: charges.sources].sum()) + inflow

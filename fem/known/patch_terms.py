@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import coefficients_of
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -42,7 +43,7 @@ class PatchTerms:
     __repr__ = one_line
 
 
-def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
+def patch_terms(patch: Patch, mass: Lumping) -> PatchTerms:
     """Assemble the terms of a patch.
 
     Parameters
@@ -62,7 +63,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     count = len(mesh.points)
     faces, on_boundary = patch.faces
     out_of_faces, through = _integrals(mesh.points[faces], charges)
-    robin = 1.0 / (2.0 * medium.boundary_factor)
+    robin = boundary_condition_of(medium).robin
     leaving = robin * out_of_faces * on_boundary[:, None]
     load = -sum_by_index(faces, through + leaving, count)
     # a(I_h G, v): stiffness, absorption and boundary terms of the patch, times G at the nodes.
@@ -85,7 +86,7 @@ def patch_terms(patch: Patch, mass: Mass) -> PatchTerms:
     )
 
 
-def _mass(values: FloatArray, mass: Mass) -> FloatArray:
+def _mass(values: FloatArray, mass: Lumping) -> FloatArray:
     """Mass matrices of simplices of unit size times values at their corners, (m, d + 1)."""
     corners = values.shape[1]
     if mass == "lumped":

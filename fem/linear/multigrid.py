@@ -7,7 +7,7 @@ import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
 from tetlux.fem.linear.direct import factors_of
-from tetlux.fem.linear.krylov import Preconditioner, Product, dots, preconditioned, real_bound
+from tetlux.fem.linear.krylov import Preconditioner, Product, dots, make_preconditioned_cg, real_majorant
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 
@@ -30,7 +30,7 @@ class Multigrid:
 
     def __call__(self, loads: NumberArray) -> tuple[NumberArray, int]:
         """See `tetlux.fem.linear.krylov.Method`."""
-        return preconditioned(self.product, self.cycle)(loads)
+        return make_preconditioned_cg(self.product, self.cycle)(loads)
 
     __repr__ = one_line
 
@@ -38,11 +38,11 @@ class Multigrid:
 def multigrid(product: Product) -> Multigrid:
     """Conjugate gradients, preconditioned by smoothed aggregation (Vaněk, Mandel & Brezina 1996).
 
-    For a complex matrix the hierarchy is that of its `real_bound`.
+    For a complex matrix the hierarchy is that of its `real_majorant`.
     """
     finest, levels = product, list[_Level]()
     if product.is_complex:
-        product = Product(real_bound(product.matrix))
+        product = Product(real_majorant(product.matrix))
     while product.matrix.shape[0] > COARSEST and (level := _level(product)) is not None:
         levels.append(level)
         product = Product(csr_array(level.down.matrix @ (product.matrix @ level.up.matrix)))

@@ -16,8 +16,8 @@ from tetlux.fem.charges.places import FINER
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
-from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
@@ -207,8 +207,8 @@ class ChargeSolution:
     @property
     def _unscattered(self) -> float:
         """Exitance beside ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
-        share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1])
-        return share * sum(entry.transmitted for entry in self.entries)
+        transmitted = sum(entry.transmitted for entry in self.entries)
+        return float(boundary_condition_of(self.medium).exitance_offset(transmitted))
 
 
 def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
@@ -252,7 +252,7 @@ def charge_solution(
     """
     sources = powers.sum(axis=0)
     if not inner:
-        inflow = 2.0 * np.array([entry.transmitted for entry in entries]) / (1.0 + 3.0 * moments(medium.eta)[1])
+        inflow = np.asarray(boundary_condition_of(medium).inflow(np.array([entry.transmitted for entry in entries])))
         drive = Drive(points, powers, inflow)
         fitted = fit_charges(surface, equation_of(medium), drive, tolerance=tolerance, most=most)
         samples, wall = fitted.places.fitted, Wall(surface, 0, None)

@@ -25,13 +25,13 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Layers are fitted from this k h on: below, the error of the exitance on balls is the same without.
-FITTED_FROM = 0.5
+SMALLEST_FITTED_KH = 0.5
 # k h is clipped to this range: at the lower end the quotients are 1 to rounding, at the upper one sinh would overflow.
 SMALLEST_KH, LARGEST_KH = 1e-6, 600.0
 
 
 @dataclass(frozen=True, eq=False)
-class Fitting:
+class LayerFitting:
     """Coefficients of the matrix where they are not the medium's own.
 
     Attributes
@@ -40,18 +40,18 @@ class Fitting:
         D of each tetrahedron, unit.
     absorption_scale : (n,) ndarray
         The factor on the absorption in the lumped mass of each node.
-    across : (n,) ndarray
+    kh : (n,) ndarray
         k h at nodes on the boundary, and 0 at others.
     """
 
     diffusion: FloatArray
     absorption_scale: FloatArray
-    across: FloatArray
+    kh: FloatArray
 
     __repr__ = one_line
 
 
-def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> Fitting | None:
+def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> LayerFitting | None:
     """Coefficients that fit layers along the boundary; None if light fades slowly enough for the mesh everywhere."""
     cells = mesh.boundary_cells
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
@@ -60,13 +60,13 @@ def fitting_of(mesh: TetMesh, coefficients: Coefficients) -> Fitting | None:
     spacing = 2.0 * mesh.node_volumes[nodes] / areas
     decay = mesh.to_boundary_nodes(np.sqrt(sigma_a / diffusion) * mesh.boundary_areas) / areas
     at_boundary = decay * spacing
-    if at_boundary.max() <= FITTED_FROM:
+    if at_boundary.max() <= SMALLEST_FITTED_KH:
         return None
-    across, scale = np.zeros(len(mesh.points)), np.ones(len(mesh.points))
-    across[nodes] = np.maximum(at_boundary, SMALLEST_KH)
-    scale[nodes] = np.tanh(0.5 * across[nodes]) / (0.5 * across[nodes])
-    corners = across[mesh.tetrahedra]
+    kh, scale = np.zeros(len(mesh.points)), np.ones(len(mesh.points))
+    kh[nodes] = np.maximum(at_boundary, SMALLEST_KH)
+    scale[nodes] = np.tanh(0.5 * kh[nodes]) / (0.5 * kh[nodes])
+    corners = kh[mesh.tetrahedra]
     touching = np.count_nonzero(corners, axis=1)
     mean = np.minimum(corners.sum(axis=1) / np.maximum(touching, 1), LARGEST_KH)
     share = np.divide(mean, np.sinh(mean), out=np.ones(len(mean)), where=touching > 0)
-    return Fitting(coefficients.diffusion * share, scale, across)
+    return LayerFitting(coefficients.diffusion * share, scale, kh)

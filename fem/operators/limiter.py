@@ -14,10 +14,10 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 # Sweeps from neighbour to neighbour; what is still missing after them is taken from all nodes in proportion.
 SWEEPS = 10
 # Quotients by less than this could overflow.
-NOTHING = 1e-250
+SMALLEST_DIVISOR = 1e-250
 
 
-def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
+def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
     """Raise a fluence to zero where it is below, at the cost of the nodes around.
 
     Parameters
@@ -38,7 +38,7 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     """
     power = weights * fluence
     total = float(power.sum())
-    if fluence.min(initial=0.0) >= 0 or total < NOTHING:
+    if fluence.min(initial=0.0) >= 0 or total < SMALLEST_DIVISOR:
         return fluence, 0.0
     deficit, available = np.maximum(-power, 0.0), np.maximum(power, 0.0)
     limited_power = float(deficit.sum())
@@ -63,4 +63,4 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
 
 def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
     """``a/b``, and 0 where b is next to nothing."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > NOTHING)
+    return np.divide(a, b, out=np.zeros_like(a), where=b > SMALLEST_DIVISOR)

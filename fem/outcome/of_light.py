@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tetlux.fem.known.subtraction import Subtraction
-from tetlux.fem.operators.limiter import nonnegative
+from tetlux.fem.operators.limiter import limit_to_nonnegative
 from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.solution import Power, Solution
 from tetlux.meshing.arrays import FloatArray
@@ -37,11 +37,11 @@ def solution_of_light(
     mesh, limited_power = operator.mesh, 0.0
     dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
     if limit and operator.model.nonnegative and not dips:
-        fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
+        fluence, limited_power = limit_to_nonnegative(fluence, mesh.edges, operator.loss_weights)
     outside = mesh.boundary_node_areas * terms.irradiance
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
     emitted = float((mesh.volumes * terms.emission).sum())
-    absorbed = float((operator.absorbing * fluence).sum())
+    absorbed = float((operator.absorption_weights * fluence).sum())
     ledger = Power(
         incident=known.incident + float(outside.sum()) + emitted,
         specular=known.specular + float((outside - transmitted).sum()),
@@ -52,7 +52,7 @@ def solution_of_light(
     solution = Solution(
         mesh,
         surface,
-        operator.model.boundary,
+        operator.model.boundary_condition,
         fluence,
         ledger,
         tuple(each.patch for each in subtractions),

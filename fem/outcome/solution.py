@@ -10,7 +10,7 @@ import numpy.typing as npt
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.models.boundary import Boundary
+from tetlux.fem.models.boundary import BoundaryCondition
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
@@ -64,7 +64,7 @@ class Solution:
     mesh : TetMesh
     surface : Surface
         What the mesh stands for: exitance at points is taken to this.
-    boundary : Boundary
+    boundary_condition : BoundaryCondition
         How the exitance follows from the fluence: see `tetlux.fem.models.boundary`.
     fluence : (n,) ndarray, real or complex
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
@@ -97,7 +97,7 @@ class Solution:
 
     mesh: TetMesh
     surface: Surface
-    boundary: Boundary
+    boundary_condition: BoundaryCondition
     fluence: NumberArray
     power: Power
     patches: tuple[Patch, ...] = ()
@@ -116,12 +116,12 @@ class Solution:
     @cached_property
     def exitance(self) -> NumberArray:
         """Exitance at the boundary nodes of `mesh`, (b,), W/unit²: see `tetlux.fem.models.boundary`."""
-        return self.boundary.exitance(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
+        return self.boundary_condition.exitance(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
 
     @property
     def medium(self) -> Medium:
         """The medium below the surface: of a body of several, one of the refractive index that all of them share."""
-        return self.boundary.medium
+        return self.boundary_condition.medium
 
     def exitance_at(self, points: FloatArray) -> NumberArray:
         """Exitance at the points of the surface nearest to given points.
@@ -153,7 +153,7 @@ class Solution:
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        return self.boundary.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        return self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import MASS, STIFFNESS, TETRAHEDRON, TRIANGLE, TRIANGLE_EDGES, derivatives, functions
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -16,7 +17,7 @@ BLOCK = 2048
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
     """The matrix of a space, (size, size), symmetric, by its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
-    escaping = coefficients.robin * face_matrices(space, faces)
+    escaping = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
     return csr_array(_scattered(space.cells, elements, space.size) + _scattered(faces, escaping, space.size))
 
 

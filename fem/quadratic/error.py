@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.roughness import roughness
 from tetlux.fem.quadratic.sight import Sight
 from tetlux.fem.quadratic.solution import QuadraticSolution
@@ -70,7 +71,8 @@ def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
     squares = (SIZE * local) ** 2
     if not sight.inside:
         # Along the normal fluence changes by itself over the extrapolation length.
-        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, seen.cells)
+        robin = boundary_condition_of(operator.coefficients.outer).robin
+        steepness = robin / at_cells(operator.coefficients.diffusion, seen.cells)
         off = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
         squares[seen.cells[0]] += off**2
     return ReadingError(value, squares, SIZE * SUM * float(local.sum()))

@@ -10,6 +10,7 @@ from scipy.sparse import csr_array
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, dots
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
 from tetlux.fem.quadratic.sight import Seen, Sight
@@ -77,7 +78,8 @@ class QuadraticOperator:
         """
         nodes = len(self.mesh.points)
         assembly = Assembly(self.mesh)
-        linear = assembly.solver(self.coefficients, assembly.of(self.coefficients), EXPECTED).preconditioner
+        matrix = assembly.assemble(self.coefficients)
+        linear = assembly.solver(Diffusion(self.coefficients), matrix, EXPECTED).preconditioner
         inverse = 1.0 / self.matrix.diagonal()[nodes:, None]
 
         def precondition(rest: FloatArray) -> FloatArray:
@@ -89,7 +91,7 @@ class QuadraticOperator:
         """Solutions (size, k) for loads (size, k), to relative residuals of about 1e-7."""
         product, precondition = self._product, self._precondition
         # In units in which the iteration stops at the aim.
-        size = np.sqrt(dots(loads, loads)) * AIM / krylov.AIM
+        size = np.sqrt(dots(loads, loads)) * AIM / krylov.STOP_RESIDUAL
         size[size == 0] = 1.0
         scaled = loads / size
         groups = [np.ascontiguousarray(scaled[:, i : i + GROUP]) for i in range(0, loads.shape[1], GROUP)]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, functions
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -46,7 +47,8 @@ class Sight:
         face, weights = space.on_boundary(self.points)
         mesh = space.mesh
         places, hats = space.faces(mesh.boundary_faces[face]), functions(weights, TRIANGLE_EDGES)
-        return Seen(self, space, coefficients.robin, mesh.boundary_cells[face], places, hats)
+        robin = boundary_condition_of(coefficients.outer).robin
+        return Seen(self, space, robin, mesh.boundary_cells[face], places, hats)
 
     __repr__ = one_line
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
-from tetlux.fem.media.fresnel import moments
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.loads import QuadraticPatch, quadratic_fitted_patch, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.roughness import roughness
@@ -158,7 +158,7 @@ class QuadraticSolution:
             return np.zeros(len(seen.cells))
         transmitted = np.zeros(len(mesh.points))
         transmitted[mesh.boundary_nodes] = given
-        share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.operator.coefficients.outer.eta)[1])
+        share = boundary_condition_of(self.operator.coefficients.outer).exitance_offset(1.0)
         return np.asarray(share * (transmitted[seen.places[:, :3]] * seen.hats[:, :3]).sum(axis=1))
 
     __repr__ = one_line
