@@ -28,13 +28,13 @@ MOST_TETRAHEDRA = 1_000_000
 PROGRESS_AFTER_SECONDS = 8.0
 
 Report = Callable[[str], None]
-# Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
+# Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
 SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
 
 
 @dataclass(frozen=True, eq=False)
 class Tolerances:
-    """What a mesh is refined for.
+    """What a mesh is refined for: wanted errors.
 
     Attributes
     ----------
@@ -51,46 +51,46 @@ class Tolerances:
     views: tuple[View, ...] = ()
 
     def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
-        """Say how far steps on one mesh are from the aims."""
+        """Compare the errors of solutions on one mesh with the tolerances."""
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
-        worst, words = 0.0, f"estimated error {error:.2%}"
+        largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
-            worst = error / self.exitance
+            largest_ratio = error / self.exitance
             splits += cells_to_split((step.estimate for step in steps), self.exitance)
         if self.readings is not None:
             readings = [reading for step in steps for reading in self._read(step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
-            worst = max(worst, of_readings / self.readings)
-            words += f", of readings {of_readings:.2%}"
+            largest_ratio = max(largest_ratio, of_readings / self.readings)
+            summary += f", of readings {of_readings:.2%}"
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
-        return Assessment(worst, splits, words)
+        return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
-        # All duals at once.
+        # Solve for all duals at once.
         quadratic.operator.duals([view.sight for view in self.views])
         return [read_with_error(quadratic, view.sight) for view in self.views]
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How far steps on one mesh are from what it is refined for.
+    """How far solutions on one mesh are from the tolerances.
 
     Attributes
     ----------
-    worst : float
-        The largest of their errors, by its tolerance.
+    largest_error_ratio : float
+        The largest ratio of an estimated error to its tolerance.
     splits : (m,) ndarray of int
         How often to split each tetrahedron.
-    words : str
-        Their errors in words.
+    summary : str
+        The errors, in a few words.
     """
 
-    worst: float
+    largest_error_ratio: float
     splits: IntArray
-    words: str
+    summary: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,23 +132,32 @@ class Problem:
             media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
             for media in dict.fromkeys(self.media)
         }
-        return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
+        return lambda scene, coarser: systems[self.media[scene]].step(self.sources[scene], self.watch, coarser)
 
 
-def first_mesh(problem: Problem, aims: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+def first_mesh(
+    problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
+) -> TetMesh:
     """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        lit = places_to_resolve([deposit for sources in problem.sources for deposit in sources.not_fitted])
-        mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, inner=scenes.inner)
-        if aims.readings is not None:
-            seen = np.array([view.position for view in aims.views])
-            every, _ = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])
+        source_points = places_to_resolve([each for sources in problem.sources for each in sources.not_fitted])
+        mesh = grade_mesh(mesh, scenes.surface, *source_points, most_tetrahedra, inner=scenes.inner)
+        if tolerances.readings is not None:
+            detector_points = np.array([view.position for view in tolerances.views])
+            all_points, _ = places_to_resolve([each for sources in problem.sources for each in sources.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
-                    mesh, scenes.surface, scenes.inner, media, every, seen, aims.readings, most_tetrahedra
+                    mesh,
+                    scenes.surface,
+                    scenes.inner,
+                    media,
+                    all_points,
+                    detector_points,
+                    tolerances.readings,
+                    most_tetrahedra,
                 )
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
@@ -168,38 +177,38 @@ def _report_if_slow(report: Report) -> Iterator[None]:
 
 
 def solve_and_refine(
-    mesh: TetMesh, problem: Problem, aims: Tolerances, most_tetrahedra: int, report: Report
+    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
 ) -> list[MeshSolution]:
-    """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
+    """Solve for all scenes on one mesh, refined until each is within the tolerances or the mesh as large as it may be.
 
     Parameters
     ----------
     mesh : TetMesh
-        To begin with.
+        The first one.
     problem : Problem
-    aims : Tolerances
+    tolerances : Tolerances
     most_tetrahedra : int
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
-        Called with a line of text as each mesh is solved on.
+        Called with a line of text for each mesh.
 
     Returns
     -------
     list of MeshSolution
         One for each scene, all on the same mesh.
     """
-    # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
+    # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
     bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     solve_on = problem.solver_on(mesh)
-    steps = best = {first: solve_on(first, None)}
-    least = np.inf
+    steps = best_steps = {first: solve_on(first, None)}
+    least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = aims.assess(list(steps.values()))
-        if found.worst < least:
-            best, least = steps, found.worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.words}")
+            found = tolerances.assess(list(steps.values()))
+        if found.largest_error_ratio < least_ratio:
+            best_steps, least_ratio = steps, found.largest_error_ratio
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
         fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
@@ -211,7 +220,7 @@ def solve_and_refine(
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
-            chosen = steps if fine_enough else best
+            chosen = steps if fine_enough else best_steps
             return [chosen[scene] for scene in range(len(bodies))]
-        steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
-        pending, least = [], np.inf
+        steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
+        pending, least_ratio = [], np.inf

@@ -1,30 +1,27 @@
-"""`solve` and `solve_each`: the public functions that solve for the light in a body."""
+"""`solve`: the public function that solves for the light in a body."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, overload
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
-from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.known.split import Subtract
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
-from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
-from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
-from tetlux.fem.outcome.detectors import Detector, read_all, view_of
-from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.outcome.detectors import Detector, read_all
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.scenes import build_scenes, media_by_channel
+from tetlux.fem.scenes import media_by_channel
+from tetlux.fem.solve_each import Report, no_report, solve_each
 from tetlux.fem.sources.light import Light
-from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+__all__ = ["solve", "solve_each"]
 
 
 @overload
@@ -43,7 +40,7 @@ def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of
     limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
-    report: Callable[[str], None] = ...,
+    report: Report = ...,
     model: Literal["full"] = ...,
 ) -> Solution: ...
 
@@ -64,20 +61,21 @@ def solve(
     limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
-    report: Callable[[str], None] = ...,
+    report: Report = ...,
     model: Literal["full"] = ...,
 ) -> list[Solution]: ...
 
 
 @overload
 def solve(
-    body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    body: Surface,
+    medium: AnyMedium,
     lights: Sequence[Light],
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
     tolerance: float = ...,
+    detectors: Sequence[Detector] = ...,
 ) -> ChargeSolution: ...
 
 
@@ -96,7 +94,7 @@ def solve(
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = no_report,
     model: Literal["full", "charges"] = "full",
 ) -> Solution | list[Solution] | ChargeSolution:
     """Solve the diffusion approximation for the light in a body.
@@ -125,13 +123,14 @@ def solve(
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
-        Quadrature of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
+        Quadrature of the terms without derivatives, which are mass matrices of the volume and of the boundary: see
+        `tetlux.fem.operators.assembly.system_matrix`.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
         What is subtracted from the fluence of point sources before finite elements solve for the rest, see
         `tetlux.fem.known`. "fitted" is charges fitted to the surface, for points and beams that are points, where the
-        body is a `Surface` of one even medium; other light, and light for which they would not do, has "half-space".
-        Places of charges are kept with the mesh of a solution: solved on it again as `mesh`, the exitance depends
-        smoothly on the medium.
+        body is a `Surface` of one homogeneous medium; for other light, and where no fit is good enough, it is
+        "half-space". The positions of the charges are kept with the mesh of a solution; solved on it again, given as
+        `mesh`, the exitance depends smoothly on the medium.
     limit : bool
         Whether the fluence is limited to be nonnegative where lumping alone does not make it so, see
         `tetlux.fem.operators.limiter`.
@@ -143,9 +142,10 @@ def solve(
     report : callable
         Called with a line of text as each stage ends.
     model : {"full", "charges"}
-        "full" solves by finite elements. "charges" fits screened charges outside the body to its boundary condition
-        and makes no mesh, see `tetlux.fem.charges`; it takes points, beams that are points, and diffuse light, in
-        uniform media, and of the other arguments only `regions` and `tolerance`.
+        The method: both solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
+        charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
+        beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
+        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest.
 
     Returns
     -------
@@ -179,8 +179,19 @@ def solve(
     if model not in ("full", "charges"):
         raise InputError(f'model is "{model}"; give "full" or "charges".')
     if model == "charges":
-        if tolerance is None:
-            raise InputError('model "charges" needs a tolerance of the exitance; give one.')
+        _check_options_of_charges(
+            tolerance,
+            {
+                "detector_tolerance": detector_tolerance is not None,
+                "mass": mass != "lumped",
+                "subtract": subtract != "fitted",
+                "limit": not limit,
+                "most_tetrahedra": most_tetrahedra != MOST_TETRAHEDRA,
+                "cache": not cache,
+                "report": report is not no_report,
+            },
+        )
+        assert tolerance is not None
         found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
         return replace(found, readings=read_all(detectors, found))
     channels, several = media_by_channel(body, mesh, medium)
@@ -203,134 +214,18 @@ def solve(
     return solutions if several else solutions[0]
 
 
-def solve_each(
-    body: Surface | TetMesh,
-    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
-    scenes: Sequence[Sequence[Light]],
-    *,
-    regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
-    detectors: Sequence[Detector] = (),
-    detector_tolerance: float | None = None,
-    mesh: TetMesh | None = None,
-    mass: Lumping = "lumped",
-    subtract: Subtract = "fitted",
-    limit: bool = True,
-    most_tetrahedra: int = MOST_TETRAHEDRA,
-    cache: bool = True,
-    report: Callable[[str], None] = lambda _: None,
-) -> list[Solution]:
-    """Solve for several scenes of one body on one mesh that is fine enough for each of them.
-
-    Parameters
-    ----------
-    body : Surface or TetMesh
-        The body of all scenes; all lengths are in its unit.
-    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
-        One for all scenes, or a sequence with one for each scene. Coefficients in 1/unit.
-    scenes : sequence of sequences of Light
-        The lights of each scene, which add up.
-    regions : sequence of Region
-        Closed surfaces within the body; a region has one medium for all scenes, or one for each.
-    tolerance : float, optional
-        Wanted relative L2 error of each scene's exitance over the surface; None to refine for detectors alone.
-    detectors : sequence of detectors
-        What is to be read in each scene.
-    detector_tolerance : float, optional
-        Wanted relative error of what each detector reads.
-    mesh : TetMesh, optional
-        A mesh of the body, which is used as it is.
-    mass : {"lumped", "consistent"}
-        Quadrature of the terms without derivatives.
-    subtract : {"half-space", "free-space", "nothing"}
-        The closed form that is subtracted from the fluence of point sources.
-    limit : bool
-        Whether the fluence is limited to be nonnegative.
-    most_tetrahedra : int
-        Refinement stops at this many even if the tolerance is not met; solutions then carry a warning.
-    cache : bool
-        Whether the mesher's mesh is looked up and kept in the user's cache directory.
-    report : callable
-        Called with a line of text as each stage ends.
-
-    Returns
-    -------
-    list of Solution
-        One for each scene, all on the same mesh; the seconds of each are those of all scenes together.
-
-    Raises
-    ------
-    InputError
-        If an argument is out of range, a light does not meet the body, or media, regions and mesh do not fit each
-        other.
-    RunError
-        If the mesher or the linear solver fails, or the mesh takes more memory than is available.
-
-    Notes
-    -----
-    Method and estimate are those of `solve`. Scenes of equal media share one system matrix.
-
-    Examples
-    --------
-    >>> from tetlux.fem import Medium, PointSource, solve_each
-    >>> from tetlux.meshing import sphere
-    >>> tissue = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
-    >>> scenes = [[PointSource((0, 0, z))] for z in (5.0, 8.0)]
-    >>> deep, shallow = solve_each(sphere(10.0), tissue, scenes, tolerance=0.05)
-    >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
-    (True, True)
-    """
-    _check_tolerances(tolerance, detectors, detector_tolerance)
-    check_scenes(scenes)
-    if isinstance(body, TetMesh):
-        if mesh is not None:
-            raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
-        mesh = body
-    watch = Stopwatch()
-    with watch.stage("surface"):
-        checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = KeptPlaces() if mesh is None else kept_on(mesh)
-        if isinstance(body, TetMesh):
-            subtract = without_fit(subtract)
-        sources = [
-            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
-            for lights, each in zip(scenes, checked.bodies, strict=True)
-        ]
-        dark = Dark(checked.surface, checked.bodies[0].outer)
-        aims = Tolerances(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
-    problem = Problem(checked, sources, mass, limit, watch)
-    given, reading = mesh is not None, len(detectors) > 0
-    most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)
-    if mesh is None:
-        mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
-    check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
-    steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
-    keep_with(steps[0].solution.mesh, kept)
-    where = "on the mesh given" if given else where
-    solutions = []
-    for number, step in enumerate(steps):
-        with watch.stage("solve"):
-            readings = read_all(detectors, step.solution)
-        notes = notes_on(step.solution, sources[number], tolerance, where)
-        notes += notes_on_readings(readings, detector_tolerance, where)
-        notes += checked.warnings(number, step.solution, given=given)
-        solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
-    seconds = watch.read()
-    return [replace(solution, seconds=seconds) for solution in solutions]
-
-
-def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
-    """Refuse tolerances that are not sensible or do not go with the detectors.
+def _check_options_of_charges(tolerance: float | None, given: Mapping[str, bool]) -> None:
+    """Refuse arguments that are for finite elements alone; `given` says of each whether it was changed.
 
     Raises
     ------
     InputError
     """
-    if tolerance is not None:
-        check_tolerance(tolerance)
-    if detector_tolerance is not None:
-        check_tolerance(detector_tolerance, "detector_tolerance")
-        if len(detectors) == 0:
-            raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
-    elif tolerance is None:
-        raise InputError("there is no tolerance; give tolerance, or detectors and a detector_tolerance.")
+    if tolerance is None:
+        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
+    names = [name for name, changed in given.items() if changed]
+    if names:
+        raise InputError(
+            f'model "charges" does not take {" and ".join(names)}; leave out what it does not take, or give '
+            'model="full".'
+        )

@@ -309,3 +309,26 @@ def test_a_word_is_said_of_a_slow_mesher(monkeypatch: pytest.MonkeyPatch) -> Non
     words: list[str] = []
     solve(sphere(10.0, subdivisions=2), TISSUE, [DiffuseLight(1.0)], tolerance=0.5, cache=False, report=words.append)
     assert words[0].startswith("still tetrahedralizing: ")
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"detector_tolerance": 0.01}, "detector_tolerance"),
+        ({"mass": "consistent"}, "mass"),
+        ({"subtract": "nothing", "cache": False}, "subtract and cache"),
+        ({"limit": False}, "limit"),
+        ({"most_tetrahedra": 1000}, "most_tetrahedra"),
+        ({"report": print}, "report"),
+    ],
+)
+def test_charges_refuse_what_is_for_finite_elements(ball: Surface, options: dict[str, Any], names: str) -> None:
+    expected = f'model "charges" does not take {names}; leave out what it does not take, or give model="full".'
+    with pytest.raises(InputError, match=f"^{expected}$"):
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], model="charges", **options)
+
+
+def test_a_system_takes_a_model_of_its_own() -> None:
+    """Light that is absorbed more strongly by a shift is that of a medium with more absorption."""
+    mesh, light, more = block((8, 8, 8), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))], 0.05
+    shifted = Operators(mesh, TISSUE, lambda coefficients: Diffusion(coefficients, shift=more))

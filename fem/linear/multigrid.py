@@ -13,8 +13,9 @@ from tetlux.meshing.describe import one_line
 
 # PyAMG finds the aggregates, and has no wheel for Linux on ARM.
 HAS_PYAMG = find_spec("pyamg") is not None
-# Matrices of this many unknowns or fewer are factorised, and spectral radii are estimated in so many steps.
+# Matrices of this many unknowns or fewer are factorised.
 COARSEST = 500
+# Steps of the power iteration that estimates a spectral radius.
 POWER_STEPS = 8
 
 

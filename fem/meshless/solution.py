@@ -18,8 +18,8 @@ from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
-from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface

@@ -61,7 +61,7 @@ def system_matrix(mesh: TetMesh, medium: Medium, lumping: Lumping = "lumped") ->
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What all matrices on a mesh have in common: their pattern, and the integrals of their hat functions.
+    """Assembles matrices on one mesh, which share their pattern and the integrals of their hat functions.
 
     Parameters
     ----------

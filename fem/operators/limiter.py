@@ -1,10 +1,10 @@
-"""No fluence below zero: what a node lacks is taken from its neighbours, and no power is lost.
+"""Limit a fluence to be nonnegative: what a node lacks is taken from its neighbours, and no power is lost.
 
 With lumped mass the matrix keeps the fluence from going below zero where no angle between faces is obtuse (Brandts,
 Korotov & Křížek 2007); meshers return others too, where the fluence overshoots in the dark by up to some per cent of
-its maximum. Each node stands for the power that is absorbed in its part of the volume and leaves through its part of
-the boundary, which is what a row of the matrix sums to; moving power from node to node leaves the ledger as it is. Of
-all fluences that differ from the one given by this, the one returned is near it: nothing moves farther than needed.
+its maximum. The fluence at a node times the sum of its row of the matrix is the power that is absorbed in its part of
+the volume and leaves through its part of the boundary. Moving this power from node to node leaves the ledger as it is;
+it is moved to the nearest nodes that lack it.
 """
 
 import numpy as np
@@ -13,12 +13,12 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 
 # Sweeps from neighbour to neighbour; what is still missing after them is taken from all nodes in proportion.
 SWEEPS = 10
-# Quotients by less than this could overflow.
+# Divisors below this count as 0, since quotients could overflow.
 SMALLEST_DIVISOR = 1e-250
 
 
 def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
-    """Raise a fluence to zero where it is below, at the cost of the nodes around.
+    """Raise a fluence to zero where it is negative, and lower it at the nodes around.
 
     Parameters
     ----------
@@ -62,5 +62,5 @@ def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArr
 
 
 def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
-    """``a/b``, and 0 where b is next to nothing."""
+    """``a/b``, and 0 where b is below SMALLEST_DIVISOR."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > SMALLEST_DIVISOR)

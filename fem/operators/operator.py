@@ -1,4 +1,4 @@
-"""`Operator`: the equation of given coefficients on a mesh, prepared to be solved."""
+"""`Operator`: a model on a mesh, prepared to be solved."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class Operator:
-    """The equation on a mesh by its terms, and its solver.
+    """The terms of a model on a mesh, and the solver of its matrix.
 
     Attributes
     ----------

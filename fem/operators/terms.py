@@ -1,11 +1,12 @@
-"""`Terms`: a system matrix by its terms, real, on one pattern; whoever needs ``K + s M + B`` combines them.
+"""`Terms`: the real terms of a system matrix, all of one pattern, to be combined with a shift.
 
 Beyond steady light the equation is the same with ``sigma_a + s n/c`` in place of sigma_a, with n the refractive index,
 c the speed of light and ``s = i omega`` for light modulated at the angular frequency omega, so that its matrix is::
 
     K + A + B + (s n/c) M
 
-with K the stiffness, A the absorption, B the boundary term and M the mass matrix.
+with K the stiffness, A the absorption, B the boundary term and M the mass matrix. `mass` is M; `lumping` says how M, A
+and B are integrated.
 """
 
 from dataclasses import dataclass

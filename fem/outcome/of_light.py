@@ -1,4 +1,4 @@
-"""The solution of one light: its fluence, limited where it has to be, and its ledger."""
+"""The solution of one light: its fluence, limited to be nonnegative where that is asked for, and its ledger."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,7 +6,10 @@ from dataclasses import replace
 from tetlux.fem.known.subtraction import Subtraction
 from tetlux.fem.operators.limiter import limit_to_nonnegative
 from tetlux.fem.operators.loads import Load
-from tetlux.fem.outcome.solution import Power, Solution
+from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.solution import QuadraticLights, QuadraticSolution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -27,7 +30,7 @@ def solution_of_light(
     surface : Surface
         What the mesh stands for.
     limit : bool
-        Whether the fluence is kept from going below zero where the diffusion equation itself keeps it from that.
+        Whether the fluence is limited to be nonnegative where that of the equation itself is.
 
     Returns
     -------
@@ -61,3 +64,33 @@ def solution_of_light(
     )
     exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(each.terms.exited for each in subtractions)
     return replace(solution, power=replace(ledger, exited=exited))
+
+
+def attach_quadratic(
+    of_lights: Sequence[Solution], loads: Sequence[Load], operator: QuadraticOperator
+) -> tuple[list[Solution], QuadraticSolution]:
+    """Give the solution of each light its quadratic elements, by which detectors are read.
+
+    Parameters
+    ----------
+    of_lights : sequence of Solution
+    loads : sequence of Load
+        Of the same lights.
+    operator : QuadraticOperator
+
+    Returns
+    -------
+    of_lights : list of Solution
+    quadratic : QuadraticSolution
+        Of all lights together.
+    """
+    lights = QuadraticLights(
+        operator,
+        tuple(load.deposit for load in loads),
+        tuple(solution.patches for solution in of_lights),
+        tuple(solution.fluence for solution in of_lights),
+    )
+    attached = [
+        replace(solution, quadratic=QuadraticSolution(lights, (light,))) for light, solution in enumerate(of_lights)
+    ]
+    return attached, QuadraticSolution(lights, tuple(range(len(loads))))

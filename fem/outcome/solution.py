@@ -11,6 +11,7 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.sight import Sight
@@ -22,37 +23,6 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
-
-
-@dataclass(frozen=True)
-class Power:
-    """The ledger of a run: ``incident = specular + absorbed + exited + ballistic``, all in W.
-
-    Attributes
-    ----------
-    incident : float
-        Power that meets the body, or that sources inside it emit.
-    specular : float
-        Reflected at the surface at once.
-    absorbed : float
-        Turned to heat inside.
-    exited : float
-        Left through the surface after having been scattered: the integral of the exitance.
-    ballistic : float
-        Passed through without having been scattered.
-    """
-
-    incident: float
-    specular: float
-    absorbed: float
-    exited: float
-    ballistic: float
-
-    @property
-    def balance_error(self) -> float:
-        """What the ledger lacks, as a share of the incident power."""
-        out = self.specular + self.absorbed + self.exited + self.ballistic
-        return (self.incident - out) / self.incident
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +169,13 @@ class Solution:
         fluence = linear + (known - guessed)
         if np.iscomplexobj(fluence):
             return np.asarray(fluence)
-        # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
+        # Where light fades within a tetrahedron, adding the difference may give a negative value; scaling by the ratio
+        # cannot.
         below = (fluence < 0) & (linear >= 0)
         shares = below & (known >= 0) & (guessed > 0)
         fluence[shares] = linear[shares] * known[shares] / guessed[shares]
         if any(isinstance(patch, FittedPatch) for patch in self.patches):
-            # They may be below zero where they are off by more than there is light.
+            # Fitted charges may be negative where their error exceeds the fluence.
             rest = below & ~shares
             fluence[rest] = linear[rest]
         return np.asarray(fluence)

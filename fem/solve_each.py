@@ -1,0 +1,170 @@
+"""`solve_each`: solve for several scenes of one body on one mesh."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
+from tetlux.fem.error.tolerance import check_tolerance
+from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
+from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.labels import GivenMedia
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.media.region import Region
+from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
+from tetlux.fem.notes import notes_on, notes_on_readings
+from tetlux.fem.operators.assembly import Lumping
+from tetlux.fem.outcome.detectors import Detector, read_all, view_of
+from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.scenes import build_scenes
+from tetlux.fem.sources.light import Light
+from tetlux.fem.stopwatch import Stopwatch
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.mesh import TetMesh
+
+Report = Callable[[str], None]
+
+
+def no_report(_: str) -> None:
+    """Print no progress."""
+
+
+def solve_each(
+    body: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    scenes: Sequence[Sequence[Light]],
+    *,
+    regions: Sequence[Region] = (),
+    tolerance: float | None = 0.02,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
+    mesh: TetMesh | None = None,
+    mass: Lumping = "lumped",
+    subtract: Subtract = "fitted",
+    limit: bool = True,
+    most_tetrahedra: int = MOST_TETRAHEDRA,
+    cache: bool = True,
+    report: Report = no_report,
+) -> list[Solution]:
+    """Solve for several scenes of one body on one mesh that is fine enough for each of them.
+
+    Parameters
+    ----------
+    body : Surface or TetMesh
+        The body of all scenes; all lengths are in its unit.
+    medium : Medium, VaryingMedium, mapping of label to these, or sequence of these
+        One for all scenes, or a sequence with one for each scene. Coefficients in 1/unit.
+    scenes : sequence of sequences of Light
+        The lights of each scene, which add up.
+    regions : sequence of Region
+        Closed surfaces within the body; a region has one medium for all scenes, or one for each.
+    tolerance : float, optional
+        Wanted relative L2 error of each scene's exitance over the surface; None to refine for detectors alone.
+    detectors : sequence of detectors
+        What is to be read in each scene.
+    detector_tolerance : float, optional
+        Wanted relative error of what each detector reads.
+    mesh : TetMesh, optional
+        A mesh of the body, which is used as it is.
+    mass : {"lumped", "consistent"}
+        Quadrature of the terms without derivatives.
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        What is subtracted from the fluence of point sources, see `tetlux.fem.solve`.
+    limit : bool
+        Whether the fluence is limited to be nonnegative.
+    most_tetrahedra : int
+        Refinement stops at this many even if the tolerance is not met; solutions then carry a warning.
+    cache : bool
+        Whether the mesher's mesh is looked up and kept in the user's cache directory.
+    report : callable
+        Called with a line of text as each stage ends.
+
+    Returns
+    -------
+    list of Solution
+        One for each scene, all on the same mesh; the seconds of each are those of all scenes together.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of range, a light does not meet the body, or media, regions and mesh do not fit each
+        other.
+    RunError
+        If the mesher or the linear solver fails, or the mesh takes more memory than is available.
+
+    Notes
+    -----
+    Method and estimate are those of `solve`. Scenes of equal media share one system matrix.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointSource, solve_each
+    >>> from tetlux.meshing import sphere
+    >>> tissue = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> scenes = [[PointSource((0, 0, z))] for z in (5.0, 8.0)]
+    >>> deep, shallow = solve_each(sphere(10.0), tissue, scenes, tolerance=0.05)
+    >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
+    (True, True)
+    """
+    _check_tolerances(tolerance, detectors, detector_tolerance)
+    check_scenes(scenes)
+    if isinstance(body, TetMesh):
+        if mesh is not None:
+            raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
+        mesh = body
+    watch = Stopwatch()
+    with watch.stage("surface"):
+        checked = build_scenes(body, mesh, medium, regions, len(scenes))
+        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        if isinstance(body, TetMesh):
+            subtract = without_fit(subtract)
+        sources = [
+            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
+            for lights, each in zip(scenes, checked.bodies, strict=True)
+        ]
+        dark = Dark(checked.surface, checked.bodies[0].outer)
+        tolerances = Tolerances(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
+    problem = Problem(checked, sources, mass, limit, watch)
+    given, reading = mesh is not None, len(detectors) > 0
+    limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
+    if mesh is None:
+        mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
+    check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
+    steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
+    keep_with(steps[0].solution.mesh, kept)
+    where = "on the mesh given" if given else _in_words(limit_of_mesh)
+    solutions = []
+    for number, step in enumerate(steps):
+        with watch.stage("solve"):
+            readings = read_all(detectors, step.solution)
+        notes = notes_on(step.solution, sources[number], tolerance, where)
+        notes += notes_on_readings(readings, detector_tolerance, where)
+        notes += checked.warnings(number, step.solution, given=given)
+        solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
+    seconds = watch.read()
+    return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def _in_words(limit: MeshLimit) -> str:
+    """A clause that says where refinement stopped."""
+    if limit.memory is None:
+        return f"at the limit of {limit.tetrahedra:,} tetrahedra"
+    return f"at the {limit.tetrahedra:,} tetrahedra that {gigabytes(limit.memory)} GB of memory suffice for"
+
+
+def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
+    """Refuse tolerances that are not sensible or do not go with the detectors.
+
+    Raises
+    ------
+    InputError
+    """
+    if tolerance is not None:
+        check_tolerance(tolerance)
+    if detector_tolerance is not None:
+        check_tolerance(detector_tolerance, "detector_tolerance")
+        if len(detectors) == 0:
+            raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
+    elif tolerance is None:
+        raise InputError("there is no tolerance; give tolerance, or detectors and a detector_tolerance.")
