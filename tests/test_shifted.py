@@ -8,8 +8,9 @@ from scipy.sparse import block_array, csr_array
 from scipy.sparse.linalg import spsolve
 
 from tests.conftest import TISSUE, block, needs
-from tetlux.fem import Power, Solution
+from tetlux.fem import Body, Medium, PointSource, Power, Solution, System
 from tetlux.fem.exact import sphere as exact
+from tetlux.fem.known.split import sources_of
 from tetlux.fem.linear.direct import direct
 from tetlux.fem.linear.krylov import Method, Product, jacobi
 from tetlux.fem.linear.multigrid import Multigrid, multigrid
@@ -22,7 +23,8 @@ from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.operators.operator import operator_of, solve_columns
 from tetlux.fem.operators.terms import Lumping, Terms
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing import RunError, Surface, TetMesh, refine
+from tetlux.fem.stopwatch import Stopwatch
+from tetlux.meshing import InputError, RunError, Surface, TetMesh, refine
 
 COEFFICIENTS = coefficients_of(TISSUE)
 ROBIN = PartialCurrent(TISSUE).robin
@@ -212,3 +214,30 @@ def test_operators_of_near_frequencies_share_a_hierarchy() -> None:
         matrix = terms_on(mesh).combine(model.shift)
         assert np.linalg.norm(own - matrix @ fluence) < 2e-11 * np.linalg.norm(own)
     assert [model.nonnegative for model in models] == [True, False, False]
+
+
+def test_a_system_takes_a_model_of_its_own() -> None:
+    """A real shift is absorption, with the same D."""
+    mesh, light, shift = block((8, 8, 8), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))], 0.05
+    system = System(mesh, TISSUE, model_of=lambda coefficients: Diffusion(coefficients, shift))
+    found = system.solve(light, subtract="nothing")
+    darker = Medium(
+        sigma_a=TISSUE.sigma_a + shift, sigma_s_prime=TISSUE.sigma_t_prime - TISSUE.sigma_a - shift, eta=1.4
+    )
+    expected = System(mesh, darker).solve(light, subtract="nothing")
+    assert found.fluence == pytest.approx(expected.fluence, rel=1e-8)
+    # What the shift absorbs is in no ledger.
+    shifted = shift * float(mesh.node_volumes @ found.fluence)
+    assert found.power.absorbed + shifted == pytest.approx(expected.power.absorbed, rel=1e-8)
+
+
+def test_what_knows_steady_diffusion_only_is_refused_or_left_out() -> None:
+    mesh, light = block((4, 4, 4), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))]
+    system = System(mesh, TISSUE, model_of=lambda coefficients: Diffusion(coefficients, 0.05))
+    with pytest.raises(InputError, match='charges are subtracted; give subtract="nothing"'):
+        system.solve(light)
+    with pytest.raises(InputError, match=r"errors are estimated; call System\.solve"):
+        system.step(sources_of(light, Body(mesh.surface, (TISSUE,)), "nothing"), Stopwatch())
+    assert system.layer_operator is system.plain
+    with pytest.raises(InputError, match="has no errors of single points"):
+        system.solve(light, subtract="nothing").fluence_with_error(np.zeros((1, 3)))

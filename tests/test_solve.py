@@ -4,6 +4,7 @@ import math
 import re
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -326,9 +327,3 @@ def test_charges_refuse_what_is_for_finite_elements(ball: Surface, options: dict
     expected = f'model "charges" does not take {names}; leave out what it does not take, or give model="full".'
     with pytest.raises(InputError, match=f"^{expected}$"):
         solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], model="charges", **options)
-
-
-def test_a_system_takes_a_model_of_its_own() -> None:
-    """Light that is absorbed more strongly by a shift is that of a medium with more absorption."""
-    mesh, light, more = block((8, 8, 8), (10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, -4.0))], 0.05
-    shifted = Operators(mesh, TISSUE, lambda coefficients: Diffusion(coefficients, shift=more))
