@@ -75,10 +75,11 @@ def test_a_mesh_that_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.MonkeyPatch) -> None:
     light = [PointSource((0.0, 0.0, 9.0))]
-    free = solve(ball, TISSUE, light, tolerance=0.003)
+    # Fitted charges would need no refinement.
+    free = solve(ball, TISSUE, light, tolerance=0.003, subtract="half-space")
     assert not any("memory" in warning for warning in free.warnings)
     monkeypatch.setattr(memory, "available", lambda: memory.estimate_memory(9_000, refined=True))
-    tight = solve(ball, TISSUE, light, tolerance=0.003)
+    tight = solve(ball, TISSUE, light, tolerance=0.003, subtract="half-space")
     assert len(tight.mesh.tetrahedra) < 9_000 < len(free.mesh.tetrahedra)
     (warning,) = [warning for warning in tight.warnings if "memory" in warning]
     assert warning == (
@@ -153,8 +154,8 @@ def test_a_process_that_may_not_have_more() -> None:
     refused, stopped = done.stdout.splitlines()
     # The check of the given mesh has left its tables of faces, which the solution would use too.
     assert re.match(r"384,000 tetrahedra need about 0\.472 GB of memory, and 0\.[23]\d* GB", refused)
-    assert "tetrahedra that 0.3" in stopped
-    assert "GB of memory suffice for" in stopped
+    # What the given mesh took may be free again.
+    assert re.search(r"tetrahedra that 0\.[34]\d* GB of memory suffice for", stopped)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.meshing.arrays import FloatArray, NumberArray
+from tetlux.meshing.arrays import FloatArray, NumberArray, divide_or_zero
 from tetlux.meshing.host.blocks import THREADS, map_in_threads
 
 # Relative residual at which the iteration stops.
@@ -141,14 +141,15 @@ def conjugate_gradients(product: Product, precondition: Preconditioner, loads: N
     while iterations < ITERATIONS:
         iterations += 1
         image = product(direction)
-        length = _ratio(product_of_residuals, dots(direction, image))
+        # A dot product is 0 in a column that is solved, or where COCG breaks down.
+        length = divide_or_zero(product_of_residuals, dots(direction, image))
         solution += length * direction
         residuals -= length * image
         if norms(residuals).max(initial=0.0) <= 0.5 * STOP_RESIDUAL:
             break
         corrections = apply_to_parts(precondition, residuals)
         before, product_of_residuals = product_of_residuals, dots(residuals, corrections)
-        direction *= _ratio(product_of_residuals, before)
+        direction *= divide_or_zero(product_of_residuals, before)
         direction += corrections
     return solution, iterations
 
@@ -163,8 +164,3 @@ def norms(columns: NumberArray) -> FloatArray:
     """Euclidean norms (k,) of the columns of an (n, k) array."""
     squares = dots(columns, columns) if not np.iscomplexobj(columns) else dots(columns, columns.conj()).real
     return np.asarray(np.sqrt(squares))
-
-
-def _ratio(a: NumberArray, b: NumberArray) -> NumberArray:
-    """``a/b``, and 0 where b is 0: of a column that is solved, or where COCG breaks down."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b != 0)

@@ -9,7 +9,7 @@ it is moved to the nearest nodes that lack it.
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, divide_or_zero
 
 # Sweeps from neighbour to neighbour; what is still missing after them is taken from all nodes in proportion.
 SWEEPS = 10
@@ -43,6 +43,9 @@ def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArr
     deficit, available = np.maximum(-power, 0.0), np.maximum(power, 0.0)
     limited_power = float(deficit.sum())
 
+    def ratio(a: FloatArray, b: FloatArray) -> FloatArray:
+        return divide_or_zero(a, b, SMALLEST_DIVISOR)
+
     def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(nodes, values, minlength=len(power)), dtype=np.float64)
 
@@ -52,15 +55,10 @@ def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArr
             break
         takers, givers = np.concatenate([pairs, pairs[:, ::-1]]).T
         # Each taker asks its neighbours in proportion to what they have; a giver gives no more than it has.
-        asked = _ratio(deficit, at_nodes(takers, available[givers]))[takers] * available[givers]
-        given = asked * np.minimum(_ratio(available, at_nodes(givers, asked)), 1.0)[givers]
+        asked = ratio(deficit, at_nodes(takers, available[givers]))[takers] * available[givers]
+        given = asked * np.minimum(ratio(available, at_nodes(givers, asked)), 1.0)[givers]
         deficit = np.maximum(deficit - at_nodes(takers, given), 0.0)
         available = np.maximum(available - at_nodes(givers, given), 0.0)
     # The total is kept to rounding.
-    available *= _ratio(np.array(total), available.sum())
-    return np.where(weights > 0, _ratio(available, weights), np.maximum(fluence, 0.0)), limited_power
-
-
-def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
-    """``a/b``, and 0 where b is below SMALLEST_DIVISOR."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > SMALLEST_DIVISOR)
+    available *= ratio(np.array(total), available.sum())
+    return np.where(weights > 0, ratio(available, weights), np.maximum(fluence, 0.0)), limited_power
