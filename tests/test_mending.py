@@ -10,6 +10,7 @@ from tests.fuzz.surfaces import bulging, cube_of_quads
 from tetlux.cases.cli import main
 from tetlux.meshing import InputError, Surface, box, cylinder, sphere, surface_from_arrays, tetrahedralize
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.repair.caps import cap, triangulate_polygon
 from tetlux.meshing.repair.specks import SPECK
 from tetlux.meshing.repair.topology import Edges
@@ -191,6 +192,16 @@ def test_a_second_side_in_pieces_is_a_side(apart: float, turned: int) -> None:
     assert surface.volume == pytest.approx(surface_from_arrays(points, first).volume, rel=0.01)
     assert len(surface.faces) == len(first)
     assert surface.warnings == ()
+
+
+def test_what_is_left_between_two_sides_is_refused() -> None:
+    """Two slivers that share an edge: no surface that encloses a body."""
+    corners = np.array([[0.0, 0, 0], [10, 0, 0.01], [10, 10, 0], [0, 10, 0.01]])
+    sliver = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
+    surface = surface_from_arrays(*together((corners, sliver), (corners + [10.0, 0.0, 0.0], sliver)))
+    assert surface.overlaps
+    with pytest.raises(InputError, match="touches itself: its two sides nearly cancel each other; .* export one side"):
+        check_thickness(surface)
 
 
 def test_an_open_body_whose_sides_differ_is_capped_as_one() -> None:

@@ -94,7 +94,7 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
     The residual of fitted charges is integrated anew over the bent facets: at the points that linear elements have it,
     a reading a thousandth as bright as the brightest was 4 % off.
     """
-    return quadratic_patch(operator, patch.extend() if isinstance(patch, FittedPatch) else _widened(patch, fluence))
+    return quadratic_patch(operator, patch if isinstance(patch, FittedPatch) else _widened(patch, fluence))
 
 
 def _widened(patch: Patch, fluence: FloatArray) -> Patch:

@@ -179,12 +179,18 @@ def check_thickness(surface: Surface) -> None:
     InputError
     """
     thickness = 2.0 * surface.volume / surface.area
-    if not surface.overlaps and thickness < THINNEST * surface.diagonal:
+    if thickness >= THINNEST * surface.diagonal:
+        return
+    share = f"{surface.name} is {thickness:.3g} {surface.unit} thick on average, {thickness / surface.diagonal:.1g} of its"
+    if surface.overlaps:
         raise InputError(
-            f"{surface.name} is {thickness:.3g} {surface.unit} thick on average, {thickness / surface.diagonal:.1g} of "
-            f"its size, and below {THINNEST:g} tetrahedra that fit into it are too many; make it thicker, or take a "
-            "smaller piece of it."
+            f"{share} size, and crosses or touches itself: its two sides nearly cancel each other; if it is a two-sided "
+            "export, export one side."
         )
+    raise InputError(
+        f"{share} size, and below {THINNEST:g} tetrahedra that fit into it are too many; make it thicker, or take a "
+        "smaller piece of it."
+    )
 
 
 def _mesh_body(
