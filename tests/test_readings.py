@@ -229,7 +229,7 @@ def test_a_mesh_that_is_too_large_is_read_by_linear_elements(far: Solution, monk
             {"detectors": [PointDetector((0, 0, 10))], "detector_tolerance": 2.0},
             "detector_tolerance is 2; give a relative error between",
         ),
-        ({"detectors": PointDetector((0, 0, 10))}, r"are given in a list, but PointDetector\(.*\) is none; write \[det"),
+        ({"detectors": PointDetector((0, 0, 10))}, r"are given in a list, but PointDetector\(.*\) is none; write"),
         ({"detectors": ["top"]}, "'top' is no detector; give PointDetector, DiscDetector or FibreDetector"),
         ({"detectors": [PointDetector((0, 0, 50))]}, r"position \(0, 0, 50\) is 40 mm from the surface"),
     ],
