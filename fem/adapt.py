@@ -12,7 +12,7 @@ from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, g
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Mass
-from tetlux.fem.outcome.detectors import View, estimate_reading
+from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
 from tetlux.fem.quadratic.error import ReadingError
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
@@ -42,13 +42,13 @@ class Aims:
         Wanted relative L2 error of the exitance.
     readings : float, optional
         Wanted relative error of what each detector reads.
-    views : tuple of View
+    views : tuple of PlacedDetector
         The detectors.
     """
 
     exitance: float | None
     readings: float | None = None
-    views: tuple[View, ...] = ()
+    views: tuple[PlacedDetector, ...] = ()
 
     def assess(self, steps: Sequence[Step]) -> "Assessment":
         """Say how far steps on one mesh are from the aims."""
@@ -70,8 +70,8 @@ class Aims:
         quadratic = step.solution.quadratic
         assert quadratic is not None
         # All duals at once.
-        quadratic.operator.duals([view.sight for view in self.views])
-        return [estimate_reading(step.solution, view.sight) for view in self.views]
+        quadratic.operator.duals([view.measurement for view in self.views])
+        return [estimate_reading(step.solution, view.measurement) for view in self.views]
 
 
 @dataclass(frozen=True, eq=False)

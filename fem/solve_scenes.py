@@ -14,7 +14,7 @@ from tetlux.fem.memory import affordable_tetrahedra, check_memory
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Mass
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA as MOST_TO_READ
-from tetlux.fem.outcome.detectors import Detector, read_all, view_of
+from tetlux.fem.outcome.detectors import Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
@@ -119,7 +119,7 @@ def solve_each(
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        aims = Aims(tolerance, detector_tolerance, tuple(view_of(detector, dark) for detector in detectors))
+        aims = Aims(tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors))
     if detector_tolerance is not None:
         most_tetrahedra = min(most_tetrahedra, MOST_TO_READ)
     problem = Problem(checked, sources, mass, limit, watch)

@@ -26,7 +26,7 @@ from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
 from tetlux.fem.outcome.of_light import solution_of_light
 from tetlux.fem.outcome.solution import Solution, sum_solutions
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.solution import QuadraticLights, QuadraticSolution
+from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -200,7 +200,7 @@ class System:
             fluence = fluences[:, owners == light].sum(axis=1)
             own = [each for each in [*subtractions, *fitted] if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
-        quadratic = QuadraticLights(
+        quadratic = QuadraticScene(
             self.quadratic,
             tuple(load.deposit for load in loads),
             tuple(solution.patches for solution in of_lights),

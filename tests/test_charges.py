@@ -21,11 +21,11 @@ from tetlux.fem import (
     read,
     solve,
 )
-from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_charges
-from tetlux.fem.charges.check import norm, quality_of
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_charges
+from tetlux.fem.charges.check import estimate_errors, norm
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import Equation, equation_of
-from tetlux.fem.charges.places import FINER, above
+from tetlux.fem.charges.places import EQUATION_REFINEMENT, place_above_surface
 from tetlux.fem.charges.samples import Samples
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
@@ -43,13 +43,13 @@ def ball() -> Surface:
     return sphere(RADIUS)
 
 
-def of_points(points: FloatArray, powers: FloatArray | None = None) -> Drive:
+def of_points(points: FloatArray, powers: FloatArray | None = None) -> LightSources:
     count = len(points)
     given = np.ones((count, 1)) if powers is None else powers
-    return Drive(points, given, np.zeros(given.shape[1]))
+    return LightSources(points, given, np.zeros(given.shape[1]))
 
 
-def below_pole(depth: float = DEPTH) -> Drive:
+def below_pole(depth: float = DEPTH) -> LightSources:
     return of_points(np.array([[0.0, 0.0, RADIUS - depth]]))
 
 
@@ -84,8 +84,8 @@ def test_the_bound_holds_and_the_estimate_is_near_the_error(
     for most in (50, 100, 200):
         fitted = fit_charges(ball, equation_of(medium), below_pole(depth), tolerance=0.0, most=most)
         error = error_of(fitted, medium, depth)
-        assert error <= fitted.quality.bound
-        assert 0.5 * error <= fitted.quality.estimate <= 4.0 * error
+        assert error <= fitted.errors.bound
+        assert 0.5 * error <= fitted.errors.estimate <= 4.0 * error
 
 
 def test_charges_lie_outside_and_clear_of_the_body(fitted: FittedCharges, ball: Surface) -> None:
@@ -108,7 +108,7 @@ def test_there_is_no_charge_in_a_gap_far_narrower_than_the_spacing() -> None:
     pair = Surface(np.vstack([one.points, other.points]), np.vstack([one.faces, other.faces + len(one.points)]))
     points, normals = np.array([[0.5, 0.2, 5.0], [5.0, 0.3, 0.4]]), np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     feet = Samples(points, normals, np.ones(2), np.ones(2))
-    places, clear = above(pair, feet, np.ones(2), 2.0)
+    places, clear = place_above_surface(pair, feet, np.ones(2), 2.0)
     assert clear.tolist() == [False, True]
     assert places[1] == pytest.approx([7.0, 0.3, 0.4])
 
@@ -117,22 +117,24 @@ def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
     """The bound of another field at the same points."""
     samples = fitted.places.checked
     exitance, residual = field.exitance_and_residual(samples.points, samples.normals)
-    return quality_of(field.equation, samples, FINER * samples.spacing, exitance[:, 0], residual[:, 0]).bound
+    return estimate_errors(
+        field.equation, samples, EQUATION_REFINEMENT * samples.spacing, exitance[:, 0], residual[:, 0]
+    ).bound
 
 
 def test_the_residual_tells_a_flipped_sign(fitted: FittedCharges) -> None:
     field = fitted.field
-    assert spoilt(fitted, field) == pytest.approx(fitted.quality.bound)
+    assert spoilt(fitted, field) == pytest.approx(fitted.errors.bound)
     strengths = field.strengths.copy()
     strengths[len(strengths) // 2] *= -1.0
-    assert spoilt(fitted, replace(field, strengths=strengths)) > 3.0 * fitted.quality.bound
+    assert spoilt(fitted, replace(field, strengths=strengths)) > 3.0 * fitted.errors.bound
 
 
 @pytest.mark.parametrize("name", ["wave_number", "diffusion", "boundary_factor"])
 def test_the_residual_tells_another_equation(fitted: FittedCharges, name: str) -> None:
     equation = fitted.field.equation
     other = replace(equation, **{name: 1.05 * getattr(equation, name)})
-    assert spoilt(fitted, replace(fitted.field, equation=other)) > 10.0 * fitted.quality.bound
+    assert spoilt(fitted, replace(fitted.field, equation=other)) > 10.0 * fitted.errors.bound
 
 
 @pytest.mark.parametrize("name", ["wave_number", "diffusion", "boundary_factor"])
@@ -163,7 +165,7 @@ def test_a_reading_is_smooth_in_the_coefficients_at_kept_places(fitted: FittedCh
     readings = []
     for each in change:
         medium = replace(TISSUE, sigma_a=TISSUE.sigma_a * (1.0 + each))
-        readings.append(fit_at(fitted.places, equation_of(medium), below_pole()).field.exitance(points)[:, 0])
+        readings.append(fit_at_places(fitted.places, equation_of(medium), below_pole()).field.exitance(points)[:, 0])
     curves = np.array(readings)
     off = curves - np.array([np.polyval(np.polyfit(change, curve, 5), change) for curve in curves.T]).T
     assert np.abs(off / curves).max() < 1e-6
@@ -175,7 +177,7 @@ def test_ten_sources_are_the_sum_of_ten() -> None:
     points = rng.uniform(-0.5, 0.5, (10, 3)) * np.array([18.0, 13.0, 8.0])
     together = fit_charges(body, equation_of(TISSUE), of_points(points), tolerance=0.002, most=900)
     samples = together.places.checked
-    each = fit_at(together.places, equation_of(TISSUE), of_points(points, np.eye(10)))
+    each = fit_at_places(together.places, equation_of(TISSUE), of_points(points, np.eye(10)))
     exitance = each.field.exitance(samples.points)
     assert exitance.sum(axis=1) == pytest.approx(together.field.exitance(samples.points)[:, 0], rel=1e-9)
     apart = np.zeros(len(samples.points))

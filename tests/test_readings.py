@@ -18,8 +18,8 @@ from tetlux.fem import DiffuseLight, Medium, PencilBeam, PointDetector, PointSou
 from tetlux.fem.exact import layered
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.coefficients import coefficients_of
+from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.sight import Sight
 from tetlux.meshing import InputError, TetMesh, box, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 
@@ -81,7 +81,8 @@ def test_a_solution_that_was_pickled_reads_the_same(far: Solution) -> None:
     detector = on_ball(np.array([8.0]))[0]
     received = pickle.loads(pickle.dumps(far))
     assert read(detector, received).exitance == pytest.approx(read(detector, far).exitance, rel=1e-9)
-    assert received.exitance_at([[0.0, 0.0, RADIUS]]) == far.exitance_at([[0.0, 0.0, RADIUS]])
+    top = np.array([[0.0, 0.0, RADIUS]])
+    assert received.exitance_at(top) == far.exitance_at(top)
 
 
 def test_lights_add_up_in_readings() -> None:
@@ -152,10 +153,10 @@ def test_quadratic_functions_are_integrated_exactly() -> None:
 def test_duals_read_what_solutions_show() -> None:
     """``d . u = z . f``, for loads that have nothing to do with each other."""
     operator = cubes(3)
-    sight = Sight(np.array([[5.0, 1.0, 0.5]]), np.ones(1))
-    load = operator.see(Sight(np.array([[-2.0, 1.0, 3.0]]), np.ones(1), inside=True)).load
-    u, z = operator.solve(load[:, None])[:, 0], operator.duals([sight])[0]
-    assert operator.see(sight).load @ u == pytest.approx(load @ z, rel=1e-5)
+    measurement = Measurement(np.array([[5.0, 1.0, 0.5]]), np.ones(1))
+    load = operator.discretise(Measurement(np.array([[-2.0, 1.0, 3.0]]), np.ones(1), inside=True)).load
+    u, z = operator.solve(load[:, None])[:, 0], operator.duals([measurement])[0]
+    assert operator.discretise(measurement).load @ u == pytest.approx(load @ z, rel=1e-5)
 
 
 def test_curved_edges_hold_volume_and_area_of_a_ball() -> None:
@@ -229,7 +230,10 @@ def test_a_mesh_that_is_too_large_is_read_by_linear_elements(far: Solution, monk
             {"detectors": [PointDetector((0, 0, 10))], "detector_tolerance": 2.0},
             "detector_tolerance is 2; give a relative error between",
         ),
-        ({"detectors": PointDetector((0, 0, 10))}, r"are given in a list, but PointDetector\(.*\) is none; write"),
+        (
+            {"detectors": PointDetector((0, 0, 10))},
+            r"are given in a list, but PointDetector\(.*\) is none; write \[det",
+        ),
         ({"detectors": ["top"]}, "'top' is no detector; give PointDetector, DiscDetector or FibreDetector"),
         ({"detectors": [PointDetector((0, 0, 50))]}, r"position \(0, 0, 50\) is 40 mm from the surface"),
     ],

@@ -19,7 +19,7 @@ from tetlux.cases.picture.view import toward_camera
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.meshless.solve import check_deposit, check_simple, even_medium
+from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -174,7 +174,7 @@ def _check_for_charges(document: Document, body: CaseBody) -> None:
             check_simple(surface)
         with document.at((*key, "medium")):
             for body_in_channel in body.bodies:
-                even_medium(body_in_channel.by_label[number])
+                homogeneous_medium(body_in_channel.by_label[number])
 
 
 def _check_value_names(document: Document, channels: tuple[str, ...], lights: tuple[str, ...]) -> None:

@@ -1,21 +1,22 @@
 """Light without a mesh: screened charges outside a body, fitted to its boundary.
 
-A charge ``q e^{-k r}/(4 pi D r)`` obeys the diffusion equation everywhere but where it is. So the light's own sources
-inside the body and any charges outside it obey the equation inside exactly, and only the boundary condition
-``D dphi/dn + phi/(2A) = 0`` is left: strengths are found by least squares on what violates it at points of the surface.
-This is the method of fundamental solutions (Fairweather & Karageorghis 1998, Adv. Comput. Math. 9, 69-95); that its
-tables are nearly singular and why that does no harm, see Barnett & Betcke 2008, J. Comput. Phys. 227, 7003-7026.
+A charge ``q e^{-k r}/(4 pi D r)`` solves the diffusion equation everywhere but at its own position. A sum of the
+light's sources inside the body and of charges outside it therefore solves the equation inside exactly. The strengths of
+the charges outside are found by least squares on the residual of the boundary condition ``D dphi/dn + phi/(2A) = 0`` at
+points of the surface. This is the method of fundamental solutions (Fairweather & Karageorghis 1998, Adv. Comput. Math.
+9, 69-95). Its matrices are nearly singular; Barnett & Betcke 2008, J. Comput. Phys. 227, 7003-7026, show why this does
+not harm the sum.
 
-    kernel      the charge, and sums of many
-    samples     points spread over a surface at a spacing that varies
-    places      where charges and equations go
+    kernel      the fluence and flux of charges
+    samples     points on a surface at a variable spacing
+    places      positions of charges and of equations
     fit         strengths by least squares
-    check       a bound of the error, and an estimate
-    adapt       more charges, where the residual is large
+    check       a bound and an estimate of the error
+    adapt       more charges where the residual is large
     quadrature  integrals over the surface
-    several     several even regions, each with charges of its own
-    field       sources and charges together
+    regions     homogeneous regions, each with charges of its own
+    field       the sum of sources and charges
 
-`tetlux.fem.charges.check` says what the bound promises and what not. Surfaces are the smooth ones (`Surface.on_curve`):
-their true normals are what the method lives on.
+`tetlux.fem.charges.check` states the assumptions of the bound. The method needs the true normals of a surface, so that
+it works on the smooth surface (`Surface.on_curve`) and not on its triangles.
 """

@@ -1,4 +1,4 @@
-"""Charges fitted to a body and its light: as many as the tolerance needs, where the residual is large."""
+"""Charges fitted to a body and its light: as many as the tolerance needs, closest together at large residuals."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,39 +6,61 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.check import Quality, quality_of
+from tetlux.fem.charges.check import ErrorEstimates, estimate_errors
 from tetlux.fem.charges.field import ChargeField
-from tetlux.fem.charges.fit import Factors, factorise
-from tetlux.fem.charges.kernel import Equation, NumberArray
-from tetlux.fem.charges.places import FINER, HIGH, LOW, Places, distance_from, places_for
+from tetlux.fem.charges.fit import LeastSquaresFactors, factorise
+from tetlux.fem.charges.kernel import Equation
+from tetlux.fem.charges.places import (
+    EQUATION_REFINEMENT,
+    HEIGHT_ROUGH,
+    HEIGHT_SMOOTH,
+    Places,
+    distance_from,
+    places_for,
+)
 from tetlux.fem.charges.samples import Samples, Spacing
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 
-# The first fit, and how many times more charges the next one has. Estimate in % by 300 charges after 100, and after 100
-# and 170, which takes .08 s longer: hare .47 / .42, its ear 1.6 / .94, spot 1.8 / 1.5.
-FIRST, GROWTH = 100, 1.73
-# Where it ends: as many are fitted in some 5 s.
-MOST = 1600
-# Charges are higher where an earlier fit was this good, which shows that the body is smooth. Estimate in % by 300
-# charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037 / .050, hare .43 /
-# .46, rocker-arm .63 / .93.
-SMOOTH = 0.003
-# The spacing shrinks as this power of the residual, averaged over so many points, as far as that is this factor from
-# its mean or more, which is noise otherwise. Error in % by 300 charges on ball, torus, hare, spot for several of these:
-# power 0: .004, .16, .81, 2.6; .4 from 1 on: .017, .037, .46, 1.6; .5 from 2 on: .005, .043, .50, 1.8.
-POWER, ALIKE, NOISE = 0.5, 12, 2.0
-# New points take the mean of so many old ones.
-AROUND = 6
-# Beside finite elements: charges are enough when the estimate of theirs alone is this share of the tolerance, or at so
-# many, which take .2 s. The next fit has as many as it takes if the estimate falls with this power of their number, but
-# no less and no more than these factors. If they leave more than the last number, they are no help.
-ENOUGH, MOST_BESIDE, RATE, LEAST_GROWTH, MOST_GROWTH, HOPELESS = 0.6, 600, 2.0, 1.4, 2.2, 0.2
+# Number of charges of the first fit.
+FEWEST_CHARGES = 100
+# Charges of a fit, over those of the fit before. Estimate in % by 300 charges after a fit with 100, and after fits with
+# 100 and 170, which take .08 s longer: hare .47 / .42, its ear 1.6 / .94, spot 1.8 / 1.5.
+COUNT_FACTOR = 1.73
+# Number of charges of the last fit, which takes some 5 s.
+MOST_CHARGES = 1600
+# A fit with an estimated error below this shows that the body is smooth; the next fit has charges at `HEIGHT_SMOOTH`.
+# Estimate in % by 300 charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037
+# / .050, hare .43 / .46, rocker-arm .63 / .93.
+SMOOTH_ESTIMATE = 0.003
+# The spacing is multiplied by the local residual to minus this power. Error in % by 300 charges on ball, torus, hare,
+# spot for a power and a NOISE_FACTOR: 0: .004, .16, .81, 2.6; .4 and 1: .017, .037, .46, 1.6; .5 and 2: .005, .043,
+# .50, 1.8.
+REFINEMENT_EXPONENT = 0.5
+# Residuals within this factor of their geometric mean do not change the spacing.
+NOISE_FACTOR = 2.0
+# Number of nearest points over which the residual and the spacing are averaged.
+AVERAGED_NEIGHBOURS = 12
+# Number of nearest old points from which the spacing at a new point is interpolated.
+INTERPOLATED_NEIGHBOURS = 6
+# Where finite elements solve for the remainder, fitting ends when the estimated error of the charges alone is this
+# share of the tolerance.
+FIT_TOLERANCE_SHARE = 0.6
+# Where finite elements solve for the remainder, fitting ends at this number of charges, which takes .2 s.
+MOST_CHARGES_WITH_FEM = 600
+# The estimate is assumed to fall with this power of the number of charges, which gives the number of the next fit.
+ASSUMED_RATE = 2.0
+# The number of charges grows by at least this factor from fit to fit.
+LEAST_GROWTH = 1.4
+# The number of charges grows by at most this factor from fit to fit.
+MOST_GROWTH = 2.2
+# A fit with a larger estimated error does not help finite elements, and is not used.
+LARGEST_USEFUL_ESTIMATE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
-    """What light there is, in one column for each of s lights.
+class LightSources:
+    """Point sources and boundary sources, in one column for each of s lights.
 
     Attributes
     ----------
@@ -46,13 +68,14 @@ class Drive:
         Sources inside the body.
     powers : (p, s) ndarray
         W.
-    inflow : (s,) ndarray
-        What the residual has to be on the whole surface, W/unit²: 0 but for diffuse light.
+    boundary_source : (s,) ndarray
+        Right-hand side of the boundary condition ``D dphi/dn + phi/(2A)`` on the whole surface, W/unit²: 0 except under
+        diffuse light.
     """
 
     points: FloatArray
     powers: NumberArray
-    inflow: NumberArray
+    boundary_source: NumberArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,123 +85,132 @@ class FittedCharges:
     Attributes
     ----------
     field : ChargeField
-        Of the sources, which come first, and of the fitted charges; a column of strengths for each light.
-    drive : Drive
+        The sources, then the fitted charges; a column of strengths for each light.
+    lights : LightSources
     places : Places
-    factors : Factors
-        Of the weighted equations; for other lights at the same places.
-    quality : Quality
+    factors : LeastSquaresFactors
+        Of the matrix of the weighted equations; they serve other lights with the same charges.
+    errors : ErrorEstimates
         Of the sum of all lights.
     residual : (n,) ndarray
-        Of the sum of all lights at the points that were checked, W/unit².
+        Of the sum of all lights at the checked points, W/unit².
     """
 
     field: ChargeField
-    drive: Drive
+    lights: LightSources
     places: Places
-    factors: Factors
-    quality: Quality
+    factors: LeastSquaresFactors
+    errors: ErrorEstimates
     residual: NumberArray
 
 
 def fit_charges(
-    surface: Surface, equation: Equation, drive: Drive, *, tolerance: float, most: int = MOST
+    surface: Surface, equation: Equation, lights: LightSources, *, tolerance: float, most: int = MOST_CHARGES
 ) -> FittedCharges:
-    """Fit charges until the estimated error of the exitance is within the tolerance, or there are enough.
+    """Fit charges until the estimated error of the exitance is within the tolerance, or there are `most` charges.
 
     Parameters
     ----------
     surface : Surface
     equation : Equation
-    drive : Drive
+    lights : LightSources
     tolerance : float
         Relative L2 error of the exitance.
     most : int
-        Charges at which it ends in any case, about.
+        Approximate number of charges at which fitting ends in any case.
     """
     best = None
-    for fitted in levels(surface, equation, drive, most=most):
-        if best is None or fitted.quality.estimate < best.quality.estimate:
+    for fitted in fit_sequence(surface, equation, lights, most=most):
+        if best is None or fitted.errors.estimate < best.errors.estimate:
             best = fitted
-        if best.quality.estimate <= tolerance:
+        if best.errors.estimate <= tolerance:
             break
     assert best is not None
     return best
 
 
-def levels(surface: Surface, equation: Equation, drive: Drive, *, most: int = MOST) -> Iterator[FittedCharges]:
-    """Fit ever more charges, about `most` of them at last."""
-    spacing = distance = distance_from(surface, drive.points)
-    # Steps of equal factors, so that the last is a whole one.
-    steps = max(0, round(np.log(most / FIRST) / np.log(GROWTH)))
-    height = LOW
+def fit_sequence(
+    surface: Surface, equation: Equation, lights: LightSources, *, most: int = MOST_CHARGES
+) -> Iterator[FittedCharges]:
+    """Fit growing numbers of charges, the last of about `most`."""
+    spacing = distance = distance_from(surface, lights.points)
+    # All steps grow by one factor, chosen so that the last step ends at `most`.
+    steps = max(0, round(np.log(most / FEWEST_CHARGES) / np.log(COUNT_FACTOR)))
+    height = HEIGHT_ROUGH
     for step in range(steps + 1):
-        count = round(most * (FIRST / most) ** ((steps - step) / max(steps, 1)))
+        count = round(most * (FEWEST_CHARGES / most) ** ((steps - step) / max(steps, 1)))
         places = places_for(surface, spacing, distance, count, height)
-        fitted = fit_at(places, equation, drive)
+        fitted = fit_at_places(places, equation, lights)
         yield fitted
-        height = HIGH if fitted.quality.estimate <= SMOOTH else LOW
-        spacing = _finer(places.checked, np.abs(fitted.residual) * places.checked.spacing)
+        height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
+        spacing = _refine_spacing(places.checked, np.abs(fitted.residual) * places.checked.spacing)
 
 
-def fit_within(surface: Surface, equation: Equation, drive: Drive, *, tolerance: float) -> FittedCharges | None:
-    """Fit as many charges as pay where finite elements solve for what they leave.
+def fit_for_remainder(
+    surface: Surface, equation: Equation, lights: LightSources, *, tolerance: float
+) -> FittedCharges | None:
+    """Fit charges of which finite elements solve for the remainder.
 
     Parameters
     ----------
     surface : Surface
     equation : Equation
-    drive : Drive
+    lights : LightSources
     tolerance : float
-        Relative L2 error of the exitance, of both together.
+        Relative L2 error of the exitance, of charges and finite elements together.
 
     Returns
     -------
     FittedCharges or None
-        None if they leave so much that it would be better to start from something else.
+        None if the estimated error of the best fit is above `LARGEST_USEFUL_ESTIMATE`.
     """
-    spacing = distance = distance_from(surface, drive.points)
-    best, count, height = None, FIRST, LOW
+    spacing = distance = distance_from(surface, lights.points)
+    best, count, height = None, FEWEST_CHARGES, HEIGHT_ROUGH
     while True:
-        fitted = fit_at(places_for(surface, spacing, distance, count, height), equation, drive)
-        estimate = fitted.quality.estimate
-        if best is None or estimate < best.quality.estimate:
+        fitted = fit_at_places(places_for(surface, spacing, distance, count, height), equation, lights)
+        estimate = fitted.errors.estimate
+        if best is None or estimate < best.errors.estimate:
             best = fitted
-        short = best.quality.estimate / (ENOUGH * tolerance)
-        if short <= 1.0 or LEAST_GROWTH * count > MOST_BESIDE:
-            return best if best.quality.estimate <= HOPELESS else None
-        count = min(round(count * np.clip(short ** (1.0 / RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_BESIDE)
-        height = HIGH if estimate <= SMOOTH else LOW
-        spacing = _finer(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)
+        excess = best.errors.estimate / (FIT_TOLERANCE_SHARE * tolerance)
+        if excess <= 1.0 or LEAST_GROWTH * count > MOST_CHARGES_WITH_FEM:
+            return best if best.errors.estimate <= LARGEST_USEFUL_ESTIMATE else None
+        count = min(
+            round(count * np.clip(excess ** (1.0 / ASSUMED_RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_CHARGES_WITH_FEM
+        )
+        height = HEIGHT_SMOOTH if estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
+        spacing = _refine_spacing(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)
 
 
-def fit_at(places: Places, equation: Equation, drive: Drive) -> FittedCharges:
-    """Fit charges at given places."""
+def fit_at_places(places: Places, equation: Equation, lights: LightSources) -> FittedCharges:
+    """Fit the strengths of charges at given positions."""
     samples, checked = places.fitted, places.checked
     weights = places.weights[:, None]
     factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, places.charges))
-    missing = drive.inflow - equation.residual_of_each(samples.points, samples.normals, drive.points) @ drive.powers
-    strengths = factors.solve(weights * missing)
-    field = ChargeField(equation, np.vstack([drive.points, places.charges]), np.vstack([drive.powers, strengths]))
+    right = (
+        lights.boundary_source
+        - equation.residual_of_each(samples.points, samples.normals, lights.points) @ lights.powers
+    )
+    strengths = factors.solve(weights * right)
+    field = ChargeField(equation, np.vstack([lights.points, places.charges]), np.vstack([lights.powers, strengths]))
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
-    off = (residual - drive.inflow).sum(axis=1)
-    quality = quality_of(equation, checked, FINER * checked.spacing, exitance.sum(axis=1), off)
-    return FittedCharges(field, drive, places, factors, quality, off)
+    violation = (residual - lights.boundary_source).sum(axis=1)
+    errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)
+    return FittedCharges(field, lights, places, factors, errors, violation)
 
 
-def _finer(samples: Samples, felt: FloatArray) -> Spacing:
-    """Spacing, up to a factor, that is finer where what is felt of the residual (n,) is large."""
+def _refine_spacing(samples: Samples, effects: FloatArray) -> Spacing:
+    """Spacing, up to a factor, that is finer where the effects of the residual on the exitance (n,) are large."""
     tree = cKDTree(samples.points)
-    count = min(ALIKE, len(samples))
+    count = min(AVERAGED_NEIGHBOURS, len(samples))
     _, near = tree.query(samples.points, k=count)
-    local = np.sqrt(np.square(felt)[near].mean(axis=1))
-    off = np.log(np.maximum(local, np.finfo(float).tiny))
-    off -= off.mean()
-    off = np.sign(off) * np.maximum(np.abs(off) - np.log(NOISE), 0.0)
-    wanted = (np.log(samples.spacing) - POWER * off)[near].mean(axis=1)
+    local = np.sqrt(np.square(effects)[near].mean(axis=1))
+    deviation = np.log(np.maximum(local, np.finfo(float).tiny))
+    deviation -= deviation.mean()
+    deviation = np.sign(deviation) * np.maximum(np.abs(deviation) - np.log(NOISE_FACTOR), 0.0)
+    logarithm = (np.log(samples.spacing) - REFINEMENT_EXPONENT * deviation)[near].mean(axis=1)
 
     def spacing(points: FloatArray) -> FloatArray:
-        _, around = tree.query(points, k=min(AROUND, count))
-        return np.asarray(np.exp(wanted[around].mean(axis=1)))
+        _, around = tree.query(points, k=min(INTERPOLATED_NEIGHBOURS, count))
+        return np.asarray(np.exp(logarithm[around].mean(axis=1)))
 
     return spacing

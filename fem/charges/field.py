@@ -1,23 +1,26 @@
-"""A sum of screened charges: some inside the body, its sources; the others outside."""
+"""A sum of screened charges: the sources inside the body, and fitted charges outside."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.charges.kernel import Equation, NumberArray
-from tetlux.meshing.arrays import FloatArray
+from tetlux.fem.charges.kernel import Equation
+from tetlux.meshing.arrays import FloatArray, NumberArray
 
 
 @dataclass(frozen=True, eq=False)
 class ChargeField:
-    """The field of charges, which obeys the equation wherever there is no charge.
+    """The field of charges, which solves the equation wherever there is no charge.
+
+    Fits use this class: strengths may be complex and of many lights, and the residual needs normals of the surface. A
+    mesh uses `tetlux.fem.known.charges.Charges`: real strengths of one light, limited near the charges, with gradients.
 
     Attributes
     ----------
     equation : Equation
     positions : (c, 3) ndarray
     strengths : (c, ...) ndarray
-        W; where there are several columns, each is a field of its own.
+        W; a column for each light.
     """
 
     equation: Equation

@@ -1,29 +1,25 @@
-"""The screened charge: its fluence, its flux through a surface, and sums of many.
+"""Fluence and flux of screened charges.
 
-A charge of q watts at p gives ``phi = q e^{-k r}/(4 pi D r)``, ``r = |x - p|``, which obeys the diffusion equation
+A charge of q watts at p gives ``phi = q e^{-k r}/(4 pi D r)``, ``r = |x - p|``, which solves the diffusion equation
 everywhere but at p. The wave number k may be complex: light modulated in time has ``k² = (sigma_a + i omega/v)/D``.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.host.blocks import run_in_blocks
 
-# Pairs of a point and a charge worked on at once, so that they stay in the processor's cache.
-PAIRS = 50_000
-
-# Real in steady light, complex for modulated light.
-NumberArray = npt.NDArray[Any]
+# Pairs of a point and a charge that are evaluated at once; they fit into the processor's cache.
+PAIRS_PER_BLOCK = 50_000
 
 
 @dataclass(frozen=True)
 class Equation:
-    """``-div D grad phi + D k² phi = 0`` in one even medium, with ``D dphi/dn + phi/(2A) = 0`` on its surface.
+    """``-div D grad phi + D k² phi = 0`` in one homogeneous medium, with ``D dphi/dn + phi/(2A) = 0`` on its surface.
 
     Attributes
     ----------
@@ -41,23 +37,13 @@ class Equation:
 
     @property
     def robin(self) -> float:
-        """``1/(2A)``, which makes exitance of fluence."""
+        """``1/(2A)``, the ratio of exitance to fluence."""
         return 0.5 / self.boundary_factor
 
     @property
     def dtype(self) -> npt.DTypeLike:
-        """Of fluence."""
+        """Type of the fluence."""
         return np.complex128 if isinstance(self.wave_number, complex) else np.float64
-
-    def fluence_of_each(self, points: FloatArray, positions: FloatArray) -> NumberArray:
-        """Fluence at points (n, 3) of unit charges at positions (c, 3), (n, c), W/unit²."""
-        table = np.empty((len(points), len(positions)), dtype=self.dtype)
-
-        def work(rows: slice) -> None:
-            table[rows] = self._unit_fluence(_distances(points[rows], positions))
-
-        run_in_blocks(work, len(points), _rows(positions))
-        return table
 
     def traces_of_each(
         self, points: FloatArray, normals: FloatArray, positions: FloatArray
@@ -74,16 +60,16 @@ class Equation:
 
     def residual_of_each(self, points: FloatArray, normals: FloatArray, positions: FloatArray) -> NumberArray:
         """``D dphi/dn + phi/(2A)`` at points (n, 3) of a surface, of unit charges at (c, 3), (n, c), W/unit²."""
-        table = np.empty((len(points), len(positions)), dtype=self.dtype)
+        matrix = np.empty((len(points), len(positions)), dtype=self.dtype)
 
         def work(rows: slice) -> None:
             fluence, flux = self._unit_traces(points[rows], normals[rows], positions)
             fluence *= self.robin
             flux += fluence
-            table[rows] = flux
+            matrix[rows] = flux
 
         run_in_blocks(work, len(points), _rows(positions))
-        return table
+        return matrix
 
     def fluence(self, points: FloatArray, positions: FloatArray, strengths: NumberArray) -> NumberArray:
         """Fluence of charges of given strengths (c, ...), W, at points (n, 3), (n, ...), W/unit²."""
@@ -119,7 +105,7 @@ class Equation:
     ) -> tuple[NumberArray, NumberArray]:
         distance = _distances(points, positions)
         fluence = self._unit_fluence(distance)
-        # About a point near by, so that few digits are lost.
+        # Coordinates relative to a nearby point lose fewer digits.
         origin = points[0]
         height = np.einsum("ij,ij->i", points - origin, normals)[:, None] - normals @ (positions - origin).T
         np.reciprocal(distance, out=distance)
@@ -139,7 +125,7 @@ def _distances(points: FloatArray, positions: FloatArray) -> FloatArray:
 
 
 def _rows(positions: FloatArray) -> int:
-    return max(1, PAIRS // max(1, len(positions)))
+    return max(1, PAIRS_PER_BLOCK // max(1, len(positions)))
 
 
 def equation_of(medium: Medium) -> Equation:

@@ -1,9 +1,9 @@
-"""Points spread over a surface, densely where light changes within little space: where charges and equations go.
+"""Points on a surface at a variable spacing, for charges and equations.
 
-The surface is cut into cells about as large as the wanted spacing. Candidates are drawn from these cells in their
-order, each cell as often as its area asks for, and then thinned: a candidate stays unless one of higher priority that
-stays is too near (Poisson-disc sampling by dart throwing; with a radius that varies, Mitchell et al. 2012). Points that
-face away from each other, on the two sides of a plate, do not thin each other.
+The surface is cut into cells about as large as the wanted spacing. Candidates are drawn from the cells in proportion to
+area over the square of the spacing, and then thinned: a candidate stays unless an earlier one that stays is too near
+(Poisson-disc sampling by dart throwing; with a radius that varies, Mitchell et al. 2012). Points on opposite sides of a
+plate, whose normals point away from each other, do not thin each other.
 """
 
 from collections.abc import Callable
@@ -17,15 +17,15 @@ from tetlux.meshing.surface.subdivide import quarter_triangles
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
-# Candidates to each square of the spacing.
-CANDIDATES = 4.0
-# Points that stay are farther apart than this times the spacing.
-APART = 0.8
-# Neighbours looked at when thinning; within that radius there are 8 candidates in the mean.
-NEIGHBOURS = 20
-# Cells are no longer than this times the spacing, unless they are whole triangles.
-COARSEST = 1.5
-_CUTS = 40
+# Candidates in each square of the spacing.
+CANDIDATES_PER_SQUARE = 4.0
+# Least distance between two points that stay, over the spacing.
+LEAST_SEPARATION = 0.8
+# Nearest candidates that may remove one; within the least distance there are 8 on average.
+CHECKED_NEIGHBOURS = 20
+# Longest side of a cell, over the spacing in its middle.
+LARGEST_CELL = 1.5
+_MOST_CUTS = 40
 
 # The wanted distance between points (n, 3) of the surface, (n,), unit.
 Spacing = Callable[[FloatArray], FloatArray]
@@ -40,7 +40,7 @@ class Samples:
     points, normals : (n, 3) ndarray
         Outward unit normals.
     areas : (n,) ndarray
-        What each stands for, unit².
+        Quadrature weight of each, unit².
     spacing : (n,) ndarray
         Wanted distance to the next one, unit.
     """
@@ -81,27 +81,27 @@ class Cells:
         return np.asarray(0.5 * np.linalg.norm(np.cross(first, second), axis=1))
 
     @property
-    def load(self) -> float:
-        """How many squares of the spacing there are."""
+    def sample_count(self) -> float:
+        """Number of points: squares of the spacing that fit into the cells."""
         return float((self.areas / self.spacing**2).sum())
 
     def scaled(self, scale: float) -> "Cells":
-        """The same for a spacing so many times as large."""
+        """The same cells for a spacing times a factor."""
         return replace(self, spacing=scale * self.spacing)
 
-    def cut(self, spacing: Spacing, size: float = COARSEST) -> "Cells":
-        """Cut them until none is longer than `size` times the spacing in its middle."""
+    def cut(self, spacing: Spacing, size: float = LARGEST_CELL) -> "Cells":
+        """Cut cells in four until none is longer than `size` times the spacing in its middle."""
         faces, corners, wanted = self.faces, self.corners, self.spacing
         done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-        for cut in range(_CUTS + 1):
-            small = (longest_sides(corners) <= size * wanted) | (cut == _CUTS)
+        for cut in range(_MOST_CUTS + 1):
+            small = (longest_sides(corners) <= size * wanted) | (cut == _MOST_CUTS)
             done.append((faces[small], corners[small], wanted[small]))
             if small.all():
                 break
             faces, corners = np.repeat(faces[~small], 4), quarter_triangles(corners[~small])
             wanted = spacing(corners.mean(axis=1))
         faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
-        # Parts of one triangle side by side, so that drawing in order spreads points evenly.
+        # Parts of one triangle become neighbours, so that stratified drawing covers each triangle evenly.
         order = np.argsort(faces, kind="stable")
         return Cells(faces[order], corners[order], wanted[order])
 
@@ -112,27 +112,27 @@ def cells_of(surface: Surface, spacing: Spacing) -> Cells:
     return Cells(np.arange(len(corners)), corners, spacing(corners.mean(axis=1)))
 
 
-def draw(surface: Surface, cells: Cells, rng: np.random.Generator, density: float = CANDIDATES) -> Samples:
-    """Draw points from cells, so many to each square of the spacing."""
-    load = cells.areas / cells.spacing**2
-    drawn = np.diff(np.floor(np.cumsum(load) * density + rng.random()), prepend=0.0)
-    own = np.repeat(np.arange(len(load)), drawn.astype(np.int64))
+def draw(surface: Surface, cells: Cells, rng: np.random.Generator) -> Samples:
+    """Draw `CANDIDATES_PER_SQUARE` points from each square of the spacing."""
+    squares = cells.areas / cells.spacing**2
+    drawn = np.diff(np.floor(np.cumsum(squares) * CANDIDATES_PER_SQUARE + rng.random()), prepend=0.0)
+    own = np.repeat(np.arange(len(squares)), drawn.astype(np.int64))
     first, second = rng.random((2, len(own)))
     root = np.sqrt(first)
     weights = np.column_stack([1.0 - root, root * (1.0 - second), root * second])
     flat = np.einsum("qi,qij->qj", weights, cells.corners[own])
     points, normals = surface.on_curve(cells.faces[own], flat)
     wanted = cells.spacing[own]
-    return Samples(points, normals, wanted**2 / density, wanted)
+    return Samples(points, normals, wanted**2 / CANDIDATES_PER_SQUARE, wanted)
 
 
 def thin(samples: Samples, radii: FloatArray) -> BoolArray:
-    """Which of some samples in random order stay, so that none is within the radius (n,) of an earlier one."""
+    """Whether each sample stays, (n,), so that none lies within the radius (n,) of an earlier one."""
     count = len(samples)
     if count < 2:
         return np.ones(count, dtype=bool)
     tree = cKDTree(samples.points)
-    found = tree.query(samples.points, k=min(NEIGHBOURS, count))
+    found = tree.query(samples.points, k=min(CHECKED_NEIGHBOURS, count))
     distance, near = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
     close = distance < np.minimum(radii[:, None], radii[near])
     close &= np.einsum("ij,ikj->ik", samples.normals, samples.normals[near]) > 0.0
@@ -142,7 +142,7 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     late, early = first[earlier], second[earlier]
     kept, open_ = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     while open_.any():
-        # One stays once all earlier ones near it have gone.
+        # A sample stays once all earlier samples near it are removed.
         waiting = np.zeros(count, dtype=bool)
         waiting[late[open_[early]]] = True
         stays = open_ & ~waiting
@@ -154,10 +154,10 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
 
 
 def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
-    """Points about a spacing apart, in random order, and the candidates that were not taken."""
+    """Points about a spacing apart, in random order, and the candidates that were removed."""
     drawn = draw(surface, cells, rng)
     drawn = drawn[rng.permutation(len(drawn))]
-    kept = thin(drawn, APART * drawn.spacing)
+    kept = thin(drawn, LEAST_SEPARATION * drawn.spacing)
     chosen = drawn[kept]
     nearest = np.asarray(cKDTree(chosen.points).query(drawn.points)[1])
     return replace(chosen, areas=sum_by_index(nearest, drawn.areas, len(chosen))), drawn[~kept]

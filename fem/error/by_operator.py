@@ -1,4 +1,4 @@
-"""The error of all lights together, where they are solved for with different operators."""
+"""The error of the sum of all lights, where lights have different operators."""
 
 from collections.abc import Sequence
 
@@ -13,7 +13,7 @@ from tetlux.meshing.surface.surface import Surface
 def estimate_by_operator(
     loads: Sequence[Load], of_lights: Sequence[Solution], whole: Solution, inner: Sequence[Surface]
 ) -> Estimate:
-    """Estimate the error of a solution as the sum of the errors of its parts, one for each operator.
+    """Estimate the error of a solution as the sum of the errors of its parts, one part for each operator.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def estimate_by_operator(
     for operator in dict.fromkeys(load.operator for load in loads):
         own = [light for light, load in enumerate(loads) if load.operator is operator]
         emission = sum((loads[light].deposit.terms.emission for light in own), 0.0)
-        # Only uneven deposits make the exitance ripple, and emission is even.
+        # Emission is uniform, and only nonuniform deposits make the exitance ripple.
         uneven = [loads[light].at_nodes for light in own if not loads[light].deposit.terms.is_distributed]
         estimates.append(
             estimate_error(
@@ -49,5 +49,6 @@ def estimate_by_operator(
             )
         )
     return Estimate(
-        np.sum([each.shares for each in estimates], axis=0), np.sum([each.power_shares for each in estimates], axis=0)
+        np.sum([each.exitance_indicators for each in estimates], axis=0),
+        np.sum([each.power_indicators for each in estimates], axis=0),
     )

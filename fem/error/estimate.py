@@ -1,16 +1,16 @@
-"""The error of the exitance, and the share of each tetrahedron in it.
+"""The error of the exitance, and an indicator of the contribution of each tetrahedron to it.
 
 The dual-weighted residual (Becker & Rannacher 2001): the system is solved once more with the exitance itself as its
-load. This dual solution z is the weight of a local error in the exitance. A second dual, with an even load, gives the
-weight of a local error in the total power that leaves. For either of them these add up:
+load. This dual solution z is the weight of a local residual in the error of the exitance. A second dual, with a uniform
+load, gives the weight in the error of the total exited power. The indicators of either dual are the sum of:
 
 * the residual within tetrahedra (`tetlux.fem.error.residual`),
 * layers thinner than their tetrahedra (`tetlux.fem.error.layers`),
 * flat facets in place of curved surfaces (`tetlux.fem.error.facets`),
-* ripples of what fitted charges violate at the boundary that are finer than facets (`tetlux.fem.known.fitted_patch`),
-  which hardly change the total.
+* the part of the residual of fitted charges that the facets do not resolve (`tetlux.fem.known.fitted_patch`), which
+  hardly changes the total power.
 
-All terms are moduli, so that errors that cancel are counted.
+All terms are absolute values, so that errors do not cancel in the estimate.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,14 @@ import numpy as np
 
 from tetlux.fem.error.facets import boundary_facets, interface_facets
 from tetlux.fem.error.layers import boundary_layers, interface_layers
-from tetlux.fem.error.residual import averaging, lumping_error, ripple, root_mean_square, roughness, without_patches
+from tetlux.fem.error.residual import (
+    lumping_error,
+    nodal_averaging,
+    recovered_gradient_difference,
+    ripple_indicators,
+    root_mean_square,
+    subtract_patches,
+)
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients
@@ -32,11 +39,11 @@ from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Facets of a round body err to one side, and partly against the gradients. With half of their sum the estimate is 0.6
-# to 3 times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
+# Weight of the indicators of facets, whose errors partly cancel those of gradients. With it the estimate is 0.6 to 3
+# times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
-FACETS = 0.5
-# Exited power below this share of the incident power is the residual of the linear solver.
+FACET_WEIGHT = 0.5
+# Exited power below this share of the incident power is rounding error of the linear solver.
 ROUNDING = 1e-12
 
 
@@ -46,17 +53,17 @@ class Estimate:
 
     Attributes
     ----------
-    shares, power_shares : (m,) ndarray
-        Shares of the tetrahedra in the relative errors of the exitance and of the total power that leaves.
+    exitance_indicators, power_indicators : (m,) ndarray
+        Indicators of the tetrahedra; they sum to the relative errors of the exitance and of the total exited power.
     """
 
-    shares: FloatArray
-    power_shares: FloatArray
+    exitance_indicators: FloatArray
+    power_indicators: FloatArray
 
     @property
     def error(self) -> float:
         """Relative L2 error of the exitance over the surface."""
-        return float(self.shares.sum())
+        return float(self.exitance_indicators.sum())
 
     __repr__ = one_line
 
@@ -77,7 +84,7 @@ def estimate_error(
     ----------
     solution : Solution
     whole : Solution
-        The solution that it is part of, or itself: errors are relative to its exitance.
+        The solution that `solution` is a part of, or `solution` itself: errors are relative to its exitance.
     coefficients : Coefficients
         Of the mesh of the solution.
     solver : Solver
@@ -101,35 +108,44 @@ def estimate_error(
         # Where no light leaves, the exitance has no error.
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
     duals = solver.roughly(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
-    mean = averaging(mesh)
-    smooth, rough = without_patches(solution, mean)
-    slope_error = root_mean_square(rough)
-    beyond, leaving = _beyond_fitted(solution)
+    mean = nodal_averaging(mesh)
+    smooth, difference = subtract_patches(solution, mean)
+    gradient_error = root_mean_square(difference)
+    remainder, outward_flux = _remainder(solution)
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
 
-    def shares_by(dual: FloatArray) -> FloatArray:
+    def indicators_for_dual(dual: FloatArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
-        shares = diffusion * mesh.volumes * slope_error * root_mean_square(roughness(mesh, mean, dual))
-        shares += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
-        shares += _boundary_lumping(mesh, coefficients, smooth, dual)
+        indicators = (
+            diffusion
+            * mesh.volumes
+            * gradient_error
+            * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
+        )
+        indicators += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
+        indicators += _boundary_lumping(mesh, coefficients, smooth, dual)
         if fitting is not None:
-            shares += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
-        values = beyond, leaving, dual
-        shares += FACETS * boundary_facets(mesh, coefficients, solution.surface, values, float(shares.sum()), scale)
-        shares += interface_layers(mesh, coefficients, smooth, at_corners)
-        return shares + FACETS * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
+            indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
+        values = remainder, outward_flux, dual
+        indicators += FACET_WEIGHT * boundary_facets(
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale
+        )
+        indicators += interface_layers(mesh, coefficients, smooth, at_corners)
+        return indicators + FACET_WEIGHT * interface_facets(
+            mesh, coefficients, inner, emission, (solution.fluence, dual)
+        )
 
-    shares, power_shares = map_in_threads(shares_by, list(duals.T))
-    shares += ripple(mesh, coefficients, load, norm) + _unseen(solution, norm)
-    return Estimate(shares, power_shares)
+    indicators, power_indicators = map_in_threads(indicators_for_dual, list(duals.T))
+    indicators += ripple_indicators(mesh, coefficients, load, norm) + _unresolved_indicators(solution, norm)
+    return Estimate(indicators, power_indicators)
 
 
 def _dual_loads(
     mesh: TetMesh, coefficients: Coefficients, exitance: FloatArray, norm: float, total: float
 ) -> FloatArray:
-    """Loads of the two duals (n, 2): of the exitance, by its L2 norm, and of all that leaves, by its integral."""
+    """Loads of the two duals, (n, 2): for the L2 error of the exitance, and for the error of the exited power."""
     loads = np.zeros((len(mesh.points), 2))
     robin, areas = coefficients.robin, mesh.boundary_node_areas
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
@@ -137,11 +153,11 @@ def _dual_loads(
     return loads
 
 
-def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
-    """What the mesh adds to fitted charges: its fluence, and the net flux of that which leaves, at the nodes (n,)."""
-    mesh, beyond = solution.mesh, solution.fluence
-    leaving = np.zeros(len(mesh.points))
-    leaving[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
+def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """Fluence less that of fitted charges, and its net flux out of the body, at the nodes, (n,) each."""
+    mesh, remainder = solution.mesh, solution.fluence
+    outward_flux = np.zeros(len(mesh.points))
+    outward_flux[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
             # At the border of the patch the mesh holds all of the fluence.
@@ -150,27 +166,27 @@ def _beyond_fitted(solution: Solution) -> tuple[FloatArray, FloatArray]:
                 known, residual = known.copy(), residual.copy()
                 border = mesh.tetrahedra[~patch.cells]
                 known[border] = residual[border] = 0.0
-            beyond = beyond - known
+            remainder = remainder - known
             robin = 0.5 / patch.charges.medium.boundary_factor
-            leaving[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
-            leaving += residual
-    return beyond, leaving
+            outward_flux[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
+            outward_flux += residual
+    return remainder, outward_flux
 
 
-def _unseen(solution: Solution, norm: float) -> FloatArray:
-    """Shares in what the mesh misses of the residuals of fitted charges, (m,), by the norm of the exitance."""
+def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
+    """Indicators of the residuals of fitted charges that facets do not resolve, (m,), over the norm of the exitance."""
     mesh = solution.mesh
     square = np.zeros(len(mesh.boundary_faces))
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
             square += patch.unseen()
-    shares = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
-    total = float(np.sqrt(shares.sum()))
-    return np.asarray(shares / (total * norm if total > 0 else 1.0), dtype=np.float64)
+    indicators = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
+    total = float(np.sqrt(indicators.sum()))
+    return np.asarray(indicators / (total * norm if total > 0 else 1.0), dtype=np.float64)
 
 
 def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
-    """Shares in the error of lumping the boundary term, (m,)."""
+    """Indicators of the error of lumping the boundary term, (m,)."""
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     corners = (mesh.tetrahedra[cells][:, None, :] == faces[:, :, None]).argmax(axis=2)
     on_faces = lumping_error(np.take_along_axis(smooth[cells], corners, axis=1), dual[faces])

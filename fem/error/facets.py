@@ -1,10 +1,10 @@
-"""The error of flat facets that stand for a curved boundary or interface.
+"""The error of flat facets in place of a curved boundary or interface.
 
 A boundary that lies a distance delta away adds the shape derivative of the weak form::
 
     ∮ |delta| [ D |grad_t phi . grad_t z| + sigma_a phi z + |kappa - 1/zb| J z ]
 
-with J the net flux that leaves and kappa twice the mean curvature. An interface between regions adds, with jumps [.]
+with J the net outward flux and kappa twice the mean curvature. An interface between regions adds, with jumps [.]
 across it::
 
     ∮ |delta| [ |[D]| |grad_t phi . grad_t z| + |[1/D]| |D dphi/dn D dz/dn| + |[sigma_a]| phi z + |[Q0]| z ]
@@ -21,13 +21,14 @@ from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import owners
 
-# Facets that could add no more than the first share of the rest are not measured. The distance of a facet from a smooth
-# surface is at most the second share of its longest edge.
-NOT_MEASURED, FARTHEST = 0.02, 0.2
-# Farther from the surface than this share of its longest edge, a facet is not a chord of a smooth surface.
-BULGE = 0.1
-# The mean distance of a paraboloid from a triangle through three of its points, over the distance at the middle.
-MEAN_OVER_MIDDLE = 0.75
+# Facets are not measured if together they can add at most this share of all other indicators.
+NEGLIGIBLE_SHARE = 0.02
+# Largest distance of a facet from a smooth surface, over its longest edge.
+LARGEST_DISTANCE_RATIO = 0.2
+# A facet farther from the surface than this, over its longest edge, is no chord of a smooth surface.
+LARGEST_CHORD_RATIO = 0.1
+# Mean distance of a paraboloid from a triangle through three of its points, over the distance at the triangle's middle.
+MEAN_DISTANCE_RATIO = 0.75
 
 
 def boundary_facets(
@@ -35,45 +36,47 @@ def boundary_facets(
     coefficients: Coefficients,
     surface: Surface,
     values: tuple[FloatArray, FloatArray, FloatArray],
-    rest: float,
+    others: float,
     absorption_scale: float | FloatArray,
 ) -> FloatArray:
-    """Shares in the error of flat facets of the boundary, (m,).
+    """Indicators of the error of flat facets of the boundary, (m,).
 
     Parameters
     ----------
     values : tuple of three (n,) ndarray
-        At the nodes: the fluence, the net flux that leaves, and the dual.
-    rest : float
-        The sum of all other shares: facets that could add little to it are not measured.
+        At the nodes: the fluence, the net outward flux, and the dual.
+    others : float
+        The sum of all other indicators; facets that can add little to it are not measured.
     absorption_scale : float or (m,) ndarray
-        A fitted layer moves with the facets, so that only their curvature matters to it: the other terms are scaled by
-        this.
+        Scale of the terms other than curvature: a fitted layer moves with the facets, and depends on their curvature
+        only.
     """
-    fluence, leaving, dual = values
+    fluence, outward_flux, dual = values
     faces, cells = mesh.boundary_faces, mesh.boundary_cells
     hats, nodes = mesh.hat_gradients[cells], mesh.tetrahedra[cells]
     slopes = [np.einsum("mij,mi->mj", hats, at_nodes[nodes]) for at_nodes in (fluence, dual)]
     normals, areas = mesh.surface.normals, mesh.boundary_areas
     tangential = [s - np.einsum("ij,ij->i", s, normals)[:, None] * normals for s in slopes]
     product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
-    outflow = np.abs(leaving[faces].mean(axis=1) * dual[faces].mean(axis=1))
+    outflow = np.abs(outward_flux[faces].mean(axis=1) * dual[faces].mean(axis=1))
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
     extrapolation = diffusion / coefficients.robin
     scale = at_cells(absorption_scale, cells)
     along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma_a * product
     corners = mesh.points[faces]
     length = longest_sides(corners)
-    most = FARTHEST * length * areas * (along + scale * outflow / extrapolation)
+    most = LARGEST_DISTANCE_RATIO * length * areas * (along + scale * outflow / extrapolation)
     order = np.argsort(most)
-    measured = order[np.cumsum(most[order]) > NOT_MEASURED * rest]
+    measured = order[np.cumsum(most[order]) > NEGLIGIBLE_SHARE * others]
     distance = mesh.boundary_distances(surface, measured)
     # A sphere through the corners of an equilateral triangle is h²/6R above its middle. A facet farther away has a
-    # node that could not be moved onto the surface, and its distance says nothing of the curvature.
-    curvature = np.where(distance < BULGE * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0)
+    # node that could not be moved onto the surface, and its distance does not depend on the curvature.
+    curvature = np.where(
+        distance < LARGEST_CHORD_RATIO * length[measured], 2.0 * 6.0 * distance / length[measured] ** 2, 0.0
+    )
     bent = np.abs(curvature - (scale / extrapolation)[measured]) * outflow[measured]
-    shares = MEAN_OVER_MIDDLE * distance * areas[measured] * (along[measured] + bent)
-    return np.asarray(np.bincount(cells[measured], shares, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+    indicators = MEAN_DISTANCE_RATIO * distance * areas[measured] * (along[measured] + bent)
+    return np.asarray(np.bincount(cells[measured], indicators, minlength=len(mesh.tetrahedra)), dtype=np.float64)
 
 
 def interface_facets(
@@ -83,7 +86,7 @@ def interface_facets(
     emission: float | FloatArray,
     values: tuple[FloatArray, FloatArray],
 ) -> FloatArray:
-    """Shares in the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
+    """Indicators of the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
     total = np.zeros(len(mesh.tetrahedra))
     if len(inner) == 0:
         return total
@@ -104,9 +107,9 @@ def interface_facets(
     jumps = [np.abs(np.diff(each, axis=1)[:, 0]) for each in (diffusion, 1.0 / diffusion, sigma_a, density)]
     bent = jumps[0] * np.abs(np.einsum("fj,fj->f", *tangents)) + jumps[1] * np.abs(flows[0] * flows[1])
     bent += jumps[2] * np.abs(means[0] * means[1]) + jumps[3] * np.abs(means[1])
-    shares = 0.5 * MEAN_OVER_MIDDLE * distance * areas * bent
+    indicators = 0.5 * MEAN_DISTANCE_RATIO * distance * areas * bent
     for side in cells.T:
-        total += np.bincount(side, shares, minlength=len(total))
+        total += np.bincount(side, indicators, minlength=len(total))
     return total
 
 

@@ -1,12 +1,12 @@
-"""The error of layers, in which light fades within less than the height of a tetrahedron, so that no gradient shows it.
+"""The error of layers in which light decays within one tetrahedron, so that averaged gradients do not show it.
 
-Along the boundary, what `tetlux.fem.operators.fitting` leaves of the error goes with the step of the fluence across
-these tetrahedra and x = k h::
+Along the boundary, the error that `tetlux.fem.operators.fitting` leaves depends on the change of the fluence across
+these tetrahedra ("step") and on x = k h::
 
-    ∮ D k LAYERS x²/(1 + x²)^(3/2) |phi step| z
+    ∮ D k LAYER_WEIGHT x²/(1 + x²)^(3/2) |phi step| z
 
 Layers along interfaces are not fitted. Linear elements give a flux into them of ``D k s`` times the fluence instead of
-``D k``, with s = sqrt(1 + (k h/2)²), which makes the dual there too faint by the same factor. They add::
+``D k``, with s = sqrt(1 + (k h/2)²), and a dual that is too small by the same factor. The indicators are::
 
     ∮ D k s (s - 1) |phi step| |z step|
 """
@@ -19,29 +19,31 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Under diffuse light, on balls of 3 to 100 mean free paths, reduced albedos .09 to .99 and indices 1 and 1.4, the
-# estimate with this is 1.1 to 3.5 times the true error where k h is at most 3, and 4 to 11 times where it is more.
-LAYERS = 0.25
+# Weight of the indicators of boundary layers. With it the estimate is 1.1 to 3.5 times the true error where k h is at
+# most 3, and 4 to 11 times where it is more, under diffuse light on balls of 3 to 100 mean free paths, reduced albedos
+# .09 to .99 and indices 1 and 1.4.
+LAYER_WEIGHT = 0.25
 
 
 def boundary_layers(
     mesh: TetMesh, coefficients: Coefficients, fitting: Fitting, smooth: FloatArray, dual: FloatArray
 ) -> FloatArray:
-    """Shares in the error of layers along the boundary, (m,).
+    """Indicators of the error of layers along the boundary, (m,).
 
-    By the fluence at the corners of the tetrahedra at the boundary, (f, 4), and the dual at the nodes, (n,).
+    `smooth` is the fluence at the corners of the tetrahedra at the boundary, (f, 4); `dual` is given at the nodes,
+    (n,).
     """
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
     across = fitting.across[faces].mean(axis=1)
     step = _step_across(mesh, cells, faces, smooth)
-    shares = LAYERS * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
-    shares *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
-    return np.asarray(np.bincount(cells, shares, minlength=len(mesh.tetrahedra)), dtype=np.float64)
+    indicators = LAYER_WEIGHT * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
+    indicators *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))
+    return np.asarray(np.bincount(cells, indicators, minlength=len(mesh.tetrahedra)), dtype=np.float64)
 
 
 def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
-    """Shares in the error of layers along interfaces, (m,), by fluence and dual at corners of tetrahedra, (m, 4)."""
+    """Indicators of the error of layers along interfaces, (m,), by fluence and dual at corners, (m, 4) each."""
     total = np.zeros(len(mesh.tetrahedra))
     if not mesh.regions.any():
         return total
@@ -52,12 +54,12 @@ def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArr
         k = np.sqrt(sigma_a / diffusion)
         over = np.sqrt(1.0 + (0.5 * k * 3.0 * mesh.volumes[side] / areas) ** 2)
         first, second = (_step_across(mesh, side, faces, values[side]) for values in (smooth, dual))
-        shares = diffusion * k * (over - 1.0) * over * areas * first * second
-        total += np.bincount(side, shares, minlength=len(total))
+        indicators = diffusion * k * (over - 1.0) * over * areas * first * second
+        total += np.bincount(side, indicators, minlength=len(total))
     return total
 
 
 def _step_across(mesh: TetMesh, cells: IntArray, faces: IntArray, values: FloatArray) -> FloatArray:
-    """Change of the values at corners of tetrahedra (f, 4) from the mean on a face of each (f, 3) to its apex, (f,)."""
+    """Change of values at corners of tetrahedra (f, 4) from the mean on a face (f, 3) to the opposite corner, (f,)."""
     on_face = (mesh.tetrahedra[cells][:, :, None] == faces[:, None, :]).any(axis=2)
     return np.asarray(np.abs(np.where(on_face, values / 3.0, -values).sum(axis=1)))

@@ -9,23 +9,30 @@ from tetlux.fem.quadratic.error import ReadingError
 from tetlux.meshing.arrays import BoolArray, IntArray
 from tetlux.meshing.errors import InputError
 
-# Splitting tetrahedra removes the share GAIN of their error. Split those that hold enough of it to reach the aim, but
-# always LEAST_SHARE of all error, since each mesh costs a solution, and at most SPLIT_SHARE.
-SPLIT_SHARE, GAIN, LEAST_SHARE = 0.8, 0.4, 0.3
-# The aim of refinement, as a share of the tolerance: for the exitance, and for the total power that leaves.
-SAFETY, POWER_SAFETY = 0.65, 0.4
-# Do not refine again when within 5 % of the aim.
-WORTH_A_MESH = 1.05
-
-
-# The aim of refinement for readings, as a share of the tolerance, leaves room for errors of more than the bar. There
-# errors add up by their squares: splitting a tetrahedron leaves this share of its square. It is split this often at
-# most before the next solution.
-READING_SAFETY, LEFT, MOST_SPLITS = 0.5, 0.15, 3
+# Share of their error that splitting tetrahedra is assumed to remove.
+ERROR_REMOVED_SHARE = 0.4
+# Tetrahedra that hold at least this share of the error are split, since each mesh costs a solution.
+LEAST_SPLIT_SHARE = 0.3
+# Tetrahedra that hold at most this share of the error are split at once.
+LARGEST_SPLIT_SHARE = 0.8
+# The error of the exitance that refinement aims at, as a share of the tolerance.
+AIM_SHARE = 0.65
+# The error of the total exited power that refinement aims at, as a share of the tolerance.
+POWER_AIM_SHARE = 0.4
+# An error of at most this many times the aim is not refined further.
+REFINE_ABOVE = 1.05
+# The estimated error of a reading that refinement aims at, as a share of the tolerance; it leaves room for true errors
+# above the estimate.
+READING_AIM_SHARE = 0.5
+# Share of the square of a tetrahedron's error in a reading that one split is assumed to leave; squares add up to that
+# of the reading.
+SQUARE_LEFT_AFTER_SPLIT = 0.15
+# A tetrahedron is split at most this often before the next solution.
+MOST_SPLITS = 3
 
 
 def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
-    """Refuse a tolerance that is no sensible relative error.
+    """Refuse a tolerance that is not between 0.0001 and 1.
 
     Raises
     ------
@@ -40,35 +47,39 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray
     wanted = [
         aim
         for estimate in estimates
-        for aim in ((estimate.shares, SAFETY * tolerance), (estimate.power_shares, POWER_SAFETY * tolerance))
+        for aim in (
+            (estimate.exitance_indicators, AIM_SHARE * tolerance),
+            (estimate.power_indicators, POWER_AIM_SHARE * tolerance),
+        )
     ]
     marked = np.zeros(len(wanted[0][0]), dtype=bool)
-    for shares, aim in wanted:
-        error = float(shares.sum())
-        if error <= WORTH_A_MESH * aim:
+    for indicators, aim in wanted:
+        error = float(indicators.sum())
+        if error <= REFINE_ABOVE * aim:
             continue
-        part = float(np.clip((1.0 - aim / error) / GAIN, LEAST_SHARE, SPLIT_SHARE))
-        order = np.argsort(-shares)
-        reached = np.cumsum(shares[order])
+        part = float(np.clip((1.0 - aim / error) / ERROR_REMOVED_SHARE, LEAST_SPLIT_SHARE, LARGEST_SPLIT_SHARE))
+        order = np.argsort(-indicators)
+        reached = np.cumsum(indicators[order])
         marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
     return marked
 
 
 def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
-    """How often to split each of so many tetrahedra, (m,), to bring every reading to its aim.
+    """How often to split each of `cells` tetrahedra, (m,), to bring every reading to its aim.
 
-    Tetrahedra are split until none adds more than a level to the square of the error, at which these sum to the aim.
+    A common level bounds the square of each tetrahedron's error. It is chosen so that the bounded squares sum to the
+    square of the aim, and tetrahedra above it are split until they are below.
     """
     splits = np.zeros(cells, dtype=np.int64)
     for reading in readings:
-        aim = READING_SAFETY * tolerance * abs(reading.value)
-        if not reading.error > WORTH_A_MESH * aim:
+        aim = READING_AIM_SHARE * tolerance * abs(reading.value)
+        if not reading.error > REFINE_ABOVE * aim:
             continue
         ascending = np.sort(reading.squares)
-        # What all sum to if the level is the square of each tetrahedron in turn.
+        # The sum of the bounded squares for a level equal to each tetrahedron's square in turn.
         sums = np.cumsum(ascending) + ascending * np.arange(cells - 1, -1, -1)
         level = ascending[max(int(np.searchsorted(sums, aim**2)) - 1, 0)]
         level = max(float(level), aim**2 / cells)
         over = np.maximum(reading.squares / level, 1.0)
-        splits = np.maximum(splits, np.ceil(np.log(over) / np.log(1.0 / LEFT)).astype(np.int64))
+        splits = np.maximum(splits, np.ceil(np.log(over) / np.log(1.0 / SQUARE_LEFT_AFTER_SPLIT)).astype(np.int64))
     return np.minimum(splits, MOST_SPLITS)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_at, fit_within
-from tetlux.fem.charges.check import damped
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_for_remainder
+from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import FINER, Places
+from tetlux.fem.charges.places import EQUATION_REFINEMENT, Places
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
@@ -125,14 +125,14 @@ def fit_light(
     """
     if not _is_fit(deposit, surface, medium):
         return None
-    drive = Drive(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
+    lights = LightSources(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
     equation = equation_of(medium)
     if like is None:
-        fitted = fit_within(surface, equation, drive, tolerance=tolerance)
+        fitted = fit_for_remainder(surface, equation, lights, tolerance=tolerance)
         if fitted is None:
             return None
     else:
-        fitted = fit_at(like.places, equation, drive)
+        fitted = fit_at_places(like.places, equation, lights)
     charges = _charges(fitted, surface, medium)
     violation = violation_of(charges, fitted.places.fitted, surface)
     accurate = like.accurate if like is not None else _accurate(violation, medium)
@@ -143,7 +143,7 @@ def _accurate(violation: Violation, medium: Medium) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
     points = violation.points
     nearest = cKDTree(points.points).query(points.points, k=min(AVERAGED, len(points.points)))[1]
-    errors = damped(equation_of(medium), violation.residual, points.spacing)
+    errors = exitance_error(equation_of(medium), violation.residual, points.spacing)
     error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(violation.exitance[nearest]).mean(axis=1)
     return np.asarray(error <= ACCURATE * exitance)
 
@@ -161,7 +161,7 @@ def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
 
 def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:
     """Sources and charges as one sum."""
-    field, sources = fitted.field, fitted.drive.points
+    field, sources = fitted.field, fitted.lights.points
     depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
     heights = np.asarray(cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
@@ -173,13 +173,13 @@ def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: S
     tree = cKDTree(samples.points)
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = INTEGRATED * FINER * samples.spacing[tree.query(queries)[1]]
+        own = INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
     points, equation = quadrature(surface, spacing), equation_of(charges.medium)
     fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
     exitance = equation.robin * fluence
-    apart = replace(points, spacing=FINER * samples.spacing[tree.query(points.points)[1]])
+    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
     return Violation(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
 
 

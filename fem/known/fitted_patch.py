@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.check import damped
+from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.fitted import FittedLight, Violation
 from tetlux.fem.known.patch import Patch, holds_sources
@@ -76,7 +76,7 @@ class FittedPatch(Patch):
         seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
         length = SHORTER * np.minimum(self.violation.points.spacing, sides[self.facets])
-        missed = damped(equation_of(self.charges.medium), self.violation.residual - seen, length)
+        missed = exitance_error(equation_of(self.charges.medium), self.violation.residual - seen, length)
         square = self.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
 

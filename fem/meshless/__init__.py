@@ -1,7 +1,7 @@
-"""Solutions without a mesh: ``solve(..., model="charges")``, for what `tetlux.fem.charges` fits.
+"""Solutions without a mesh: ``solve(..., model="charges")``, by the charges that `tetlux.fem.charges` fits.
 
 solution  `ChargeSolution`
-solve     from a body, its media and lights to one
+solve     makes one from a body, its media and lights
 """
 
 from tetlux.fem.meshless.solution import ChargeSolution

@@ -1,4 +1,4 @@
-"""`ChargeSolution`: light in a body of even regions, by charges fitted to their surfaces, without a mesh."""
+"""`ChargeSolution`: light in a body of homogeneous regions, by charges fitted to their surfaces, without a mesh."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -8,14 +8,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import MOST, Drive, fit_charges
-from tetlux.fem.charges.check import Quality
+from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
+from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import FINER
+from tetlux.fem.charges.places import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
+from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
-from tetlux.fem.charges.several import RegionLight, Wall, fit_regions
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.outcome.reading import Reading
@@ -28,18 +28,18 @@ from tetlux.meshing.tets.regions import region_at
 
 
 @dataclass(frozen=True)
-class Entry:
-    """What is known of a light before it diffuses.
+class LightLedger:
+    """Power of a light that does not enter diffusion, and its diffuse irradiance.
 
     Attributes
     ----------
-    known : Power
-        What of it meets the body, is reflected at once, absorbed before it was ever scattered, or passes through, W.
+    ledger : Power
+        Incident, specularly reflected, absorbed before the first scattering, and passed through the body, W.
     irradiance, transmitted : float
-        Diffuse light on the outside, and what of it passes to the inside, W/unit².
+        Diffuse irradiance on the outside, and the part of it that is transmitted to the inside, W/unit².
     """
 
-    known: Power
+    ledger: Power
     irradiance: float = 0.0
     transmitted: float = 0.0
 
@@ -53,33 +53,33 @@ class ChargeSolution:
     surface : Surface
     medium : Medium
         Of the body.
-    walls : tuple of Wall
-        The body's surface, and those of its regions.
+    interfaces : tuple of Interface
+        The body's surface, then those of its regions.
     fields : tuple of ChargeField
-        In the body's own region and in the others, each with a column of strengths for each light.
+        In the region around all others, and in regions 1, 2, ...; each with a column of strengths for each light.
     samples : tuple of Samples
-        Points of each wall at which charges were fitted.
+        Points of each interface at which charges were fitted.
     sources : (s,) ndarray
-        Power of each light's points, W.
-    entries : tuple of Entry
+        Power of the point sources of each light, W.
+    ledgers : tuple of LightLedger
         Of each light.
-    quality : Quality
+    errors : ErrorEstimates
         Of the sum of all lights.
     seconds : dict
         Seconds spent on surface, solve, and total.
     warnings : list of str
     readings : tuple of Reading
-        What the detectors read that were given to `tetlux.fem.solve`, in their order.
+        Of the detectors that were given to `tetlux.fem.solve`, in their order.
     """
 
     surface: Surface
     medium: Medium
-    walls: tuple[Wall, ...]
+    interfaces: tuple[Interface, ...]
     fields: tuple[ChargeField, ...]
     samples: tuple[Samples, ...]
     sources: FloatArray
-    entries: tuple[Entry, ...]
-    quality: Quality
+    ledgers: tuple[LightLedger, ...]
+    errors: ErrorEstimates
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     readings: tuple[Reading, ...] = ()
@@ -90,12 +90,12 @@ class ChargeSolution:
     @property
     def error_estimate(self) -> float:
         """Estimated relative L2 error of the exitance: see `tetlux.fem.charges.check`."""
-        return self.quality.estimate
+        return self.errors.estimate
 
     @property
     def error_bound(self) -> float:
         """Relative L2 error that the exitance does not exceed, nan with regions: see `tetlux.fem.charges.check`."""
-        return self.quality.bound
+        return self.errors.bound
 
     @cached_property
     def exitance(self) -> FloatArray:
@@ -119,7 +119,7 @@ class ChargeSolution:
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
         fluence = np.full(len(queries), np.nan)
         inside = np.flatnonzero(self.surface.contains(queries))
-        regions = region_at(queries[inside], [wall.surface for wall in self.walls[1:]])
+        regions = region_at(queries[inside], [interface.surface for interface in self.interfaces[1:]])
         for region, each in enumerate(self._sums):
             some = inside[regions == region]
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -128,23 +128,23 @@ class ChargeSolution:
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
-        """Points of the body's surface (n, 3), and how far apart charges are above them (n,), unit."""
-        return self.samples[0].points, FINER * self.samples[0].spacing
+        """Points of the body's surface (n, 3), and the spacing of charges above them (n,), unit."""
+        return self.samples[0].points, EQUATION_REFINEMENT * self.samples[0].spacing
 
     @property
     def charges(self) -> int:
-        """How many there are, sources included."""
+        """Number of charges, sources included."""
         return sum(len(each.positions) for each in self.fields)
 
     @property
     def fluence(self) -> FloatArray:
-        """Refused: it is that at the nodes of a mesh."""
+        """Refused: this is the fluence at the nodes of a mesh, and there is no mesh."""
         raise InputError('model "charges" has no mesh, nor fluence at its nodes; ask fluence_at(points).')
 
     @cached_property
     def of_lights(self) -> "tuple[ChargeSolution, ...]":
-        """What each light adds, in their order, if there are several."""
-        count = len(self.entries)
+        """The solution of each light, in their order; empty if there is only one."""
+        count = len(self.ledgers)
         return tuple(self._of_light(light) for light in range(count)) if count > 1 else ()
 
     def _of_light(self, light: int) -> "ChargeSolution":
@@ -153,8 +153,8 @@ class ChargeSolution:
             self,
             fields=fields,
             sources=self.sources[[light]],
-            entries=(self.entries[light],),
-            quality=Quality(np.nan, np.nan),
+            ledgers=(self.ledgers[light],),
+            errors=ErrorEstimates(np.nan, np.nan),
             warnings=[],
         )
 
@@ -162,13 +162,13 @@ class ChargeSolution:
     def power(self) -> Power:
         """The ledger, W.
 
-        What exits is the integral of the exitance. What is absorbed is, by Gauss's theorem, what sources give and what
-        flows into each region through its walls: the ledger balances as far as the conditions there hold.
+        The exited power is the integral of the exitance. The absorbed power is, by Gauss's theorem, the power of the
+        sources plus the net inflow of each region. The ledger balances as far as the interface conditions hold.
         """
         area, diffused, inflow = self._flows
-        known = [entry.known for entry in self.entries]
-        irradiance = sum(entry.irradiance for entry in self.entries)
-        transmitted = sum(entry.transmitted for entry in self.entries)
+        known = [ledger.ledger for ledger in self.ledgers]
+        irradiance = sum(ledger.irradiance for ledger in self.ledgers)
+        transmitted = sum(ledger.transmitted for ledger in self.ledgers)
         return Power(
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
@@ -184,18 +184,18 @@ class ChargeSolution:
 
     @cached_property
     def _flows(self) -> tuple[float, float, float]:
-        """Area of the body, integral of ``phi/(2A)`` over it, and what flows into all regions through their walls."""
+        """Area of the body, integral of ``phi/(2A)`` over it, and the net inflow of all regions, unit² and W."""
         area, diffused, inflow = 0.0, 0.0, 0.0
-        for wall, fitted in zip(self.walls, self.samples, strict=True):
+        for interface, fitted in zip(self.interfaces, self.samples, strict=True):
             tree = cKDTree(fitted.points)
-            spacing = FINER * fitted.spacing
-            points = quadrature(wall.surface, _nearest(tree, spacing))
-            exitance, residual = self._sums[wall.inside].exitance_and_residual(points.points, points.normals)
+            spacing = EQUATION_REFINEMENT * fitted.spacing
+            points = quadrature(interface.surface, _nearest(tree, spacing))
+            exitance, residual = self._sums[interface.inside].exitance_and_residual(points.points, points.normals)
             inflow += float(points.areas @ (residual - exitance))
-            if wall.outside is None:
+            if interface.outside is None:
                 area, diffused = float(points.areas.sum()), float(points.areas @ exitance)
             else:
-                exitance, residual = self._sums[wall.outside].exitance_and_residual(points.points, points.normals)
+                exitance, residual = self._sums[interface.outside].exitance_and_residual(points.points, points.normals)
                 inflow -= float(points.areas @ (residual - exitance))
         return area, diffused, inflow
 
@@ -206,9 +206,9 @@ class ChargeSolution:
 
     @property
     def _unscattered(self) -> float:
-        """Exitance beside ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
+        """Exitance in addition to ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
         share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1])
-        return share * sum(entry.transmitted for entry in self.entries)
+        return share * sum(ledger.transmitted for ledger in self.ledgers)
 
 
 def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
@@ -220,13 +220,13 @@ def charge_solution(
     medium: Medium,
     points: FloatArray,
     powers: FloatArray,
-    entries: Sequence[Entry],
+    ledgers: Sequence[LightLedger],
     *,
     inner: Sequence[tuple[Surface, Medium]] = (),
     tolerance: float = 0.02,
-    most: int = MOST,
+    most: int = MOST_CHARGES,
 ) -> ChargeSolution:
-    """Solve for point sources and diffuse light in a body of even regions.
+    """Solve for point sources and diffuse light in a body of homogeneous regions.
 
     Parameters
     ----------
@@ -236,15 +236,15 @@ def charge_solution(
     points : (p, 3) ndarray
         Sources inside the body.
     powers : (p, s) ndarray
-        What each of s lights puts into each of them, W.
-    entries : sequence of Entry
+        Powers of the sources in each of s lights, W.
+    ledgers : sequence of LightLedger
         Of each light; diffuse light is for a body without regions.
     inner : sequence of (Surface, Medium)
         Regions of the body.
     tolerance : float
         Wanted relative L2 error of the exitance.
     most : int
-        Charges at which fitting ends in any case, about.
+        Approximate number of charges at which fitting ends in any case.
 
     Returns
     -------
@@ -252,19 +252,23 @@ def charge_solution(
     """
     sources = powers.sum(axis=0)
     if not inner:
-        inflow = 2.0 * np.array([entry.transmitted for entry in entries]) / (1.0 + 3.0 * moments(medium.eta)[1])
-        drive = Drive(points, powers, inflow)
-        fitted = fit_charges(surface, equation_of(medium), drive, tolerance=tolerance, most=most)
-        samples, wall = fitted.places.fitted, Wall(surface, 0, None)
+        boundary_source = (
+            2.0 * np.array([ledger.transmitted for ledger in ledgers]) / (1.0 + 3.0 * moments(medium.eta)[1])
+        )
+        lights = LightSources(points, powers, boundary_source)
+        fitted = fit_charges(surface, equation_of(medium), lights, tolerance=tolerance, most=most)
+        samples, interface = fitted.places.fitted, Interface(surface, 0, None)
         return ChargeSolution(
-            surface, medium, (wall,), (fitted.field,), (samples,), sources, tuple(entries), fitted.quality
+            surface, medium, (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         )
     surfaces = [each for each, _ in inner]
     parents = nesting(surface, surfaces).parents
-    walls = [Wall(surface, 0, None)]
-    walls += [Wall(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
-    light = RegionLight(points, region_at(points, surfaces), powers)
+    interfaces = [Interface(surface, 0, None)]
+    interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
+    light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
-    fit = fit_regions(walls, equations, light, tolerance=tolerance, most=most)
+    fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
     fitted_at = tuple(each.places.fitted for each in fit.places)
-    return ChargeSolution(surface, medium, tuple(walls), fit.fields, fitted_at, sources, tuple(entries), fit.quality)
+    return ChargeSolution(
+        surface, medium, tuple(interfaces), fit.fields, fitted_at, sources, tuple(ledgers), fit.errors
+    )

@@ -1,4 +1,4 @@
-"""Lights in a body of even regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
+"""Lights in a body of homogeneous regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,14 +7,14 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
-from tetlux.fem.charges.adapt import MOST
+from tetlux.fem.charges.adapt import MOST_CHARGES
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.split import check_list
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.meshless.solution import ChargeSolution, Entry, charge_solution
+from tetlux.fem.meshless.solution import ChargeSolution, LightLedger, charge_solution
 from tetlux.fem.outcome.solution import Power
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
@@ -27,9 +27,10 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.nesting import check_regions
 
-# Mean free paths between a source and the surface of a region: nearer ones are off by a per mille, and on it by half.
-NEAREST = 1e-3
-# An exitance below zero by less than this share of its maximum is not worth a sentence.
+# Least distance of a source from the surface of a region, in mean free paths. The error is .1 % at this distance and 50
+# % on the surface.
+LEAST_DISTANCE_TO_INTERFACE = 1e-3
+# Negative exitance of less than this share of its maximum gives no warning.
 NEGLIGIBLE_DIP = 1e-6
 _INSTEAD = 'solve it with model "full".'
 
@@ -41,9 +42,9 @@ def solve_with_charges(
     *,
     regions: Sequence[Region] = (),
     tolerance: float = 0.02,
-    most: int = MOST,
+    most: int = MOST_CHARGES,
 ) -> ChargeSolution:
-    """Solve for lights in a body of even regions, without a mesh.
+    """Solve for lights in a body of homogeneous regions, without a mesh.
 
     Parameters
     ----------
@@ -86,8 +87,8 @@ def solve_with_charges(
         raise InputError("there is no light; give at least one.")
     watch = Stopwatch()
     with watch.stage("surface"):
-        inner = [(region.surface, even_medium(only_medium(region))) for region in regions]
-        body = even_medium(medium)
+        inner = [(region.surface, homogeneous_medium(only_medium(region))) for region in regions]
+        body = homogeneous_medium(medium)
         for each in (surface, *(own for own, _ in inner)):
             check_simple(each)
         check_regions(surface, [each for each, _ in inner])
@@ -102,8 +103,8 @@ def solve_with_charges(
         powers = np.zeros((len(owners), len(terms)))
         powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
         points = np.vstack([each.points for each in terms])
-        entries = [_entry(deposit) for deposit in deposits]
-        solution = charge_solution(surface, body, points, powers, entries, inner=inner, tolerance=tolerance, most=most)
+        ledgers = [_light_ledger(deposit) for deposit in deposits]
+        solution = charge_solution(surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, most=most)
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     if not solution.error_estimate <= tolerance:
         warnings.append(
@@ -115,7 +116,7 @@ def solve_with_charges(
 
 
 def _below_zero(solution: ChargeSolution) -> list[str]:
-    """What to say where the exitance is below zero: there it is less than its error."""
+    """A warning where the exitance is below zero: there it is less than its error."""
     points, areas = solution.samples[0].points, solution.samples[0].areas
     exitance = solution.exitance_on(points)
     below = exitance < -NEGLIGIBLE_DIP * exitance.max()
@@ -132,10 +133,10 @@ def _below_zero(solution: ChargeSolution) -> list[str]:
     ]
 
 
-def _entry(deposit: Deposit) -> Entry:
+def _light_ledger(deposit: Deposit) -> LightLedger:
     ledger, terms = deposit.ledger, deposit.terms
     known = Power(ledger.incident, ledger.specular, ledger.absorbed, 0.0, ledger.ballistic)
-    return Entry(known, float(terms.irradiance), float(terms.transmitted_irradiance))
+    return LightLedger(known, float(terms.irradiance), float(terms.transmitted_irradiance))
 
 
 def check_simple(surface: Surface) -> None:
@@ -156,16 +157,16 @@ def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -
     """Refuse sources on the surfaces of regions, where fluence has a pole on both sides."""
     for number, surface in enumerate(inner, 1):
         away = np.linalg.norm(surface.project(points)[0] - points, axis=1)
-        if (away < NEAREST * medium.mean_free_path).any():
+        if (away < LEAST_DISTANCE_TO_INTERFACE * medium.mean_free_path).any():
             place = ", ".join(f"{x:.4g}" for x in points[away.argmin()])
             raise InputError(
                 f'a source at ({place}) lies on the surface of region {number}, where model "charges" has none; '
-                f"move it by {NEAREST:g} of a mean free path, or {_INSTEAD}"
+                f"move it by {LEAST_DISTANCE_TO_INTERFACE:g} of a mean free path, or {_INSTEAD}"
             )
 
 
-def even_medium(medium: AnyMedium) -> Medium:
-    """The medium, if it does not vary.
+def homogeneous_medium(medium: AnyMedium) -> Medium:
+    """The medium, if it is homogeneous.
 
     Raises
     ------
@@ -174,11 +175,11 @@ def even_medium(medium: AnyMedium) -> Medium:
     """
     if isinstance(medium, Medium):
         return medium
-    raise InputError(f'the medium varies within the body, and model "charges" has even ones; {_INSTEAD}')
+    raise InputError(f'the medium varies within the body, and model "charges" needs homogeneous ones; {_INSTEAD}')
 
 
 def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Surface]) -> None:
-    """Refuse what a light leaves in a body, unless that is points and even diffuse light.
+    """Refuse a light unless it leaves point sources or uniform diffuse light in the body.
 
     Parameters
     ----------
@@ -199,7 +200,7 @@ def check_deposit(light: Light, deposit: Deposit, body: Body, inner: Sequence[Su
     if np.any(terms.emission):
         raise InputError(f'{name} emits light throughout, and model "charges" has points; {_INSTEAD}')
     if np.ndim(terms.irradiance) or np.ndim(terms.transmitted_irradiance):
-        raise InputError(f'{name} is not even over the surface, as model "charges" needs it; {_INSTEAD}')
+        raise InputError(f'{name} is not uniform over the surface, as model "charges" needs it; {_INSTEAD}')
     if terms.irradiance and body.only_medium is None:
         raise InputError(f'{name} on a body with regions is not for model "charges"; {_INSTEAD}')
     _check_apart(terms.points, body.outer, inner)

@@ -12,18 +12,22 @@ from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.error import ReadingError, read_with_error
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
 
-# How far from the surface a point may be, as a share of the body's diagonal.
-FARTHEST = 0.05
-# How far from a flat disc the surface may run, as a share of its radius: on a sphere, a disc of half its radius.
-FLATNESS = 0.25
-# Circles of a disc, and points on each: Gauss points in the square of the radius, so that areas come out equal.
-CIRCLES, SPOKES = 16, 32
-# Larger meshes are read by linear elements, without an error: quadratic ones take a minute there, and gigabytes.
+# Largest distance of a point detector from the surface, as a share of the body's diagonal.
+LARGEST_DISTANCE_SHARE = 0.05
+# Largest distance between a disc and the surface, as a share of the disc's radius; on a sphere it is reached by a disc
+# of half the sphere's radius.
+LARGEST_GAP_SHARE = 0.25
+# Number of circles of quadrature points on a disc, at Gauss points of the square of the radius.
+CIRCLES = 16
+# Number of quadrature points on each circle.
+SPOKES = 32
+# Most tetrahedra of a mesh that is read by quadratic elements; on larger ones these take a minute and gigabytes. Larger
+# meshes are read by linear elements, without an error.
 MOST_TETRAHEDRA = 400_000
 
 
@@ -50,7 +54,7 @@ class PointDetector:
 
 @dataclass(frozen=True)
 class DiscDetector:
-    """Reads what leaves through a round patch, at any angle.
+    """Reads the light that leaves through a flat disc at any angle.
 
     Parameters
     ----------
@@ -76,7 +80,7 @@ class DiscDetector:
 
 @dataclass(frozen=True)
 class FibreDetector(DiscDetector):
-    """Reads what a fibre collects that stands on the surface, at right angles to it.
+    """Reads the light that a fibre at right angles to the surface collects.
 
     Parameters
     ----------
@@ -109,13 +113,13 @@ Detector = PointDetector | DiscDetector | FibreDetector
 def read(detector: Detector, solution: ExitanceField) -> Reading:
     """Read a detector.
 
-    A disc's mean is over the flat disc that touches the surface, with the exitance at the surface's points nearest to
-    the disc's. A fibre collects up to the angle whose sine is its aperture, out of radiance that goes with
-    ``F_t(eta, theta)`` and adds up to the exitance; it changes nothing of the light that it reads.
+    The exitance of a disc is a mean over the flat disc that touches the surface, taken at the surface points nearest to
+    the points of the disc. A fibre collects radiance up to the angle whose sine is its numerical aperture. The radiance
+    is proportional to ``F_t(eta, theta)``, and its flux is the exitance. Detectors do not change the light in the body.
 
-    What a solution on a mesh is read by are quadratic elements on the same mesh, which are solved for at the first
-    reading: see `tetlux.fem.quadratic`. Far from the light they are ten times nearer to the truth than the linear
-    elements of `Solution.exitance`.
+    Readings of a solution on a mesh come from quadratic elements on the same mesh, which are solved for at the first
+    reading: see `tetlux.fem.quadratic`. Far from the light their error is a tenth of that of the linear elements of
+    `Solution.exitance`.
 
     Parameters
     ----------
@@ -132,89 +136,91 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
         radius; or if the surface is not flat enough for the disc, or ends under it.
     """
-    view = view_of(detector, solution)
+    placed = place_detector(detector, solution)
     error = model = None
     if isinstance(solution, Solution) and is_quadratic(solution):
-        found = estimate_reading(solution, view.sight)
+        found = estimate_reading(solution, placed.measurement)
         exitance, error = found.value, found.relative
     else:
-        exitance = float(view.sight.weights @ solution.exitance_on(view.sight.points))
+        exitance = float(placed.measurement.weights @ solution.exitance_on(placed.measurement.points))
     if isinstance(solution, Solution) and solution.validity is not None:
-        model = float(view.sight.weights @ (1.0 - solution.valid_on(view.sight.points)))
-    power = None if view.area is None else view.share * exitance * view.area
-    return Reading(view.position, view.normal, exitance, view.area, power, error, model)
+        model = float(placed.measurement.weights @ (1.0 - solution.valid_on(placed.measurement.points)))
+    power = None if placed.area is None else placed.share * exitance * placed.area
+    return Reading(placed.position, placed.normal, exitance, placed.area, power, error, model)
 
 
 def is_quadratic(solution: Solution) -> bool:
-    """Whether it is read by quadratic elements: its mesh may be too large for that."""
+    """Whether a solution is read by quadratic elements: its mesh may be too large."""
     return solution.quadratic is not None and len(solution.mesh.tetrahedra) <= MOST_TETRAHEDRA
 
 
-def estimate_reading(solution: Solution, sight: Sight) -> ReadingError:
+def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingError:
     """The exitance at points of a solution by quadratic elements, with its error.
 
-    Where spread light fades within a tetrahedron linear elements are better, and the error is the difference.
+    Where distributed light decays within a tetrahedron, linear elements are better; the error is the difference.
     """
     quadratic = solution.quadratic
     assert quadratic is not None
-    found = read_with_error(quadratic, sight)
-    if not quadratic.has_thin_layers(sight):
+    found = read_with_error(quadratic, measurement)
+    if not quadratic.has_thin_layers(measurement):
         return found
     if len(solution.of_lights) > 1:
-        parts = [estimate_reading(part, sight) for part in solution.of_lights]
+        parts = [estimate_reading(part, measurement) for part in solution.of_lights]
         return ReadingError.add(parts)
-    value = float(sight.weights @ solution.exitance_on(sight.points))
+    value = float(measurement.weights @ solution.exitance_on(measurement.points))
     squares = np.zeros(len(found.squares))
-    squares[quadratic.operator.see(sight).cells[0]] = (value - found.value) ** 2
+    squares[quadratic.operator.discretise(measurement).cells[0]] = (value - found.value) ** 2
     return ReadingError(value, squares, 0.0, 0.0)
 
 
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
-    """`read` several detectors, which takes less time together."""
+    """`read` several detectors; this is faster than reading one after another."""
     if isinstance(solution, Solution) and is_quadratic(solution):
         assert solution.quadratic is not None
-        solution.quadratic.operator.duals([view_of(detector, solution).sight for detector in detectors])
+        solution.quadratic.operator.duals([place_detector(detector, solution).measurement for detector in detectors])
     return tuple(read(detector, solution) for detector in detectors)
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class PlacedDetector:
     """A detector on a body.
 
     Attributes
     ----------
     position, normal : (3,) floats
-        Its place on the surface, and the outward unit normal there.
-    sight : Sight
-        The points that it reads.
+        Its position on the surface, and the outward unit normal there.
+    measurement : Measurement
+        The points at which it reads.
     area : float or None
         Of the flat disc, unit²; None for a point.
     share : float
-        Of what leaves there that it collects.
+        Collected share of the exitance.
     """
 
     position: Vector
     normal: Vector
-    sight: Sight
+    measurement: Measurement
     area: float | None = None
     share: float = 1.0
 
     __repr__ = one_line
 
 
-def view_of(detector: Detector, solution: ExitanceField) -> View:
-    """A detector on the body of a solution: see `read`."""
+def place_detector(detector: Detector, solution: ExitanceField) -> PlacedDetector:
+    """Place a detector on the body of a solution: see `read`."""
     if isinstance(detector, PointDetector):
-        reach = FARTHEST * solution.surface.diagonal
-        place, normal = _on_surface(solution, "position", detector.position, reach, f"{FARTHEST:.0%} of the diagonal")
-        return View(_vector(place), _vector(normal), Sight(place[None], np.ones(1)))
+        reach = LARGEST_DISTANCE_SHARE * solution.surface.diagonal
+        place, normal = _on_surface(
+            solution, "position", detector.position, reach, f"{LARGEST_DISTANCE_SHARE:.0%} of the diagonal"
+        )
+        return PlacedDetector(_vector(place), _vector(normal), Measurement(place[None], np.ones(1)))
     if not isinstance(detector, DiscDetector):
         raise InputError(f"{detector!r} is no detector; give PointDetector, DiscDetector or FibreDetector.")
     place, normal = _on_surface(solution, "center", detector.center, detector.radius, "its radius")
     flat = place + detector.radius * _unit_disc(normal)
     points, _ = solution.surface.project(flat)
     gap = float(np.linalg.norm(points - flat, axis=1).max())
-    if gap > FLATNESS * detector.radius:
+    if gap > LARGEST_GAP_SHARE * detector.radius:
         raise InputError(
             f"the disc of radius {detector.radius:.3g} at {as_text(place)} does not lie on the surface, which bends "
             f"away or ends {gap:.3g} {solution.surface.unit} from it; make it smaller or move it."
@@ -224,21 +230,21 @@ def view_of(detector: Detector, solution: ExitanceField) -> View:
     if isinstance(detector, FibreDetector):
         eta = solution.medium.eta
         share = collected_share(eta, detector.numerical_aperture) / collected_share(eta, 1.0)
-    sight = Sight(points, weights)
-    return View(_vector(place), _vector(normal), sight, math.pi * detector.radius**2, share)
+    measurement = Measurement(points, weights)
+    return PlacedDetector(_vector(place), _vector(normal), measurement, math.pi * detector.radius**2, share)
 
 
 def _on_surface(
     solution: ExitanceField, name: str, given: Vector, reach: float, what: str
 ) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
-    wanted = as_vector(given, name)
-    (place,), (normal,) = solution.surface.project(wanted[None])
-    away = float(np.linalg.norm(wanted - place))
-    if away > reach:
+    position = as_vector(given, name)
+    (place,), (normal,) = solution.surface.project(position[None])
+    distance = float(np.linalg.norm(position - place))
+    if distance > reach:
         raise InputError(
-            f"the detector's {name} {as_text(wanted)} is {away:.3g} {solution.surface.unit} from the surface, more "
-            f"than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
+            f"the detector's {name} {as_text(position)} is {distance:.3g} {solution.surface.unit} from the surface, "
+            f"more than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
         )
     return place, normal
 
@@ -246,9 +252,9 @@ def _on_surface(
 def _unit_disc(normal: FloatArray) -> FloatArray:
     """Points (CIRCLES * SPOKES, 3) of the unit disc across a normal, circle by circle."""
     radius = np.sqrt(0.5 * (np.polynomial.legendre.leggauss(CIRCLES)[0] + 1.0))
-    # Every other circle is turned, so that points do not line up.
-    turn = 0.5 * (np.arange(CIRCLES) % 2)
-    angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + turn[:, None])
+    # Every other circle is rotated by half a step, so that points do not line up.
+    rotation = 0.5 * (np.arange(CIRCLES) % 2)
+    angle = 2.0 * np.pi / SPOKES * (np.arange(SPOKES) + rotation[:, None])
     across, up = perpendicular_axes(normal)
     spread = np.cos(angle)[:, :, None] * across + np.sin(angle)[:, :, None] * up
     return np.asarray((radius[:, None, None] * spread).reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""`Reading`: what a detector reads, and how far off that may be."""
+"""`Reading`: the exitance and power at a detector, and their errors."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from tetlux.meshing.arrays import Vector
 
 @dataclass(frozen=True)
 class Reading:
-    """What a detector reads.
+    """Exitance and power at a detector, with estimated errors.
 
     Attributes
     ----------
     position : (3,) floats
-        Where on the surface it is, unit.
+        Of the detector on the surface, unit.
     normal : (3,) floats
         Outward unit normal there.
     exitance : float
@@ -25,7 +25,7 @@ class Reading:
         Estimated numerical error of this reading, relative: see `tetlux.fem.quadratic.error`. None where it is not
         estimated, as without a mesh.
     model_error : float or None
-        Expected relative error of the diffusion approximation there, which no mesh makes smaller: see
+        Expected relative error of the diffusion approximation there, which no mesh reduces: see
         `tetlux.fem.validity.local`. None where it is not known, as of one of several lights.
     """
 

@@ -1,19 +1,19 @@
-"""Quadratic elements on the same mesh: what readings far from the light need.
+"""Quadratic elements on the same mesh, for readings far from the light.
 
-Light fades over many tetrahedra on its way to a detector, and linear elements err by (k h)²/24 of each fading length,
-with h the size of tetrahedra. On a ball of radius 80 mm whose light fades over 4 mm, linear elements would need edges
-of .6 mm between the light and a fibre 50 mm away to read it to 1 %; quadratic ones need 3 mm.
+Light decays over many tetrahedra on its way to a detector. Linear elements change its decay rate k by a share of
+(k h)²/24, with h the size of tetrahedra. In a ball of radius 80 mm where light decays over 4 mm, linear elements need
+edges of .6 mm between the light and a fibre 50 mm away for a reading to 1 %; quadratic ones need edges of 3 mm.
 
-They are hierarchical: the hat functions of the nodes, and a bubble ``4 lambda_i lambda_j`` on each edge. Edges of the
-boundary and of interfaces are bent onto the true surface, and with them the tetrahedra beside them.
+The basis is hierarchical: the hat functions of the nodes, and a bubble ``4 lambda_i lambda_j`` on each edge. Edges of
+the boundary and of interfaces are bent onto the true surface, and with them the tetrahedra that they belong to.
 
-    elements    the functions of one tetrahedron and of one triangle
-    space       the functions of a mesh, and how its edges are bent
-    assembly    the matrix
-    loads       what lights put on the functions
-    sight       what is read: points of the surface, or inside
-    operator    the matrix with its solver, and the dual solutions of what is read
-    solution    the fluence of lights, and what is read of it
-    roughness   what a function does not resolve
-    error       how far off a reading is, by its dual solution
+    elements            shape functions of one tetrahedron and of one triangle
+    space               the finite-element space of a mesh, with bent edges
+    assembly            the matrix, and integrals of shape functions
+    loads               the right-hand side of lights
+    measurement         weighted points at which the solution is read
+    operator            the matrix with its solver, and the dual solutions of measurements
+    solution            the fluence of lights, and measurements of it
+    recovered_gradient  the difference between averaged and own gradients (Zienkiewicz & Zhu 1987)
+    error               the error of a reading, by its dual solution
 """

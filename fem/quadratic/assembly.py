@@ -1,49 +1,57 @@
-"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of functions."""
+"""The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of loads."""
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.quadratic.elements import MASS, STIFFNESS, TETRAHEDRON, TRIANGLE, TRIANGLE_EDGES, derivatives, functions
+from tetlux.fem.quadratic.elements import (
+    REFERENCE_MASS,
+    REFERENCE_STIFFNESS,
+    TETRAHEDRON_RULE,
+    TRIANGLE_EDGES,
+    TRIANGLE_RULE,
+    shape_derivatives,
+    shape_functions,
+)
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
-# Curved tetrahedra that are integrated at once.
+# Number of curved tetrahedra that are integrated at once.
 BLOCK = 2048
 
 
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
-    """The matrix of a space, (size, size), symmetric, by its `element_matrices`."""
+    """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
-    escaping = coefficients.robin * face_matrices(space, faces)
-    return csr_array(_scattered(space.cells, elements, space.size) + _scattered(faces, escaping, space.size))
+    boundary_matrices = coefficients.robin * face_matrices(space, faces)
+    return csr_array(_assemble(space.cells, elements, space.size) + _assemble(faces, boundary_matrices, space.size))
 
 
-def _scattered(places: IntArray, values: FloatArray, size: int) -> csr_array:
-    """The sum of element matrices (m, c, c) at places (m, c)."""
-    count = places.shape[1]
-    rows = np.repeat(places.astype(np.int32), count, axis=1).ravel()
-    columns = np.tile(places.astype(np.int32), count).ravel()
+def _assemble(dofs: IntArray, values: FloatArray, size: int) -> csr_array:
+    """The sum of element matrices (m, c, c) by their DOF numbers (m, c)."""
+    count = dofs.shape[1]
+    rows = np.repeat(dofs.astype(np.int32), count, axis=1).ravel()
+    columns = np.tile(dofs.astype(np.int32), count).ravel()
     return csr_array(coo_array((values.ravel(), (rows, columns)), shape=(size, size)))
 
 
 def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> FloatArray:
-    """Matrices of the tetrahedra of a mesh, without its boundary, (m, 10, 10)."""
+    """Matrices of the tetrahedra of a mesh, without boundary terms, (m, 10, 10)."""
     mesh, curved = space.mesh, space.curved
     every = np.arange(len(mesh.tetrahedra))
     diffusion, sigma_a = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma_a))
     hats, volumes = mesh.hat_gradients, mesh.volumes
     products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
-    values = products @ STIFFNESS + (sigma_a * volumes)[:, None] * MASS
+    values = products @ REFERENCE_STIFFNESS + (sigma_a * volumes)[:, None] * REFERENCE_MASS
     values = values.reshape(-1, 10, 10)
 
     def integrate(block: slice) -> None:
         some = curved[block]
-        slopes, weights = gradients(space, some, TETRAHEDRON[0], TETRAHEDRON[1])
+        slopes, weights = gradients(space, some, TETRAHEDRON_RULE[0], TETRAHEDRON_RULE[1])
         own = np.einsum("cq,cqai,cqbi->cab", diffusion[some, None] * weights, slopes, slopes, optimize=True)
-        hats_there = functions(TETRAHEDRON[0])
-        pairs = (hats_there[:, :, None] * hats_there[:, None, :]).reshape(-1, 100)
+        shape_values = shape_functions(TETRAHEDRON_RULE[0])
+        pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 100)
         values[some] = own + ((sigma_a[some, None] * weights) @ pairs).reshape(-1, 10, 10)
 
     run_in_blocks(integrate, len(curved), BLOCK)
@@ -51,29 +59,29 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
 
 
 def gradients(
-    space: QuadraticSpace, cells: IntArray, places: FloatArray, weights: FloatArray
+    space: QuadraticSpace, cells: IntArray, barycentric: FloatArray, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gradients of the functions of tetrahedra, (c, q, 10, 3), and volumes, (c, q), at points of a rule (q,).
+    """Gradients of shape functions, (c, q, 10, 3), and volumes, (c, q), at quadrature points of tetrahedra.
 
-    The points are barycentric coordinates, (q, 4) for all tetrahedra or (c, q, 4) for each.
+    The barycentric coordinates of the points are (q, 4) for all tetrahedra or (c, q, 4) for each; weights are (q,).
     """
-    slopes = derivatives(places) @ space.mesh.hat_gradients[cells][:, None]
-    bending = space.bending(cells, places)
-    volumes = space.mesh.volumes[cells][:, None] * weights * np.linalg.det(bending)
-    return slopes @ np.linalg.inv(bending), volumes
+    slopes = shape_derivatives(barycentric) @ space.mesh.hat_gradients[cells][:, None]
+    jacobians = space.jacobians(cells, barycentric)
+    volumes = space.mesh.volumes[cells][:, None] * weights * np.linalg.det(jacobians)
+    return slopes @ np.linalg.inv(jacobians), volumes
 
 
 def face_matrices(space: QuadraticSpace, faces: IntArray) -> FloatArray:
-    """Integrals of products of the functions over triangles (f, 6), (f, 6, 6)."""
-    hats = functions(TRIANGLE[0], TRIANGLE_EDGES)
-    areas = TRIANGLE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE[0]), axis=2)
-    pairs = (hats[:, :, None] * hats[:, None, :]).reshape(-1, 36)
+    """Integrals of products of shape functions over triangles with DOF numbers (f, 6), (f, 6, 6)."""
+    shape_values = shape_functions(TRIANGLE_RULE[0], TRIANGLE_EDGES)
+    areas = TRIANGLE_RULE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE_RULE[0]), axis=2)
+    pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 36)
     return np.asarray((areas @ pairs).reshape(-1, 6, 6))
 
 
-def face_normals(space: QuadraticSpace, faces: IntArray, places: FloatArray) -> FloatArray:
-    """Normals of triangles (f, 6) at barycentric coordinates (q, 3), as long as their area, (f, q, 3)."""
-    slopes = np.einsum("qap,fai->fqpi", derivatives(places, TRIANGLE_EDGES), space.corners_and_bends(faces))
+def face_normals(space: QuadraticSpace, faces: IntArray, barycentric: FloatArray) -> FloatArray:
+    """Normals of triangles (f, 6) at barycentric coordinates (q, 3), with the area as length, (f, q, 3)."""
+    slopes = np.einsum("qap,fai->fqpi", shape_derivatives(barycentric, TRIANGLE_EDGES), space.corners_and_bends(faces))
     return np.asarray(0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0]))
 
 
@@ -84,8 +92,12 @@ def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     means[:, 4:] = 0.2
     values = (density * mesh.volumes)[:, None] * means
     curved = space.curved
-    volumes = mesh.volumes[curved][:, None] * TETRAHEDRON[1] * np.linalg.det(space.bending(curved, TETRAHEDRON[0]))
-    values[curved] = density[curved, None] * (volumes @ functions(TETRAHEDRON[0]))
+    volumes = (
+        mesh.volumes[curved][:, None]
+        * TETRAHEDRON_RULE[1]
+        * np.linalg.det(space.jacobians(curved, TETRAHEDRON_RULE[0]))
+    )
+    values[curved] = density[curved, None] * (volumes @ shape_functions(TETRAHEDRON_RULE[0]))
     return sum_by_index(space.cells, values, space.size)
 
 
@@ -93,6 +105,6 @@ def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
     """``∮ q v`` of densities q that are linear on boundary triangles, by their values at all nodes (n,), (size,)."""
     corners = space.mesh.boundary_faces
     faces = space.faces(corners)
-    areas = TRIANGLE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE[0]), axis=2)
-    values = (areas * (at_nodes[corners] @ TRIANGLE[0].T)) @ functions(TRIANGLE[0], TRIANGLE_EDGES)
+    areas = TRIANGLE_RULE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE_RULE[0]), axis=2)
+    values = (areas * (at_nodes[corners] @ TRIANGLE_RULE[0].T)) @ shape_functions(TRIANGLE_RULE[0], TRIANGLE_EDGES)
     return sum_by_index(faces, values, space.size)

@@ -1,7 +1,7 @@
-"""Hierarchical quadratic functions on one tetrahedron and on one triangle, and rules that integrate them.
+"""Hierarchical quadratic shape functions of one tetrahedron and of one triangle, and quadrature rules for them.
 
-The functions of a tetrahedron are its barycentric coordinates lambda_i, and ``4 lambda_i lambda_j`` for each of its
-edges, in the order of `TetMesh.tetrahedron_edges`; those of a triangle likewise, for the edges 01, 12 and 20.
+The shape functions of a tetrahedron are its barycentric coordinates lambda_i, and ``4 lambda_i lambda_j`` for each of
+its edges, in the order of `TetMesh.tetrahedron_edges`; those of a triangle likewise, for the edges 01, 12 and 20.
 """
 
 import numpy as np
@@ -12,18 +12,18 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.topology import EDGES
 
 TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
-# Exact for products of two quadratic functions.
+# Degree of the quadrature rules: exact for products of two quadratic functions.
 _DEGREE = 4
 
 
-def functions(weights: FloatArray, edges: IntArray = EDGES) -> FloatArray:
-    """Values of the functions (..., c + e) at barycentric coordinates (..., c)."""
+def shape_functions(weights: FloatArray, edges: IntArray = EDGES) -> FloatArray:
+    """Values of the shape functions (..., c + e) at barycentric coordinates (..., c)."""
     bubbles = 4.0 * weights[..., edges[:, 0]] * weights[..., edges[:, 1]]
     return np.concatenate([weights, bubbles], axis=-1)
 
 
-def derivatives(weights: FloatArray, edges: IntArray = EDGES) -> FloatArray:
-    """Derivatives of the functions by the barycentric coordinates, (..., c + e, c), at (..., c)."""
+def shape_derivatives(weights: FloatArray, edges: IntArray = EDGES) -> FloatArray:
+    """Derivatives of the shape functions by the barycentric coordinates, (..., c + e, c), at (..., c)."""
     corners = weights.shape[-1]
     found = np.zeros((*weights.shape[:-1], corners + len(edges), corners))
     found[..., np.arange(corners), np.arange(corners)] = 1.0
@@ -39,20 +39,21 @@ def _rule(element: type, degree: int) -> tuple[FloatArray, FloatArray]:
 
 
 # Barycentric coordinates (q, 4) or (q, 3) of points, and their weights (q,), which sum to 1.
-TETRAHEDRON = _rule(RefTet, _DEGREE)
-TRIANGLE = _rule(RefTri, _DEGREE)
+TETRAHEDRON_RULE = _rule(RefTet, _DEGREE)
+TRIANGLE_RULE = _rule(RefTri, _DEGREE)
 
 
 def _stiffness() -> FloatArray:
-    slopes = derivatives(TETRAHEDRON[0])
-    return np.asarray(np.einsum("q,qap,qbr->prab", TETRAHEDRON[1], slopes, slopes).reshape(16, 100))
+    slopes = shape_derivatives(TETRAHEDRON_RULE[0])
+    return np.asarray(np.einsum("q,qap,qbr->prab", TETRAHEDRON_RULE[1], slopes, slopes).reshape(16, 100))
 
 
 def _mass() -> FloatArray:
-    values = functions(TETRAHEDRON[0])
-    return np.asarray(np.einsum("q,qa,qb->ab", TETRAHEDRON[1], values, values).reshape(100))
+    values = shape_functions(TETRAHEDRON_RULE[0])
+    return np.asarray(np.einsum("q,qa,qb->ab", TETRAHEDRON_RULE[1], values, values).reshape(100))
 
 
-# From the products of the gradients of the barycentric coordinates, (m, 16), to integrals of products of gradients of
-# the functions over a straight tetrahedron of unit volume, (m, 100); and those of the products of functions, (100,).
-STIFFNESS, MASS = _stiffness(), _mass()
+# REFERENCE_STIFFNESS (16, 100) maps products of the gradients of the barycentric coordinates, (m, 16), to integrals of
+# products of the gradients of shape functions over a straight tetrahedron of unit volume, (m, 100). REFERENCE_MASS
+# (100,) are the integrals of products of shape functions over it.
+REFERENCE_STIFFNESS, REFERENCE_MASS = _stiffness(), _mass()

@@ -1,13 +1,13 @@
-"""The error of what is read, and the share of each tetrahedron in it.
+"""The error of a reading, and the contribution of each tetrahedron to it.
 
-A detector's reading is linear in the fluence, and a dual solution z, with the reading as its load, is the weight of a
-local error in it. With quadratic elements and their gradients averaged by R over nodes, in each tetrahedron K::
+A reading is linear in the fluence. The dual solution z, whose load is the reading, is the weight of a local residual in
+it. With R the average of gradients over the tetrahedra around a node, the contribution of a tetrahedron K is::
 
     eta_K = D ∫_K (grad phi_h - R grad phi_h) . (grad z_h - R grad z_h)
 
-These have either sign and cancel mostly, like the steps of a random walk, but not all: the error is
-``SIZE sqrt(sum eta_K² + (SUM sum eta_K)²)``.
-Points that lie off the mesh, where its bent facets miss the true surface, add what the fluence changes by on the way.
+Contributions have either sign and cancel mostly, like the steps of a random walk. The estimated error is
+``RANDOM_SCALE sqrt(sum eta_K² + (CORRELATED_WEIGHT sum eta_K)²)``. Where bent facets differ from the true surface, the
+change of the fluence over that distance is added.
 """
 
 from collections.abc import Sequence
@@ -16,35 +16,38 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import at_cells
-from tetlux.fem.quadratic.roughness import roughness
-from tetlux.fem.quadratic.sight import Sight
+from tetlux.fem.quadratic.measurement import Measurement
+from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
-# Calibrated so that the true error is within twice the bar for 95 % of readings (`tests.benchmarks.readings`).
-SIZE, SUM = 0.48, 0.4
-# The share of a reading that is always added: what gradients do not show, such as how far the surface is known.
-LEAST = 5e-4
-# A broad beam is one ray through the middle of each facet, where bubbles are 4/3 of their mean: this share of what they
-# get of the beam is in doubt.
-RAYS = 0.35
+# Factor of all contributions. With it the true error is at most twice the estimated error for 95 % of readings
+# (`tests.benchmarks.readings`).
+RANDOM_SCALE = 0.48
+# Weight of the sum of contributions, which do not cancel entirely, beside the root of their squares.
+CORRELATED_WEIGHT = 0.4
+# Relative error that is always added, for errors that gradients do not show, such as those of the surface itself.
+LEAST_RELATIVE_ERROR = 5e-4
+# Relative error of the load of broad beams on bubbles. A broad beam is one ray through the middle of each facet, where
+# bubbles are 4/3 of their mean.
+BEAM_RELATIVE_ERROR = 0.35
 
 
 @dataclass(frozen=True, eq=False)
 class ReadingError:
-    """A reading and its error.
+    """A reading and its estimated error.
 
     Attributes
     ----------
     value : float
         W/unit².
     squares : (m,) ndarray
-        Squares of what tetrahedra add to its error.
+        Squares of the contributions of tetrahedra to its error.
     sum : float
-        What they add together, by their signs, W/unit².
+        Weighted sum of the signed contributions, W/unit².
     rays : float
-        What rays in place of broad beams add, W/unit².
+        Contribution of rays in place of broad beams, W/unit².
     """
 
     value: float
@@ -54,7 +57,7 @@ class ReadingError:
 
     @staticmethod
     def add(parts: "Sequence[ReadingError]") -> "ReadingError":
-        """The reading of several lights together."""
+        """The reading of the sum of several lights."""
         return ReadingError(
             sum(part.value for part in parts),
             np.sum([part.squares for part in parts], axis=0),
@@ -65,38 +68,40 @@ class ReadingError:
     @property
     def error(self) -> float:
         """Estimated error, W/unit²."""
-        return float(np.sqrt(self.squares.sum() + self.sum**2 + self.rays**2 + (LEAST * self.value) ** 2))
+        return float(
+            np.sqrt(self.squares.sum() + self.sum**2 + self.rays**2 + (LEAST_RELATIVE_ERROR * self.value) ** 2)
+        )
 
     @property
     def relative(self) -> float:
-        """Estimated relative error; infinite if nothing is read."""
+        """Estimated relative error; infinite if the reading is 0."""
         return self.error / abs(self.value) if self.value else np.inf
 
     __repr__ = one_line
 
 
-def read_with_error(solution: QuadraticSolution, sight: Sight) -> ReadingError:
-    """What is read and how far it is off."""
+def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> ReadingError:
+    """The value of a measurement and its estimated error."""
     operator = solution.operator
     mesh, space = operator.mesh, operator.space
-    dual = operator.duals([sight])[0]
-    local = np.einsum("mij,mij->m", solution.unresolved, roughness(space, dual)) / 4.0
+    dual = operator.duals([measurement])[0]
+    local = np.einsum("mij,mij->m", solution.gradient_difference, recovered_gradient_difference(space, dual)) / 4.0
     local *= operator.coefficients.diffusion * mesh.volumes
-    value = solution.read(sight)
-    seen = operator.see(sight)
-    squares = (SIZE * local) ** 2
-    if not sight.inside:
-        # Along the normal fluence changes by itself over the extrapolation length.
-        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, seen.cells)
-        off = float(np.abs(sight.weights) @ (seen.away * steepness)) * abs(value)
-        squares[seen.cells[0]] += off**2
-    rays = RAYS * float(solution.broad_beams @ dual)
-    return ReadingError(value, squares, SIZE * SUM * float(local.sum()), rays)
+    value = solution.read(measurement)
+    discrete = operator.discretise(measurement)
+    squares = (RANDOM_SCALE * local) ** 2
+    if not measurement.inside:
+        # Along the normal the relative change of the fluence over the extrapolation length is 1.
+        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, discrete.cells)
+        off = float(np.abs(measurement.weights) @ (discrete.distances_from_mesh * steepness)) * abs(value)
+        squares[discrete.cells[0]] += off**2
+    rays = BEAM_RELATIVE_ERROR * float(solution.broad_beams @ dual)
+    return ReadingError(value, squares, RANDOM_SCALE * CORRELATED_WEIGHT * float(local.sum()), rays)
 
 
 def fluence_with_error(solution: QuadraticSolution, points: FloatArray) -> FloatArray:
     """Fluence at points (q, 3) inside the body, W/unit², and its relative error, (2, q)."""
-    sights = [Sight(point[None], np.ones(1), inside=True) for point in points]
-    solution.operator.duals(sights)
-    readings = [read_with_error(solution, sight) for sight in sights]
+    measurements = [Measurement(point[None], np.ones(1), inside=True) for point in points]
+    solution.operator.duals(measurements)
+    readings = [read_with_error(solution, measurement) for measurement in measurements]
     return np.array([[reading.value for reading in readings], [reading.relative for reading in readings]])

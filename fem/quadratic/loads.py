@@ -1,4 +1,4 @@
-"""What lights put on quadratic functions: the right-hand side as in `tetlux.fem.operators.loads`, for patches too."""
+"""The right-hand side of lights and patches for quadratic elements: see `tetlux.fem.operators.loads`."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
 from tetlux.fem.media.fresnel import moments
 from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
-from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, derivatives, functions
+from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.sources.segments import Segments
@@ -25,12 +25,13 @@ from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.topology import FACES
 
-# Gauss points along a beam in each tetrahedron.
-ALONG = np.polynomial.legendre.leggauss(4)
-# Quadrature rules for triangles, by their longest edge over the distance to the nearest charge; a triangle for which
-# that is above the last limit is cut in four, at most CUTS times.
-RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.2, 4), (0.6, 6), (2.0, 10)))
-CUTS = 12
+# Gauss rule along a beam in each tetrahedron.
+BEAM_RULE = np.polynomial.legendre.leggauss(4)
+# Quadrature rules for triangles, each up to a ratio of the longest edge to the distance of the nearest charge. A
+# triangle with a ratio above the last limit is cut in four.
+TRIANGLE_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.2, 4), (0.6, 6), (2.0, 10)))
+# A triangle is cut in four at most this often.
+MOST_CUTS = 12
 
 
 def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
@@ -48,21 +49,21 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: Sou
         load += surface_load(space, entering)
     if np.any(terms.emission):
         emitted = volume_load(space, np.broadcast_to(terms.emission, len(mesh.tetrahedra)))
-        # Its power is known for flat facets.
+        # The power of emission is that of the mesh with flat facets.
         load += emitted * float((mesh.volumes * terms.emission).sum()) / emitted[: len(mesh.points)].sum()
     return load
 
 
 def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -> FloatArray:
-    """Points in the tetrahedra that they lie in, or on the boundary that they are nearest to."""
+    """Load of points: in the tetrahedron that holds a point, or else on the nearest boundary triangle, (size,)."""
     mesh, load = space.mesh, np.zeros(space.size)
     cells, weights = mesh.locate(points)
     inside, outside = cells >= 0, np.flatnonzero(cells < 0)
-    values = powers[inside, None] * functions(weights[inside])
+    values = powers[inside, None] * shape_functions(weights[inside])
     load += sum_by_index(space.cells[cells[inside]], values, space.size)
     if len(outside):
         face, weights = space.on_boundary(points[outside])
-        values = powers[outside, None] * functions(weights, TRIANGLE_EDGES)
+        values = powers[outside, None] * shape_functions(weights, TRIANGLE_EDGES)
         load += sum_by_index(space.faces(mesh.boundary_faces[face]), values, space.size)
     return load
 
@@ -70,7 +71,10 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
 def line_load(
     space: QuadraticSpace, coefficients: Coefficients, segments: Segments
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fading beams, by Gauss points along them in every tetrahedron; stretches outside of all as points and powers."""
+    """Load of attenuated beams, (size,); points and powers of their parts outside the mesh.
+
+    The beams are integrated by Gauss points in every tetrahedron.
+    """
     mesh, load = space.mesh, np.zeros(space.size)
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
     for part in march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells):
@@ -80,14 +84,14 @@ def line_load(
         arriving = segments.fluxes[part.paths] * np.exp(-optical_depths(part, coefficients.extinction, cells))
         step, outside = part.leave - part.enter, part.cells < 0
         lost = np.zeros(len(step))
-        for node, weight in zip(0.5 * (1.0 + ALONG[0]), 0.5 * ALONG[1], strict=True):
+        for node, weight in zip(0.5 * (1.0 + BEAM_RULE[0]), 0.5 * BEAM_RULE[1], strict=True):
             at = node * step
-            left = arriving * scattering * weight * step * np.exp(-extinction * at)
-            lost += left
-            places = (part.weights + at[:, None] * part.slopes)[~outside]
-            hats = functions(places)
-            along = np.einsum("qap,qp->qa", derivatives(places), part.slopes[~outside])
-            values = left[~outside, None] * (hats + forward[~outside, None] * along)
+            scattered = arriving * scattering * weight * step * np.exp(-extinction * at)
+            lost += scattered
+            barycentric = (part.weights + at[:, None] * part.slopes)[~outside]
+            shape_values = shape_functions(barycentric)
+            along = np.einsum("qap,qp->qa", shape_derivatives(barycentric), part.slopes[~outside])
+            values = scattered[~outside, None] * (shape_values + forward[~outside, None] * along)
             load += sum_by_index(space.cells[part.cells[~outside]], values, space.size)
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
         points.append(segments.starts[paths] + middle[:, None] * segments.directions[paths])
@@ -102,92 +106,93 @@ class QuadraticPatch:
     Attributes
     ----------
     patch : Patch
-    guess : (size,) ndarray
+    interpolant : (size,) ndarray
         The quadratic interpolant of its charges' fluence.
     load : (size,) ndarray
-        What it adds to the load vector, W.
+        Contribution to the load vector, W.
     """
 
     patch: Patch
-    guess: FloatArray
+    interpolant: FloatArray
     load: FloatArray
 
     @property
     def is_fitted(self) -> bool:
-        """Whether its charges are fitted to the surface, and subtracted throughout."""
+        """Whether the charges are fitted to the surface, and subtracted in the whole body."""
         return isinstance(self.patch, FittedPatch)
 
 
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
-    """A patch with its load, as `tetlux.fem.known.patch_terms` has it for linear elements.
+    """A patch with its load, as in `tetlux.fem.known.patch_terms` for linear elements.
 
-    Across inner faces of the patch the fluence jumps by what the interpolant of the charges is off. Dual solutions feel
-    that jump by ``∮ (G - I G) D dz/dn``, which is added to the load, so that it does no harm to readings.
+    Across inner faces of the patch the fluence jumps by the interpolation error G - I G. The jump changes a reading by
+    ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change.
     """
     space, coefficients = operator.space, coefficients_of(patch.charges.medium)
     mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
         sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
         return QuadraticPatch(patch, np.zeros(space.size), quadratic_load(space, coefficients, sources))
-    guess = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
+    interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
     neighbours = mesh.neighbours[inside]
-    # At the boundary the index -1 reads the last tetrahedron; the first condition overrides what it says.
+    # At the boundary the index -1 reads the last tetrahedron; the first condition overrides that value.
     outer = np.flatnonzero((neighbours < 0) | ~patch.cells[neighbours])
     cell, face = np.divmod(outer, 4)
     corners, on_boundary = mesh.tetrahedra[inside[cell, None], FACES[face]], neighbours.reshape(-1)[outer] < 0
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
-    load = _product(operator.elements[inside], space.cells[inside], guess)
-    load += _product(coefficients.robin * face_matrices(space, leaving_faces), leaving_faces, guess)
+    load = _product(operator.elements[inside], space.cells[inside], interpolant)
+    load += _product(coefficients.robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
     value, flux = _integrals(space, faces, charges)
     leaving = flux + (coefficients.robin * on_boundary)[:, None] * value
     load -= sum_by_index(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():
-        load += _jump_load(space, charges, guess, inside[cell[within]], face[within])
-    return QuadraticPatch(patch, guess, load)
+        load += _jump_load(space, charges, interpolant, inside[cell[within]], face[within])
+    return QuadraticPatch(patch, interpolant, load)
 
 
-def _product(matrices: FloatArray, places: IntArray, function: FloatArray) -> FloatArray:
-    """Element matrices (c, k, k) at places (c, k) times a function (size,)."""
-    values = np.einsum("cab,cb->ca", matrices, function[places])
-    return sum_by_index(places, values, len(function))
+def _product(matrices: FloatArray, dofs: IntArray, function: FloatArray) -> FloatArray:
+    """Element matrices (c, k, k) with DOF numbers (c, k) times a function (size,), (size,)."""
+    values = np.einsum("cab,cb->ca", matrices, function[dofs])
+    return sum_by_index(dofs, values, len(function))
 
 
 def _jump_load(
-    space: QuadraticSpace, charges: Charges, guess: FloatArray, cells: IntArray, local: IntArray
+    space: QuadraticSpace, charges: Charges, interpolant: FloatArray, cells: IntArray, local: IntArray
 ) -> FloatArray:
-    """``∮ (G - I G) D dv/dn`` over faces of tetrahedra (f,), by the number of the opposite corner (f,), (size,)."""
-    nodes, weights = RULES[-1][1], RULES[-1][2]
+    """``∮ (G - I G) D dv/dn``, (size,), over faces of tetrahedra (f,) given by their opposite corners (f,)."""
+    nodes, weights = TRIANGLE_RULES[-1][1], TRIANGLE_RULES[-1][2]
     on_face = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]])
     corners = space.mesh.tetrahedra[cells[:, None], FACES[local]]
     faces = space.faces(corners)
-    hats = functions(on_face, TRIANGLE_EDGES)
-    points = hats @ space.corners_and_bends(faces)
-    off = charges.fluence(points.reshape(-1, 3)).reshape(len(cells), -1) - guess[faces] @ hats.T
+    shape_values = shape_functions(on_face, TRIANGLE_EDGES)
+    points = shape_values @ space.corners_and_bends(faces)
+    fluence = charges.fluence(points.reshape(-1, 3)).reshape(len(cells), -1)
+    jumps = fluence - interpolant[faces] @ shape_values.T
     normals = 2.0 * weights[:, None] * face_normals(space, faces, on_face)
-    places = np.zeros((len(cells), len(weights), 4))
+    barycentric = np.zeros((len(cells), len(weights), 4))
     for corner in range(3):
-        np.put_along_axis(places, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
-    slopes, _ = gradients(space, cells, places, weights)
-    values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", off, slopes, normals)
+        np.put_along_axis(barycentric, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
+    slopes, _ = gradients(space, cells, barycentric, weights)
+    values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", jumps, slopes, normals)
     return sum_by_index(space.cells[cells], values, space.size)
 
 
 def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
-    """Integrals over triangles (f, 6) of G and of ``D dG/dn`` against their functions, (f, 6) each."""
+    """Integrals over triangles (f, 6) of G and of ``D dG/dn`` times their shape functions, (f, 6) each."""
     shapes = space.corners_and_bends(faces)
     value, flux = np.zeros((len(faces), 6)), np.zeros((len(faces), 6))
     tree = cKDTree(charges.positions)
     # Triangles left to integrate: the face they belong to, and the barycentric coordinates of their corners in it.
     owner, place = np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3))
-    for cut in range(CUTS + 1):
-        part = functions(place, TRIANGLE_EDGES) @ shapes[owner]
+    for cut in range(MOST_CUTS + 1):
+        part = shape_functions(place, TRIANGLE_EDGES) @ shapes[owner]
         size = longest_sides(part)
         near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
         done = np.zeros(len(part), dtype=bool)
-        for limit, nodes, weights in RULES:
-            now = np.flatnonzero(~done & ((near < limit) | (limit == RULES[-1][0] and cut == CUTS)))
+        for limit, nodes, weights in TRIANGLE_RULES:
+            now = np.flatnonzero(~done & ((near < limit) | (limit == TRIANGLE_RULES[-1][0] and cut == MOST_CUTS)))
             done[now] = True
             if len(now):
                 where = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]]) @ place[now]
@@ -208,13 +213,16 @@ def _add_rule(
     weights: FloatArray,
     charges: Charges,
 ) -> None:
-    """Add integrals over parts of triangles, by points (p, q, 3) of a rule (q,) on them, to those of their owners."""
-    hats = functions(where, TRIANGLE_EDGES)
-    points = hats @ shapes
-    slopes = derivatives(where, TRIANGLE_EDGES).swapaxes(-1, -2) @ shapes[:, None]
+    """Add integrals over parts of triangles to those of their owners.
+
+    `where` are barycentric coordinates (p, q, 3) of quadrature points in the owners.
+    """
+    shape_values = shape_functions(where, TRIANGLE_EDGES)
+    points = shape_values @ shapes
+    slopes = shape_derivatives(where, TRIANGLE_EDGES).swapaxes(-1, -2) @ shapes[:, None]
     normals = weights[:, None] * 0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0])
     fluence, gradient = charges.fluence_and_gradient(points.reshape(-1, 3))
     through = charges.medium.diffusion * np.einsum("fqi,fqi->fq", gradient.reshape(points.shape), normals)
     amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)
-    np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, hats))
-    np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, hats))
+    np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, shape_values))
+    np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, shape_values))

@@ -1,4 +1,4 @@
-"""`QuadraticOperator`: the matrix of quadratic elements, its solver, and the dual solutions of what is read."""
+"""`QuadraticOperator`: the matrix of quadratic elements, its solver, and the dual solutions of measurements."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradient
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
-from tetlux.fem.quadratic.sight import Seen, Sight
+from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
@@ -21,13 +21,13 @@ from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Relative residual of solutions and of duals. A reading is corrected by what is left of the load, weighted by its dual,
-# so that it is off by about the product of the two.
-AIM = 1e-7
-# Columns that are iterated on side by side.
-GROUP = 4
-# Of how many loads a solver of the linear part should think, roughly.
-EXPECTED = 10
+# Relative residual at which the iteration stops, for solutions and duals. A reading is corrected by the residual of the
+# solution times the dual, so that its relative error is about the square of this.
+STOP_RESIDUAL = 1e-7
+# Number of right-hand sides that are iterated together.
+COLUMNS_PER_GROUP = 4
+# Number of right-hand sides for which the solver of the linear part is chosen.
+EXPECTED_RIGHT_HAND_SIDES = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +38,9 @@ class QuadraticOperator:
     ----------
     mesh : TetMesh
     surface : Surface
-        What the mesh stands for.
+        The true surface of the body.
     inner : sequence of Surface
-        Of its regions.
+        True surfaces of the regions.
     coefficients : Coefficients
     """
 
@@ -48,8 +48,8 @@ class QuadraticOperator:
     surface: Surface
     inner: Sequence[Surface]
     coefficients: Coefficients
-    _duals: dict[Sight, FloatArray] = field(default_factory=dict)
-    _seen: dict[Sight, Seen] = field(default_factory=dict)
+    _duals: dict[Measurement, FloatArray] = field(default_factory=dict)
+    _discretised: dict[Measurement, DiscreteMeasurement] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
@@ -57,7 +57,7 @@ class QuadraticOperator:
 
     @cached_property
     def space(self) -> QuadraticSpace:
-        """The functions."""
+        """The finite-element space."""
         return quadratic_space(self.mesh, self.surface, self.inner)
 
     @cached_property
@@ -78,11 +78,13 @@ class QuadraticOperator:
     def _precondition(self) -> Preconditioner:
         """A solver of the linear part, and the diagonal of the bubbles.
 
-        The two parts meet at an angle that is the same however fine the mesh is (Yserentant 1986): 50 iterations.
+        The condition number does not depend on the size of tetrahedra (Yserentant 1986): about 50 iterations.
         """
         nodes = len(self.mesh.points)
         assembly = Assembly(self.mesh)
-        linear = assembly.solver(self.coefficients, assembly.of(self.coefficients), EXPECTED).preconditioner
+        linear = assembly.solver(
+            self.coefficients, assembly.of(self.coefficients), EXPECTED_RIGHT_HAND_SIDES
+        ).preconditioner
         inverse = 1.0 / self.matrix.diagonal()[nodes:, None]
 
         def precondition(rest: FloatArray) -> FloatArray:
@@ -93,26 +95,29 @@ class QuadraticOperator:
     def solve(self, loads: FloatArray) -> FloatArray:
         """Solutions (size, k) for loads (size, k), to relative residuals of about 1e-7."""
         product, precondition = self._product, self._precondition
-        # In units in which the iteration stops at the aim.
-        size = np.sqrt(dots(loads, loads)) * AIM / krylov.AIM
+        # Loads are scaled so that the iteration stops at STOP_RESIDUAL.
+        size = np.sqrt(dots(loads, loads)) * STOP_RESIDUAL / krylov.AIM
         size[size == 0] = 1.0
         scaled = loads / size
-        groups = [np.ascontiguousarray(scaled[:, i : i + GROUP]) for i in range(0, loads.shape[1], GROUP)]
+        groups = [
+            np.ascontiguousarray(scaled[:, i : i + COLUMNS_PER_GROUP])
+            for i in range(0, loads.shape[1], COLUMNS_PER_GROUP)
+        ]
         found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 
-    def see(self, sight: Sight) -> Seen:
-        """A sight on the mesh."""
-        if sight not in self._seen:
-            self._seen[sight] = sight.on(self.space, self.coefficients)
-        return self._seen[sight]
+    def discretise(self, measurement: Measurement) -> DiscreteMeasurement:
+        """A measurement on the mesh; each is made once."""
+        if measurement not in self._discretised:
+            self._discretised[measurement] = measurement.discretise(self.space, self.coefficients)
+        return self._discretised[measurement]
 
-    def duals(self, sights: Sequence[Sight]) -> list[FloatArray]:
-        """Dual solutions (size,) of what is read; each is solved for once."""
-        new = [sight for sight in dict.fromkeys(sights) if sight not in self._duals]
+    def duals(self, measurements: Sequence[Measurement]) -> list[FloatArray]:
+        """Dual solutions (size,) of measurements; each is solved for once."""
+        new = [measurement for measurement in dict.fromkeys(measurements) if measurement not in self._duals]
         if new:
-            loads = np.column_stack([self.see(sight).load for sight in new])
+            loads = np.column_stack([self.discretise(measurement).load for measurement in new])
             self._duals.update(zip(new, self.solve(loads).T.copy(), strict=True))
-        return [self._duals[sight] for sight in sights]
+        return [self._duals[measurement] for measurement in measurements]
 
     __repr__ = one_line

@@ -1,4 +1,4 @@
-"""`QuadraticSpace`: the functions of a mesh, and how its edges are bent onto the surfaces that it stands for."""
+"""`QuadraticSpace`: the quadratic finite-element space of a mesh, with edges bent onto the true surfaces."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,32 +7,33 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem.quadratic.elements import TETRAHEDRON, TRIANGLE_EDGES, derivatives, functions
+from tetlux.fem.quadratic.elements import TETRAHEDRON_RULE, TRIANGLE_EDGES, shape_derivatives, shape_functions
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.regions import owners
+from tetlux.meshing.tets.regions import corner_groups, owners
 
-# Edges are bent by at most this share of their length: farther away a surface has no chord there.
-MOST_BENT = 0.2
-# Bends below this share of the body's diagonal are rounding.
-STRAIGHT = 1e-9
-# A tetrahedron keeps this share of its volume everywhere, or its edges stay straight.
-LEAST_SHARE = 0.25
-# Steps of Newton's method from a point to its place on a curved triangle.
-STEPS = 3
+# Largest bend of an edge, as a share of its length; a longer displacement means that the edge is no chord of the
+# surface.
+LARGEST_BEND = 0.2
+# Bends below this share of the body's diagonal are rounding errors.
+SMALLEST_BEND = 1e-9
+# Edges of a tetrahedron stay straight if bending leaves less than this share of its volume anywhere.
+LEAST_VOLUME_SHARE = 0.25
+# Steps of Newton's method for the barycentric coordinates of a point in a curved triangle or tetrahedron.
+NEWTON_STEPS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticSpace:
-    """The functions of a mesh: hats of its n nodes, then bubbles of its e edges.
+    """The basis functions of a mesh: hats of its n nodes, then bubbles of its e edges.
 
     Attributes
     ----------
     mesh : TetMesh
     bends : (e, 3) ndarray
-        How far the middle of each edge is from where it is on the straight edge, unit.
+        Displacement of the middle of each edge from the straight edge, unit.
     """
 
     mesh: TetMesh
@@ -40,12 +41,12 @@ class QuadraticSpace:
 
     @property
     def size(self) -> int:
-        """The number of functions."""
+        """Number of basis functions."""
         return len(self.mesh.points) + len(self.bends)
 
     @cached_property
     def cells(self) -> IntArray:
-        """The functions of each tetrahedron, (m, 10)."""
+        """DOF numbers of each tetrahedron, (m, 10)."""
         edges = self.mesh.tetrahedron_edges.astype(np.int64) + len(self.mesh.points)
         return np.hstack([self.mesh.tetrahedra, edges])
 
@@ -65,27 +66,27 @@ class QuadraticSpace:
         return np.asarray(self.mesh.points[self.mesh.edges].mean(axis=1) + self.bends)
 
     def faces(self, corners: IntArray) -> IntArray:
-        """The functions of triangles (f, 3) of nodes, (f, 6)."""
+        """DOF numbers of triangles given by nodes (f, 3), (f, 6)."""
         nodes = len(self.mesh.points)
         pairs = np.sort(corners[:, TRIANGLE_EDGES], axis=2)
         low, high = self.mesh.edges.T
         return np.hstack([corners, nodes + np.searchsorted(low * nodes + high, pairs[..., 0] * nodes + pairs[..., 1])])
 
-    def corners_and_bends(self, places: IntArray) -> FloatArray:
-        """Coordinates of nodes and bends of edges by the numbers of their functions (...), (..., 3)."""
-        return np.asarray(np.concatenate([self.mesh.points, self.bends])[places])
+    def corners_and_bends(self, dofs: IntArray) -> FloatArray:
+        """Coordinates of nodes and bends of edges by DOF numbers (...), (..., 3)."""
+        return np.asarray(np.concatenate([self.mesh.points, self.bends])[dofs])
 
     def interpolate(self, at_nodes: FloatArray, at_middles: FloatArray) -> FloatArray:
-        """The function of given values at nodes (n,) and at middles of edges (e,), (n + e,)."""
+        """The function with given values at nodes (n,) and at middles of edges (e,), (n + e,)."""
         return np.concatenate([at_nodes, at_middles - at_nodes[self.mesh.edges].mean(axis=1)])
 
     def on_boundary(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The boundary triangles nearest to points (q, 3), (q,), and the points' barycentric places there, (q, 3)."""
+        """The boundary triangles nearest to points (q, 3), (q,), and barycentric coordinates there, (q, 3)."""
         _, face, weights = self.mesh.closest_boundary(points)
         shapes = self.corners_and_bends(self.faces(self.mesh.boundary_faces[face]))
-        for _ in range(STEPS if self.bent.any() else 0):
-            off = points - np.einsum("qa,qai->qi", functions(weights, TRIANGLE_EDGES), shapes)
-            slopes = np.einsum("qap,qai->qpi", derivatives(weights, TRIANGLE_EDGES), shapes)
+        for _ in range(NEWTON_STEPS if self.bent.any() else 0):
+            off = points - np.einsum("qa,qai->qi", shape_functions(weights, TRIANGLE_EDGES), shapes)
+            slopes = np.einsum("qap,qai->qpi", shape_derivatives(weights, TRIANGLE_EDGES), shapes)
             tangents = slopes[:, 1:] - slopes[:, :1]
             gram = tangents @ tangents.transpose(0, 2, 1)
             step = np.linalg.solve(gram, np.einsum("qpi,qi->qp", tangents, off)[..., None])[..., 0]
@@ -93,7 +94,7 @@ class QuadraticSpace:
         return face, weights
 
     def within(self, points: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The tetrahedra that points (q, 3) of the body lie in or next to, (q,), and their places there, (q, 4)."""
+        """The tetrahedra that hold or adjoin points (q, 3) of the body, (q,), and barycentric coordinates, (q, 4)."""
         mesh = self.mesh
         cells, weights = mesh.locate(points)
         lost = np.flatnonzero(cells < 0)
@@ -101,31 +102,27 @@ class QuadraticSpace:
             cells[lost] = mesh.boundary_cells[mesh.closest_boundary(points[lost])[1]]
             weights[lost] = mesh.barycentric(points[lost], cells[lost])
         bends = self.bends[mesh.tetrahedron_edges[cells]]
-        for _ in range(STEPS if bends.any() else 0):
-            moved = np.einsum("qe,qei->qi", functions(weights)[:, 4:], bends)
-            weights = mesh.barycentric(points - moved, cells)
+        for _ in range(NEWTON_STEPS if bends.any() else 0):
+            displacements = np.einsum("qe,qei->qi", shape_functions(weights)[:, 4:], bends)
+            weights = mesh.barycentric(points - displacements, cells)
         return cells, weights
 
-    def bending(self, cells: IntArray, weights: FloatArray) -> FloatArray:
-        """How the maps of tetrahedra (c,) stretch at barycentric coordinates (q, 4) or (c, q, 4), (c, q, 3, 3)."""
+    def jacobians(self, cells: IntArray, weights: FloatArray) -> FloatArray:
+        """Jacobians of the maps that bend tetrahedra (c,), (c, q, 3, 3), at barycentric (q, 4) or (c, q, 4)."""
         mesh = self.mesh
-        slopes = derivatives(weights)[..., 4:, :] @ mesh.hat_gradients[cells][:, None]
+        slopes = shape_derivatives(weights)[..., 4:, :] @ mesh.hat_gradients[cells][:, None]
         return np.eye(3) + self.bends[mesh.tetrahedron_edges[cells]].transpose(0, 2, 1)[:, None] @ slopes
 
     @cached_property
-    def straightening(self) -> FloatArray:
-        """Inverses of `bending` at the corners of curved tetrahedra, (c, 4, 3, 3)."""
-        return np.asarray(np.linalg.inv(self.bending(self.curved, np.eye(4))))
+    def inverse_jacobians(self) -> FloatArray:
+        """Inverses of `jacobians` at the corners of curved tetrahedra, (c, 4, 3, 3)."""
+        return np.asarray(np.linalg.inv(self.jacobians(self.curved, np.eye(4))))
 
     @cached_property
-    def averaging(self) -> tuple[IntArray, csr_array]:
-        """Numbers of corners, the same at one node in one region, (m, 4), and the matrix of means by volume there."""
-        mesh, groups = self.mesh, self.mesh.tetrahedra
-        if mesh.regions.any():
-            first = int(mesh.regions.min())
-            keys = groups * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
-            groups = np.unique(keys, return_inverse=True)[1].reshape(keys.shape)
-        volumes = np.repeat(mesh.volumes, 4)
+    def nodal_averaging(self) -> tuple[IntArray, csr_array]:
+        """`corner_groups`, (m, 4), and the matrix of averages over each group, weighted by volume."""
+        groups = corner_groups(self.mesh)
+        volumes = np.repeat(self.mesh.volumes, 4)
         shares = volumes / np.bincount(groups.ravel(), volumes)[groups.ravel()]
         shape = (int(groups.max()) + 1, groups.size)
         return groups, csr_array((shares, (groups.ravel(), np.arange(groups.size))), shape=shape)
@@ -134,7 +131,7 @@ class QuadraticSpace:
 
 
 def quadratic_space(mesh: TetMesh, surface: Surface, inner: Sequence[Surface] = ()) -> QuadraticSpace:
-    """The functions of a mesh whose boundary and interfaces stand for given surfaces; made once for a mesh."""
+    """The space of a mesh with edges bent onto given surfaces; made once for a mesh."""
     return mesh.cache.get((QuadraticSpace, surface, tuple(inner)), lambda: _space(mesh, surface, inner))
 
 
@@ -151,25 +148,25 @@ def _space(mesh: TetMesh, surface: Surface, inner: Sequence[Surface]) -> Quadrat
         _bend(mesh, bends, np.unique(mesh.boundary_edges), surface)
     while True:
         space = QuadraticSpace(mesh, bends)
-        spoiled = _spoiled(space)
-        if len(spoiled) == 0:
+        inverted = _inverted_cells(space)
+        if len(inverted) == 0:
             return space
         bends = bends.copy()
-        bends[mesh.tetrahedron_edges[spoiled]] = 0.0
+        bends[mesh.tetrahedron_edges[inverted]] = 0.0
 
 
 def _bend(mesh: TetMesh, bends: FloatArray, edges: IntArray, surface: Surface) -> None:
-    """Bend edges onto a surface."""
+    """Bend edges onto a surface, in place."""
     straight = mesh.points[mesh.edges[edges]].mean(axis=1)
-    away = surface.project(straight)[0] - straight
-    length = np.linalg.norm(away, axis=1)
-    away[(length > MOST_BENT * mesh.edge_lengths[edges]) | (length < STRAIGHT * mesh.diagonal)] = 0.0
-    bends[edges] = away
+    displacements = surface.project(straight)[0] - straight
+    length = np.linalg.norm(displacements, axis=1)
+    displacements[(length > LARGEST_BEND * mesh.edge_lengths[edges]) | (length < SMALLEST_BEND * mesh.diagonal)] = 0.0
+    bends[edges] = displacements
 
 
-def _spoiled(space: QuadraticSpace) -> IntArray:
-    """The tetrahedra that are squeezed too much."""
-    corners = np.vstack([np.eye(4), TETRAHEDRON[0]])
+def _inverted_cells(space: QuadraticSpace) -> IntArray:
+    """The tetrahedra that bending inverts or compresses below `LEAST_VOLUME_SHARE`."""
+    corners = np.vstack([np.eye(4), TETRAHEDRON_RULE[0]])
     cells = space.curved
-    shares = np.linalg.det(space.bending(cells, corners)) if len(cells) else np.ones((0, 1))
-    return np.asarray(cells[shares.min(axis=1, initial=1.0) < LEAST_SHARE])
+    shares = np.linalg.det(space.jacobians(cells, corners)) if len(cells) else np.ones((0, 1))
+    return np.asarray(cells[shares.min(axis=1, initial=1.0) < LEAST_VOLUME_SHARE])

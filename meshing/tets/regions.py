@@ -37,6 +37,15 @@ def owners(pairs: IntArray, regions: Sequence[Surface]) -> IntArray:
     return np.asarray(np.where(rank[pairs[:, 0]] > rank[pairs[:, 1]], pairs[:, 0], pairs[:, 1]))
 
 
+def corner_groups(mesh: TetMesh) -> IntArray:
+    """Number of each corner of tetrahedra, the same for all corners at one node in one region, (m, 4)."""
+    if not mesh.regions.any():
+        return mesh.tetrahedra
+    first = int(mesh.regions.min())
+    keys = mesh.tetrahedra * (int(mesh.regions.max()) - first + 1) + (mesh.regions[:, None] - first)
+    return np.asarray(np.unique(keys, return_inverse=True)[1].reshape(keys.shape))
+
+
 def region_at(points: FloatArray, regions: Sequence[Surface]) -> IntArray:
     """The region of each point (q, 3) of a body, (q,)."""
     result = np.zeros(len(points), dtype=np.int64)

@@ -23,7 +23,7 @@ import numpy as np
 
 from tetlux.fem import Medium, PencilBeam, PointSource, Power, solve
 from tetlux.fem.body.body import Body
-from tetlux.fem.charges.adapt import Drive, FittedCharges, fit_charges
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.places import distance_from
@@ -32,7 +32,7 @@ from tetlux.fem.charges.samples import cells_of, draw
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.known.split import Subtract
-from tetlux.fem.meshless.solution import Entry, charge_solution
+from tetlux.fem.meshless.solution import LightLedger, charge_solution
 from tetlux.meshing import Surface, box, cylinder, read_surface, refine, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair.pipeline import surface_from_arrays
@@ -57,14 +57,14 @@ class Scene:
 
     def fit(self, charges: int) -> FittedCharges:
         """About so many charges."""
-        drive = Drive(self.source, np.ones((1, 1)), np.zeros(1))
-        return fit_charges(self.surface, equation_of(self.medium), drive, tolerance=0.0, most=charges)
+        lights = LightSources(self.source, np.ones((1, 1)), np.zeros(1))
+        return fit_charges(self.surface, equation_of(self.medium), lights, tolerance=0.0, most=charges)
 
     def truth_at(self, points: FloatArray, charges: int) -> tuple[FloatArray, float]:
         """The exitance at points (n, 3), and the bound of its error."""
         if self.radius is None:
             best = self.fit(charges)
-            return best.field.exitance(points)[:, 0], best.quality.bound
+            return best.field.exitance(points)[:, 0], best.errors.bound
         gamma = np.arctan2(np.hypot(points[:, 0], points[:, 1]), points[:, 2])
         depth = float(self.source[0, 2])
         return exact_sphere.point_exitance(self.medium, radius=self.radius, source_radius=depth, gamma=gamma), 0.0
@@ -164,7 +164,7 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
         started = time.process_time()
         fitted = scene.fit(charges)
         seconds.append(time.process_time() - started)
-    samples, quality = fitted.places.checked, fitted.quality
+    samples, errors = fitted.places.checked, fitted.errors
     exitance = fitted.field.exitance(samples.points)[:, 0]
     right, bound = scene.truth_at(samples.points, truth)
     size = norm(samples.areas, right)
@@ -178,16 +178,16 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
         str(len(fitted.places.charges)),
         f"{min(seconds):.2f}",
         f"{error:.4%}",
-        f"{quality.estimate:.4%}",
-        f"{quality.estimate / error:.2f}",
-        f"{quality.bound:.3%}",
-        f"{quality.bound / error:.1f}",
+        f"{errors.estimate:.4%}",
+        f"{errors.estimate / error:.2f}",
+        f"{errors.bound:.3%}",
+        f"{errors.bound / error:.1f}",
         f"{bound:.3%}",
         f"{median:.2%}",
         f"{(off[bright] / right[bright]).max():.1%}",
     ]
     text = "| " + " | ".join(columns) + " |"
-    return text, quality.estimate / error, quality.bound / error
+    return text, errors.estimate / error, errors.bound / error
 
 
 def fitted_rows(scene: Scene) -> Iterator[str]:
@@ -233,7 +233,7 @@ def head_rows() -> Iterator[str]:
     gamma = np.radians([0.0, 10.0, 20.0, 30.0, 45.0])
     points = radii[0] * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
     right = layered_ball.point_exitance(media[::-1], radii[::-1], source_radius=depth, gamma=gamma)
-    entry = Entry(Power(1.0, 0.0, 0.0, 0.0, 0.0))
+    entry = LightLedger(Power(1.0, 0.0, 0.0, 0.0, 0.0))
     for most in (700, 1050):
         started = time.process_time()
         solution = charge_solution(

@@ -1,4 +1,4 @@
-"""How much the gradient of a quadratic function jumps between tetrahedra, which shows what it does not resolve."""
+"""The difference between averaged and own gradients: an estimate of their error (Zienkiewicz & Zhu 1987)."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.topology import EDGES
 
 
-def roughness(space: QuadraticSpace, function: FloatArray) -> FloatArray:
+def recovered_gradient_difference(space: QuadraticSpace, function: FloatArray) -> FloatArray:
     """The averaged gradient less the gradient at the corners of each tetrahedron, (m, 4, 3), of a function (size,).
 
-    Gradients are averaged over the tetrahedra of one region around a node, weighted by volume; across an interface they
-    jump.
+    Gradients are averaged over the tetrahedra of one region around a node, weighted by volume. They are not averaged
+    across an interface, where they jump.
     """
     mesh = space.mesh
     values, hats = function[space.cells], mesh.hat_gradients
@@ -22,6 +22,6 @@ def roughness(space: QuadraticSpace, function: FloatArray) -> FloatArray:
         slopes[:, j] += steepness * hats[:, i]
     curved = space.curved
     if len(curved):
-        slopes[curved] = (slopes[curved, :, None] @ space.straightening)[:, :, 0]
-    groups, average = space.averaging
+        slopes[curved] = (slopes[curved, :, None] @ space.inverse_jacobians)[:, :, 0]
+    groups, average = space.nodal_averaging
     return np.asarray((average @ slopes.reshape(-1, 3))[groups] - slopes)
