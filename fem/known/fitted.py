@@ -37,6 +37,8 @@ SHALLOWEST = 1e-3
 MOST_SOURCES = 30
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
+# The power that flows out is corrected where less than this share of all is absorbed.
+LITTLE = 0.05
 # Charges are subtracted where they are off by at most this share of the exitance, on average over so many points of the
 # surface. On a hare the far half, five decades darker than the entry, is left to finite elements: charges are off by
 # once or twice the exitance there.
@@ -53,11 +55,14 @@ class Violation:
         The q points at which it is integrated; their `spacing` is that of charges, unit.
     exitance, residual : (q,) ndarray
         ``G/(2A)`` and ``D dG/dn + G/(2A)``, W/unit².
+    missed : float
+        What the sum of ``-D dG/dn`` over the points misses of its integral, W; 0 where that hardly matters.
     """
 
     points: Samples
     exitance: FloatArray
     residual: FloatArray
+    missed: float
 
     __repr__ = one_line
 
@@ -171,10 +176,22 @@ def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: S
         own = INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points = quadrature(surface, spacing)
-    fluence, flux = equation_of(charges.medium).traces(
-        points.points, points.normals, charges.positions, charges.strengths
-    )
-    exitance = 0.5 / charges.medium.boundary_factor * fluence
+    points, equation = quadrature(surface, spacing), equation_of(charges.medium)
+    fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
+    exitance = equation.robin * fluence
     apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return Violation(apart, exitance, flux + exitance)
+    return Violation(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+
+
+def _missed(charges: Charges, points: Samples, outflow: float) -> float:
+    """What a sum over points misses of the outflow of charges, of which they have that sum, W.
+
+    Without absorption all power of the sources flows out, so the sum for the same charges without absorption says how
+    far it is off. That matters where little is absorbed, which is what does not flow out.
+    """
+    power = float(charges.strengths[: charges.sources].sum())
+    if power - outflow > LITTLE * power:
+        return 0.0
+    equation = replace(equation_of(charges.medium), wave_number=0.0)
+    _, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
+    return outflow * (power / -float(points.areas @ flux) - 1.0)

@@ -149,7 +149,8 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> Pa
         leaving = areas @ violation.exitance
         through = areas @ (violation.residual - violation.exitance)
         return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
-    exited, inflow = float(areas @ violation.exitance), float(areas @ (violation.residual - violation.exitance))
+    exited = float(areas @ violation.exitance) + violation.missed
+    inflow = float(areas @ (violation.residual - violation.exitance)) - violation.missed
     robin = boundary_condition_of(charges.medium).robin
     at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
     # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.

@@ -118,6 +118,7 @@ class Solution:
     def exitance_on(self, queries: FloatArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         _, face, weights = self.mesh.closest_boundary(queries)
+        weights = np.maximum(weights, 0.0)  # rounding
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
