@@ -89,7 +89,7 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     assert validity["share_thin"] == 0.0
     # A cap of a height of 2 by 20 mean free paths, on a mesh that has some twenty facets there.
     assert validity["share_near_light"] == pytest.approx((2 / 10.1) ** 2 / 4, rel=0.3)
-    assert 0.2 < validity["least_valid"] < 0.5
+    assert 0.2 < validity["least_valid"] < 0.8
     assert 0.9 < validity["mean_valid"] < 0.99
     assert summary["versions"]["tetlux"]
 
