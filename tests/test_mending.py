@@ -198,9 +198,9 @@ def test_what_is_left_between_two_sides_is_refused() -> None:
     """Two slivers that share an edge: no surface that encloses a body."""
     corners = np.array([[0.0, 0, 0], [10, 0, 0.01], [10, 10, 0], [0, 10, 0.01]])
     sliver = np.array([[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]])
-    surface = surface_from_arrays(*together((corners, sliver), (corners + [10.0, 0.0, 0.0], sliver)))
+    surface = surface_from_arrays(*together((corners, sliver), (corners + np.array([10.0, 0.0, 0.0]), sliver)))
     assert surface.overlaps
-    with pytest.raises(InputError, match="touches itself: its two sides nearly cancel each other; .* export one side"):
+    with pytest.raises(InputError, match=r"touches itself: its two sides nearly cancel each other; .* export one side"):
         check_thickness(surface)
 
 
