@@ -181,17 +181,16 @@ def check_thickness(surface: Surface) -> None:
     thickness = 2.0 * surface.volume / surface.area
     if thickness >= THINNEST * surface.diagonal:
         return
-    share = (
-        f"{surface.name} is {thickness:.3g} {surface.unit} thick on average, {thickness / surface.diagonal:.1g} of its"
-    )
+    share = thickness / surface.diagonal
+    thin = f"{surface.name} is {thickness:.3g} {surface.unit} thick on average, {share:.1g} of its size, and"
     if surface.overlaps:
         raise InputError(
-            f"{share} size, and crosses or touches itself: its two sides nearly cancel each other; if it is a "
-            "two-sided export, export one side."
+            f"{thin} crosses or touches itself: its two sides nearly cancel each other; if it is a two-sided export, "
+            "export one side."
         )
     raise InputError(
-        f"{share} size, and below {THINNEST:g} tetrahedra that fit into it are too many; make it thicker, or take a "
-        "smaller piece of it."
+        f"{thin} below {THINNEST:g} tetrahedra that fit into it are too many; make it thicker, or take a smaller piece "
+        "of it."
     )
 
 
