@@ -24,9 +24,10 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
-from tetlux.fem.outcome.solution import Power, Solution
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint

@@ -11,12 +11,12 @@ from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
-from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
 from tetlux.fem.quadratic.error import ReadingError
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import Step
+from tetlux.fem.system import MeshSolution
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
@@ -25,16 +25,16 @@ from tetlux.meshing.tets.refine import refine_often
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
 # After this many seconds in the mesher a progress line appears.
-SLOW = 8.0
+PROGRESS_AFTER_SECONDS = 8.0
 
 Report = Callable[[str], None]
-# Solves for one scene on a mesh, given its number and its step on the mesh before, if there was one.
-SceneSolver = Callable[[int, Step | None], Step]
+# Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
+SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
 
 
 @dataclass(frozen=True, eq=False)
-class Aims:
-    """What a mesh is refined for.
+class Tolerances:
+    """What a mesh is refined for: wanted errors.
 
     Attributes
     ----------
@@ -42,55 +42,55 @@ class Aims:
         Wanted relative L2 error of the exitance.
     readings : float, optional
         Wanted relative error of what each detector reads.
-    views : tuple of PlacedDetector
+    placed : tuple of PlacedDetector
         The detectors.
     """
 
     exitance: float | None
     readings: float | None = None
-    views: tuple[PlacedDetector, ...] = ()
+    placed: tuple[PlacedDetector, ...] = ()
 
-    def assess(self, steps: Sequence[Step]) -> "Assessment":
-        """Say how far steps on one mesh are from the aims."""
+    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
+        """Compare the errors of solutions on one mesh with the tolerances."""
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
-        worst, words = 0.0, f"estimated error {error:.2%}"
+        largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
-            worst = error / self.exitance
+            largest_ratio = error / self.exitance
             splits += cells_to_split((step.estimate for step in steps), self.exitance)
         if self.readings is not None:
             readings = [reading for step in steps for reading in self._read(step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
-            worst = max(worst, of_readings / self.readings)
-            words += f", of readings {of_readings:.2%}"
+            largest_ratio = max(largest_ratio, of_readings / self.readings)
+            summary += f", of readings {of_readings:.2%}"
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
-        return Assessment(worst, splits, words)
+        return Assessment(largest_ratio, splits, summary)
 
-    def _read(self, step: Step) -> list[ReadingError]:
+    def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
         # All duals at once.
-        quadratic.operator.duals([view.measurement for view in self.views])
-        return [estimate_reading(step.solution, view.measurement) for view in self.views]
+        quadratic.operator.duals([placed.measurement for placed in self.placed])
+        return [estimate_reading(step.solution, placed.measurement) for placed in self.placed]
 
 
 @dataclass(frozen=True, eq=False)
 class Assessment:
-    """How far steps on one mesh are from what it is refined for.
+    """How far solutions on one mesh are from the tolerances.
 
     Attributes
     ----------
-    worst : float
-        The largest of their errors, by its tolerance.
+    largest_error_ratio : float
+        The largest ratio of an estimated error to its tolerance.
     splits : (m,) ndarray of int
         How often to split each tetrahedron.
-    words : str
-        Their errors in words.
+    summary : str
+        The errors, in a few words.
     """
 
-    worst: float
+    largest_error_ratio: float
     splits: IntArray
-    words: str
+    summary: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Problem:
         The body and the media of each scene.
     sources : list of Sources
         The lights of each scene.
-    mass : {"lumped", "consistent"}
+    lumping : {"lumped", "consistent"}
     limit : bool
         Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
     watch : Stopwatch
@@ -111,7 +111,7 @@ class Problem:
 
     scenes: Scenes
     sources: list[Sources]
-    mass: Mass
+    lumping: Lumping
     limit: bool
     watch: Stopwatch
 
@@ -129,28 +129,39 @@ class Problem:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
         assembly = Assembly(mesh)
         systems = {
-            media: self.scenes.system_on(mesh, media, self.mass, assembly, limit=self.limit)
+            media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
             for media in dict.fromkeys(self.media)
         }
-        return lambda scene, before: systems[self.media[scene]].step(self.sources[scene], self.watch, before)
+        return lambda scene, coarser: systems[self.media[scene]].step(self.sources[scene], self.watch, coarser)
 
 
-def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Report, *, cache: bool) -> TetMesh:
+def first_mesh(
+    problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
+) -> TetMesh:
     """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
         for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
-            deposits = [deposit for sources in problem.sources for deposit in sources.deposits_if(fitted=fitted)]
-            lit = places_to_resolve(deposits)
-            mesh = grade_mesh(mesh, scenes.surface, *lit, most_tetrahedra, longest=longest, inner=scenes.inner)
-        if aims.readings is not None:
-            seen = np.array([view.position for view in aims.views])
-            every, _ = places_to_resolve([deposit for sources in problem.sources for deposit in sources.deposits])
+            deposits = [each for sources in problem.sources for each in sources.deposits_if(fitted=fitted)]
+            source_points = places_to_resolve(deposits)
+            mesh = grade_mesh(
+                mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
+            )
+        if tolerances.readings is not None:
+            detector_points = np.array([placed.position for placed in tolerances.placed])
+            all_points, _ = places_to_resolve([each for sources in problem.sources for each in sources.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
-                    mesh, scenes.surface, scenes.inner, media, every, seen, aims.readings, most_tetrahedra
+                    mesh,
+                    scenes.surface,
+                    scenes.inner,
+                    media,
+                    all_points,
+                    detector_points,
+                    tolerances.readings,
+                    most_tetrahedra,
                 )
     report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
@@ -160,7 +171,7 @@ def first_mesh(problem: Problem, aims: Aims, most_tetrahedra: int, report: Repor
 def _report_if_slow(report: Report) -> Iterator[None]:
     """Report once that the mesher is still running, if it takes long."""
     words = f"still tetrahedralizing: thin parts and small regions take long; given up after {TIME_LIMIT:g} s"
-    timer = Timer(SLOW, report, [words])
+    timer = Timer(PROGRESS_AFTER_SECONDS, report, [words])
     timer.daemon = True
     timer.start()
     try:
@@ -169,37 +180,39 @@ def _report_if_slow(report: Report) -> Iterator[None]:
         timer.cancel()
 
 
-def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedra: int, report: Report) -> list[Step]:
-    """Solve for all scenes on one mesh, refined until each meets its aims or the mesh is as large as it may be.
+def solve_and_refine(
+    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
+) -> list[MeshSolution]:
+    """Solve for all scenes on one mesh, refined until each is within the tolerances or the mesh as large as it may be.
 
     Parameters
     ----------
     mesh : TetMesh
-        To begin with.
+        The first one.
     problem : Problem
-    aims : Aims
+    tolerances : Tolerances
     most_tetrahedra : int
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
-        Called with a line of text as each mesh is solved on.
+        Called with a line of text for each mesh.
 
     Returns
     -------
-    list of Step
+    list of MeshSolution
         One for each scene, all on the same mesh.
     """
-    # The scene of the shortest mean free path needs the finest mesh: the others are solved for when that is found.
+    # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
     bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     solve_on = problem.solver_on(mesh)
-    steps = best = {first: solve_on(first, None)}
-    least = np.inf
+    steps = best_steps = {first: solve_on(first, None)}
+    least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = aims.assess(list(steps.values()))
-        if found.worst < least:
-            best, least = steps, found.worst
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.words}")
+            found = tolerances.assess(list(steps.values()))
+        if found.largest_error_ratio < least_ratio:
+            best_steps, least_ratio = steps, found.largest_error_ratio
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
         fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
@@ -211,7 +224,7 @@ def solve_and_refine(mesh: TetMesh, problem: Problem, aims: Aims, most_tetrahedr
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
-            chosen = steps if fine_enough else best
+            chosen = steps if fine_enough else best_steps
             return [chosen[scene] for scene in range(len(bodies))]
-        steps = best = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
-        pending, least = [], np.inf
+        steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
+        pending, least_ratio = [], np.inf

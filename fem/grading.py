@@ -14,15 +14,15 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
-# Between light and detectors, edges are no longer than this times the length over which fluence fades to 1/e, for a
-# tolerance of .01: the error of quadratic elements goes with its fourth power. Off the straight way light gets fainter
-# by e^{-k excess}, with what its way is longer, and edges may be longer by the root of that.
+# Longest edge between sources and detectors for a tolerance of .01, in lengths over which fluence fades to 1/e. The
+# error of quadratic elements is proportional to its fourth power. A path that is longer than the straight one by an
+# excess carries e^{-k excess} of the light; edges there may be longer by the fourth root of that.
 FADING, AT_TOLERANCE = 1.5, 0.01
-# Near a detector, where its dual solution is steep, edges are shorter by the first factor; from the second of these
-# distances on, in lengths of fading, they are as long as elsewhere.
+# At a detector, where its dual solution is steep, edges are shorter by AT_DETECTOR; the factor grows to 1 at the
+# distance NEAR_DETECTOR, in lengths over which fluence fades to 1/e.
 AT_DETECTOR, NEAR_DETECTOR = 0.4, 2.0
-# So many lit points are looked at.
-MOST_LIT = 32
+# If there are more source points than this, every second, third, ... is taken.
+MOST_SOURCE_POINTS = 32
 # Longest edge of a tetrahedron on the first mesh, relative to its distance from the nearest source, or to the length
 # to resolve there if that is larger. The error then is some per cent, and its estimate good to a factor of three.
 LONGEST_EDGE = 1.0
@@ -109,8 +109,8 @@ def grade_between(
     surface: Surface,
     inner: Sequence[Surface],
     media: Sequence[AnyMedium],
-    lit: FloatArray,
-    seen: FloatArray,
+    source_points: FloatArray,
+    detector_points: FloatArray,
     tolerance: float,
     most: int,
 ) -> TetMesh:
@@ -125,7 +125,7 @@ def grade_between(
         Those of the mesh's regions.
     media : sequence of medium
         Of the body and of its regions.
-    lit, seen : (s, 3), (d, 3) ndarray
+    source_points, detector_points : (s, 3), (d, 3) ndarray
         Where light is deposited, and where it is read.
     tolerance : float
         Of readings.
@@ -136,13 +136,13 @@ def grade_between(
     -------
     TetMesh
     """
-    some = lit[:: -(-len(lit) // MOST_LIT)] if len(lit) else lit
-    lengths = cdist(some, seen)
+    some = source_points[:: max(1, -(-len(source_points) // MOST_SOURCE_POINTS))]
+    lengths = cdist(some, detector_points)
     while len(some):
         coefficients = coefficients_on(mesh, media)
         decay = np.broadcast_to(np.sqrt(coefficients.sigma_a / coefficients.diffusion), len(mesh.tetrahedra))
         middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-        from_light, to_detector = cdist(middles, some), cdist(middles, seen)
+        from_light, to_detector = cdist(middles, some), cdist(middles, detector_points)
         excess = np.full(len(middles), np.inf)
         for light, length in enumerate(lengths):
             excess = np.minimum(excess, (from_light[:, [light]] + to_detector - length).min(axis=1))

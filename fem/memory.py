@@ -4,12 +4,13 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from tetlux.meshing.errors import RunError
 
-# Bytes. Measured as the growth of a process's peak memory while it solves and estimates the error, less IMPORTED; kB
-# for each tetrahedron, and in the last column what `estimate_memory` gives:
+# Measured: growth of the peak memory of a process while it solves and estimates the error, less BYTES_OF_IMPORTS, in kB
+# for each tetrahedron; the last column is what `estimate_memory` gives:
 #
 #   a given mesh, by its tetrahedra        48k    413k  1,296k  estimate
 #   a point source                         .43     .92     .77   1.02
@@ -27,12 +28,11 @@ from tetlux.meshing.errors import RunError
 #   eight point sources, 238k                     1.54           1.76
 #
 # Refinement holds two meshes at a time, and makes a third one that may turn out to be too large.
-IMPORTED = 80e6
-GIVEN, REFINED = 1000.0, 1600.0
-# Bytes a tetrahedron for each further medium (its matrix and solver), and for each light (its fluence and patch).
-MATRIX, LIGHT = 120.0, 20.0
-# Bytes a tetrahedron for quadratic elements, where detectors are read (74,000 tetrahedra).
-READING = 3750.0
+BYTES_OF_IMPORTS = 80e6
+BYTES_PER_TETRAHEDRON_GIVEN, BYTES_PER_TETRAHEDRON_REFINED = 1000.0, 1600.0
+# For each tetrahedron: of a further medium (its matrix and solver), of a light (its fluence and patch), and of
+# quadratic elements, where detectors are read (measured on 74,000 tetrahedra).
+BYTES_PER_MATRIX, BYTES_PER_LIGHT, BYTES_OF_READINGS = 120.0, 20.0, 3750.0
 
 
 def estimate_memory(
@@ -56,12 +56,14 @@ def estimate_memory(
     -------
     float
     """
-    return IMPORTED + tetrahedra * _bytes_per_tetrahedron(matrices, lights, refined=refined, reading=reading)
+    return BYTES_OF_IMPORTS + tetrahedra * _bytes_per_tetrahedron(matrices, lights, refined=refined, reading=reading)
 
 
 def _bytes_per_tetrahedron(matrices: int, lights: int, *, refined: bool, reading: bool) -> float:
-    of_readings = READING if reading else 0.0
-    return (REFINED if refined else GIVEN) + MATRIX * (matrices - 1) + LIGHT * lights + of_readings
+    """Bytes that each tetrahedron takes."""
+    of_mesh = BYTES_PER_TETRAHEDRON_REFINED if refined else BYTES_PER_TETRAHEDRON_GIVEN
+    of_readings = BYTES_OF_READINGS if reading else 0.0
+    return of_mesh + BYTES_PER_MATRIX * (matrices - 1) + BYTES_PER_LIGHT * lights + of_readings
 
 
 def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> None:
@@ -79,13 +81,27 @@ def check_memory(tetrahedra: int, matrices: int = 1, lights: int = 1, *, reading
         )
 
 
-def affordable_tetrahedra(most: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> tuple[int, str]:
-    """How many tetrahedra a mesh may be refined to, at most `most`, and a clause that says what sets the limit."""
+@dataclass(frozen=True)
+class MeshLimit:
+    """How many tetrahedra a mesh may be refined to.
+
+    Attributes
+    ----------
+    tetrahedra : int
+    memory : float or None
+        Available memory, bytes, if that sets the limit.
+    """
+
+    tetrahedra: int
+    memory: float | None = None
+
+
+def limit_by_memory(most: int, matrices: int = 1, lights: int = 1, *, reading: bool = False) -> MeshLimit:
+    """The number of tetrahedra that memory suffices for, at most `most`; see `estimate_memory`."""
     free = available()
-    affordable = max(0.0, free - IMPORTED) / _bytes_per_tetrahedron(matrices, lights, refined=True, reading=reading)
-    if affordable >= most:
-        return most, f"at the limit of {most:,} tetrahedra"
-    return int(affordable), f"at the {affordable:,.0f} tetrahedra that {gigabytes(free)} GB of memory suffice for"
+    each = _bytes_per_tetrahedron(matrices, lights, refined=True, reading=reading)
+    affordable = max(0.0, free - BYTES_OF_IMPORTS) / each
+    return MeshLimit(most) if affordable >= most else MeshLimit(round(affordable), free)
 
 
 def gigabytes(memory: float) -> str:

@@ -8,7 +8,7 @@ from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labels import GivenMedia, check_single_label, resolve_media, warnings_for_cavities, warnings_for_labels
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
-from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.system import System
 from tetlux.fem.validity.notes import check_media, warnings_for_regions
@@ -50,15 +50,15 @@ class Scenes:
     mesh_is_body: bool
 
     def system_on(
-        self, mesh: TetMesh, media: tuple[AnyMedium, ...], mass: Mass, assembly: Assembly, *, limit: bool
+        self, mesh: TetMesh, media: tuple[AnyMedium, ...], lumping: Lumping, assembly: Assembly, *, limit: bool
     ) -> System:
         """Assemble the system of one set of media on a mesh."""
         expected = self.media.count(media)
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
-            return System(mesh, by_label, self.surface, mass, expected, (), assembly, limit)
+            return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit)
         regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
-        return System(mesh, media[0], self.surface, mass, expected, regions, assembly, limit)
+        return System(mesh, media[0], self.surface, lumping, expected, regions, assembly, limit)
 
     def warnings(self, number: int, solution: Solution, *, given: bool) -> list[str]:
         """Notes on the regions or labels of scene `number`, and on the mesh if the user gave it."""

@@ -1,6 +1,6 @@
 """`solve`: the public function that solves for the light in a body."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Literal, overload
 
@@ -11,15 +11,17 @@ from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detectors import Detector, read_all
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import media_by_channel
-from tetlux.fem.solve_scenes import solve_each
+from tetlux.fem.solve_scenes import Report, no_report, solve_each
 from tetlux.fem.sources.light import Light
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+__all__ = ["solve", "solve_each"]
 
 
 @overload
@@ -33,12 +35,12 @@ def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of
     detectors: Sequence[Detector] = ...,
     detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
-    mass: Mass = ...,
+    mass: Lumping = ...,
     subtract: Subtract = ...,
     limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
-    report: Callable[[str], None] = ...,
+    report: Report = ...,
     model: Literal["full"] = ...,
 ) -> Solution: ...
 
@@ -54,25 +56,26 @@ def solve(
     detectors: Sequence[Detector] = ...,
     detector_tolerance: float | None = ...,
     mesh: TetMesh | None = ...,
-    mass: Mass = ...,
+    mass: Lumping = ...,
     subtract: Subtract = ...,
     limit: bool = ...,
     most_tetrahedra: int = ...,
     cache: bool = ...,
-    report: Callable[[str], None] = ...,
+    report: Report = ...,
     model: Literal["full"] = ...,
 ) -> list[Solution]: ...
 
 
 @overload
 def solve(
-    body: Surface | TetMesh,
-    medium: AnyMedium | Sequence[AnyMedium],
+    body: Surface,
+    medium: AnyMedium,
     lights: Sequence[Light],
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
     tolerance: float = ...,
+    detectors: Sequence[Detector] = ...,
 ) -> ChargeSolution: ...
 
 
@@ -86,12 +89,12 @@ def solve(
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
-    mass: Mass = "lumped",
+    mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = no_report,
     model: Literal["full", "charges"] = "full",
 ) -> Solution | list[Solution] | ChargeSolution:
     """Solve the diffusion approximation for the light in a body.
@@ -120,13 +123,14 @@ def solve(
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
-        Quadrature of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
+        Quadrature of the terms without derivatives, which are mass matrices of the volume and of the boundary: see
+        `tetlux.fem.operators.assembly.system_matrix`.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
         What is subtracted from the fluence of point sources before finite elements solve for the rest, see
         `tetlux.fem.known`. "fitted" is charges fitted to the surface, for points and beams that are points, where the
-        body is a `Surface` of one even medium; other light, and light for which they would not do, has "half-space".
-        Places of charges are kept with the mesh of a solution: solved on it again as `mesh`, the exitance depends
-        smoothly on the medium.
+        body is a `Surface` of one homogeneous medium; for other light, and where no fit is good enough, it is
+        "half-space". The positions of the charges are kept with the mesh of a solution; solved on it again, given as
+        `mesh`, the exitance depends smoothly on the medium.
     limit : bool
         Whether the fluence is limited to be nonnegative where lumping alone does not make it so, see
         `tetlux.fem.operators.limiter`.
@@ -138,9 +142,10 @@ def solve(
     report : callable
         Called with a line of text as each stage ends.
     model : {"full", "charges"}
-        "full" solves by finite elements. "charges" fits screened charges outside the body to its boundary condition
-        and makes no mesh, see `tetlux.fem.charges`; it takes points, beams that are points, and diffuse light, in
-        uniform media, and of the other arguments only `regions` and `tolerance`.
+        The method: both solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
+        charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
+        beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
+        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest.
 
     Returns
     -------
@@ -174,8 +179,19 @@ def solve(
     if model not in ("full", "charges"):
         raise InputError(f'model is "{model}"; give "full" or "charges".')
     if model == "charges":
-        if tolerance is None:
-            raise InputError('model "charges" needs a tolerance of the exitance; give one.')
+        _check_options_of_charges(
+            tolerance,
+            {
+                "detector_tolerance": detector_tolerance is not None,
+                "mass": mass != "lumped",
+                "subtract": subtract != "fitted",
+                "limit": not limit,
+                "most_tetrahedra": most_tetrahedra != MOST_TETRAHEDRA,
+                "cache": not cache,
+                "report": report is not no_report,
+            },
+        )
+        assert tolerance is not None
         found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
         return replace(found, readings=read_all(detectors, found))
     channels, several = media_by_channel(body, mesh, medium)
@@ -196,3 +212,20 @@ def solve(
         report=report,
     )
     return solutions if several else solutions[0]
+
+
+def _check_options_of_charges(tolerance: float | None, given: Mapping[str, bool]) -> None:
+    """Refuse arguments that are for finite elements alone; `given` says of each whether it was changed.
+
+    Raises
+    ------
+    InputError
+    """
+    if tolerance is None:
+        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
+    names = [name for name, changed in given.items() if changed]
+    if names:
+        raise InputError(
+            f'model "charges" does not take {" and ".join(names)}; leave out what it does not take, or give '
+            'model="full".'
+        )

@@ -3,16 +3,16 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Aims, Problem, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
 from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
-from tetlux.fem.memory import affordable_tetrahedra, check_memory
+from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
 from tetlux.fem.notes import notes_on, notes_on_readings
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA as MOST_TO_READ
 from tetlux.fem.outcome.detectors import Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
@@ -23,6 +23,12 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+Report = Callable[[str], None]
+
+
+def no_report(_: str) -> None:
+    """Print no progress."""
 
 
 def solve_each(
@@ -35,12 +41,12 @@ def solve_each(
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
-    mass: Mass = "lumped",
+    mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = no_report,
 ) -> list[Solution]:
     """Solve for several scenes of one body on one mesh that is fine enough for each of them.
 
@@ -64,8 +70,8 @@ def solve_each(
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
         Quadrature of the terms without derivatives.
-    subtract : {"half-space", "free-space", "nothing"}
-        The closed form that is subtracted from the fluence of point sources.
+    subtract : {"fitted", "half-space", "free-space", "nothing"}
+        What is subtracted from the fluence of point sources, see `solve`.
     limit : bool
         Whether the fluence is limited to be nonnegative.
     most_tetrahedra : int
@@ -119,18 +125,19 @@ def solve_each(
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        aims = Aims(tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors))
+        placed = tuple(place_detector(detector, dark) for detector in detectors)
+        tolerances = Tolerances(tolerance, detector_tolerance, placed)
     if detector_tolerance is not None:
         most_tetrahedra = min(most_tetrahedra, MOST_TO_READ)
     problem = Problem(checked, sources, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
-    most_tetrahedra, where = affordable_tetrahedra(most_tetrahedra, *problem.size, reading=reading)
+    limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
-        mesh = first_mesh(problem, aims, most_tetrahedra, report, cache=cache)
+        mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
-    steps = solve_and_refine(mesh, problem, aims, 0 if given else most_tetrahedra, report)
+    steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
     keep_with(steps[0].solution.mesh, kept)
-    where = "on the mesh given" if given else where
+    where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
@@ -141,6 +148,13 @@ def solve_each(
         solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def _in_words(limit: MeshLimit) -> str:
+    """A clause that says where refinement stopped."""
+    if limit.memory is None:
+        return f"at the limit of {limit.tetrahedra:,} tetrahedra"
+    return f"at the {limit.tetrahedra:,} tetrahedra that {gigabytes(limit.memory)} GB of memory suffice for"
 
 
 def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:

@@ -1,6 +1,6 @@
-"""`System`: the diffusion equation on one mesh, assembled once and solved for as many lights as wanted."""
+"""`System`: one model on one mesh, assembled once and solved for as many lights as wanted."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,37 +17,37 @@ from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.models.diffusion import Diffusion
+from tetlux.fem.models.diffusion import Diffusion, is_steady_diffusion
 from tetlux.fem.models.model import Model
-from tetlux.fem.operators.assembly import Assembly, Mass
+from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.operators.fitting import fitting_of
 from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
-from tetlux.fem.outcome.of_light import solution_of_light
+from tetlux.fem.outcome.of_light import attach_quadratic, solution_of_light
 from tetlux.fem.outcome.solution import Solution, sum_solutions
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.validity.local import Validity
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, NumberArray
 from tetlux.meshing.describe import count, one_line
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import own_volumes
 
-# A light needs its own, once more where its patch shrinks, and two to estimate the error.
-LOADS_OF_A_LIGHT = 4
+# For each light: its load, one more if its patch shrinks, and two dual loads to estimate the error.
+RIGHT_HAND_SIDES_PER_LIGHT = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
-    """A solution on one mesh, its error, and at which nodes each of its charges is a good guess."""
+class MeshSolution:
+    """The solution on one mesh, its estimated error, and the nodes (n,) at which each patch of charges is accurate."""
 
     solution: Solution
     estimate: Estimate
-    good: tuple[BoolArray, ...]
+    accurate_nodes: tuple[BoolArray, ...]
 
     __repr__ = one_line
 
@@ -66,24 +66,28 @@ class System:
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     expected : int
-        How many lights are to be solved for, roughly: for many it pays to factorise the matrix.
+        How many lights there will be, roughly: for many it pays to factorise the matrix.
     regions : tuple of Region
         The mesh's regions 1, 2, ..., each with one medium.
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     limit : bool
-        Whether the fluence is kept from going below zero, see `tetlux.fem.operators.limiter`; not under a light for
-        which the diffusion equation itself does.
+        Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`, except under a light for
+        which the equation itself has a negative fluence.
+    model_of : callable
+        Makes the model of the coefficients. A model other than `Diffusion` of steady light is solved for by `solve`
+        with ``subtract="nothing"``, without an estimate of its error and without readings by quadratic elements.
     """
 
     mesh: TetMesh
     medium: AnyMedium | MediaByLabel
     surface: Surface | None = None
-    mass: Mass = "lumped"
+    mass: Lumping = "lumped"
     expected: int = 1
     regions: tuple[Region, ...] = ()
     assembly: Assembly | None = None
     limit: bool = True
+    model_of: Callable[[Coefficients], Model] = Diffusion
 
     @property
     def media(self) -> MediaByLabel | tuple[AnyMedium, ...]:
@@ -100,7 +104,7 @@ class System:
     @cached_property
     def model(self) -> Model:
         """The equation that is solved."""
-        return Diffusion(self.coefficients)
+        return self.model_of(self.coefficients)
 
     @property
     def true_surface(self) -> Surface:
@@ -110,19 +114,20 @@ class System:
     @cached_property
     def plain(self) -> Operator:
         """The operator for points and beams."""
-        return operator_of(self._assembly, self.model, self.mass, self._loads_expected)
+        return operator_of(self._assembly, self.model, self.mass, self._expected_right_hand_sides)
 
     @cached_property
-    def fitted(self) -> Operator:
-        """The operator for diffuse and emitted light: layers along the boundary are fitted where the mesh is coarse."""
-        fitting = fitting_of(self.mesh, self.coefficients) if self.mass == "lumped" else None
+    def layer_operator(self) -> Operator:
+        """The operator for diffuse and emitted light: on coarse meshes its coefficients fit layers at the boundary."""
+        fits = self.mass == "lumped" and is_steady_diffusion(self.model)
+        fitting = fitting_of(self.mesh, self.coefficients) if fits else None
         if fitting is None:
             return self.plain
-        return operator_of(self._assembly, self.model, self.mass, self._loads_expected, fitting)
+        return operator_of(self._assembly, self.model, self.mass, self._expected_right_hand_sides, fitting)
 
     @cached_property
     def quadratic(self) -> QuadraticOperator:
-        """The operator that detectors are read by."""
+        """The operator that detectors are read by, of steady diffusion."""
         inner = tuple(region.surface for region in self.regions)
         return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
 
@@ -130,9 +135,13 @@ class System:
     def _assembly(self) -> Assembly:
         return self.assembly or Assembly(self.mesh)
 
+    def _require_steady_diffusion(self, remedy: str) -> None:
+        if not is_steady_diffusion(self.model):
+            raise InputError(f"the model is not that of steady diffusion, for which alone {remedy}.")
+
     @property
-    def _loads_expected(self) -> int:
-        return LOADS_OF_A_LIGHT * self.expected
+    def _expected_right_hand_sides(self) -> int:
+        return RIGHT_HAND_SIDES_PER_LIGHT * self.expected
 
     def solve(self, lights: Sequence[Light], *, subtract: Subtract = "fitted") -> Solution:
         """Solve for lights on the mesh as it is, without an estimate of the error.
@@ -151,10 +160,12 @@ class System:
         Raises
         ------
         InputError
-            If a light does not go with the body.
+            If a light does not go with the body, or `subtract` with the model.
         RunError
             If the linear solver fails.
         """
+        if subtract != "nothing":
+            self._require_steady_diffusion('charges are subtracted; give subtract="nothing"')
         watch = Stopwatch()
         with watch.stage("surface"):
             body = Body(self.true_surface, self.media, MeshPartition(self.mesh))
@@ -164,63 +175,58 @@ class System:
         solution = self._solve(sources, watch, None).whole
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
 
-    def step(self, sources: Sources, watch: Stopwatch, before: Step | None = None) -> Step:
-        """Solve, and estimate the error; `before` is a step on a coarser mesh that this one is a refinement of."""
-        solved = self._solve(sources, watch, before)
+    def step(self, sources: Sources, watch: Stopwatch, coarser: MeshSolution | None = None) -> MeshSolution:
+        """Solve, and estimate the error; `coarser` is the solution on a mesh that this one is a refinement of."""
+        self._require_steady_diffusion("errors are estimated; call System.solve")
+        solved = self._solve(sources, watch, coarser)
         with watch.stage("solve"):
             inner = [region.surface for region in self.regions]
             estimate = estimate_by_operator(solved.loads, solved.of_lights, solved.whole, inner)
-        return Step(replace(solved.whole, error_estimate=estimate.error), estimate, solved.good)
+        return MeshSolution(replace(solved.whole, error_estimate=estimate.error), estimate, solved.accurate_nodes)
 
-    def _solve(self, sources: Sources, watch: Stopwatch, before: Step | None) -> "_Solved":
-        """From deposits to loads and patches, to one linear system for all of them, to a solution for each light."""
+    def _solve(self, sources: Sources, watch: Stopwatch, coarser: MeshSolution | None) -> "_Solved":
+        """Turn deposits into loads and patches, solve one linear system for all, and make a solution of each light."""
         with watch.stage("assemble"):
             loads = self._loads(sources)
-            subtractions = self._subtractions(sources, before)
+            subtractions = self._subtractions(sources, coarser)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.at_nodes.any()]
-            coarse = () if before is None else before.solution.patches
+            coarse = () if coarser is None else coarser.solution.patches
             fitted = [
                 subtract_fitted(light, each, self.plain, self.mass, coarse) for light, each in sources.fitted.items()
             ]
             operators = [*(self.plain for _ in [*subtractions, *fitted]), *(loads[light].operator for light in lit)]
         with watch.stage("solve"):
-            # Every light has a fluence of its own, and a patch that depends on nothing else: so lights add up.
+            # Each light is solved for by itself, with patches that depend on it alone, so that lights add up.
             columns = [each.terms.load for each in [*subtractions, *fitted]] + [loads[light].at_nodes for light in lit]
             fluences, results = solve_columns(operators, columns, len(self.mesh.points))
             for column, each in enumerate(fitted, len(subtractions)):
                 if each.patch.cells.all():
                     fluences[:, column] += each.patch.at_nodes
-        good = tuple(good_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False))
-        if before is None:
-            results += self._shrink(subtractions, good, fluences, watch)
+        accurate = tuple(
+            good_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False)
+        )
+        if coarser is None:
+            results += self._shrink_patches(subtractions, accurate, fluences, watch)
         owners = np.array([*sources.owners, *sources.fitted, *lit], dtype=np.int64)
         of_lights = []
         for light, load in enumerate(loads):
             fluence = fluences[:, owners == light].sum(axis=1)
             own = [each for each in [*subtractions, *fitted] if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
-        quadratic = QuadraticScene(
-            self.quadratic,
-            tuple(load.deposit for load in loads),
-            tuple(solution.patches for solution in of_lights),
-            tuple(solution.fluence for solution in of_lights),
-        )
-        of_lights = [
-            replace(solution, quadratic=QuadraticSolution(quadratic, (light,)))
-            for light, solution in enumerate(of_lights)
-        ]
-        whole = self._sum(of_lights, loads, results, sources)
-        whole = replace(whole, quadratic=QuadraticSolution(quadratic, tuple(range(len(loads)))))
-        return _Solved(loads, of_lights, whole, good)
+        quadratic = None
+        if is_steady_diffusion(self.model):
+            of_lights, quadratic = attach_quadratic(of_lights, loads, self.quadratic)
+        whole = replace(self._sum(of_lights, loads, results, sources), quadratic=quadratic)
+        return _Solved(loads, of_lights, whole, accurate)
 
     def _loads(self, sources: Sources) -> list[Load]:
-        """The load of each light: with the fitted operator where it is spread evenly, else with the plain one."""
+        """The load of each light: of distributed light with `layer_operator`, else with the plain operator."""
         loads = []
         for light, deposit in enumerate(sources.remaining):
             on_mesh = self._scale_emission(deposit.evaluate_on(self.mesh, self.true_surface, self.coefficients))
             known = light in sources.owners or light in sources.fitted
-            operator = self.fitted if on_mesh.terms.is_distributed and not known else self.plain
+            operator = self.layer_operator if on_mesh.terms.is_distributed and not known else self.plain
             loads.append(load_of(on_mesh, operator))
         return loads
 
@@ -233,31 +239,31 @@ class System:
         emission = deposit.terms.emission * share[self.mesh.regions]
         return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
-    def _subtractions(self, sources: Sources, before: Step | None) -> list[Subtraction]:
-        """What is subtracted: the charges, each where it was a good guess on the mesh before, or else everywhere."""
+    def _subtractions(self, sources: Sources, coarser: MeshSolution | None) -> list[Subtraction]:
+        """Subtract each patch of charges where it was accurate on the coarser mesh; everywhere if there was none."""
         mesh = self.mesh
-        good: Sequence[BoolArray | None] = [None] * len(sources.charges)
-        if before is not None:
-            coarse = before.solution.mesh.points
-            good = [inherit_good_nodes(each, coarse, mesh) for each in before.good]
+        accurate: Sequence[BoolArray | None] = [None] * len(sources.charges)
+        if coarser is not None:
+            coarse = coarser.solution.mesh.points
+            accurate = [inherit_good_nodes(each, coarse, mesh) for each in coarser.accurate_nodes]
         return [
             subtract_on(mesh, light, charges, self.mass, nodes)
-            for light, charges, nodes in zip(sources.owners, sources.charges, good, strict=True)
+            for light, charges, nodes in zip(sources.owners, sources.charges, accurate, strict=True)
         ]
 
-    def _shrink(
-        self, subtractions: list[Subtraction], good: Sequence[BoolArray], fluences: FloatArray, watch: Stopwatch
+    def _shrink_patches(
+        self, subtractions: list[Subtraction], accurate: Sequence[BoolArray], fluences: NumberArray, watch: Stopwatch
     ) -> list[LinearResult]:
-        """Shrink patches to the good nodes and solve for them again, in place."""
-        worse = [i for i in range(len(subtractions)) if not good[i].all()]
-        if not worse:
+        """Shrink patches to their accurate nodes and solve for them again, in place."""
+        shrinking = [i for i in range(len(subtractions)) if not accurate[i].all()]
+        if not shrinking:
             return []
         with watch.stage("assemble"):
-            for i in worse:
-                subtractions[i] = subtractions[i].shrink_to(good[i])
+            for i in shrinking:
+                subtractions[i] = subtractions[i].shrink_to(accurate[i])
         with watch.stage("solve"):
-            result = self.plain.solver.solve(np.column_stack([subtractions[i].terms.load for i in worse]))
-            fluences[:, worse] = result.x
+            result = self.plain.solver.solve(np.column_stack([subtractions[i].terms.load for i in shrinking]))
+            fluences[:, shrinking] = result.x
         return [result]
 
     def _sum(
@@ -267,7 +273,7 @@ class System:
         results: Sequence[LinearResult],
         sources: Sources,
     ) -> Solution:
-        """The solution of all lights together, with what the linear solver says of itself."""
+        """The solution of all lights together, with residual, iterations and notes of the linear solver."""
         solvers = [operator.solver for operator in dict.fromkeys(load.operator for load in loads)]
         return replace(
             sum_solutions(of_lights),
@@ -284,9 +290,9 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
-    """Loads and solutions of the lights, the sum of these, and where each of the charges is a good guess."""
+    """Loads and solutions of the lights, the sum of these, and the accurate nodes as in `MeshSolution`."""
 
     loads: list[Load]
     of_lights: list[Solution]
     whole: Solution
-    good: tuple[BoolArray, ...]
+    accurate_nodes: tuple[BoolArray, ...]

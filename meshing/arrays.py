@@ -1,4 +1,4 @@
-"""Array types of all signatures, sums by index, evenly spaced indices, and perpendicular axes."""
+"""Array types of all signatures, sums by index, quotients, evenly spaced indices, and perpendicular axes."""
 
 from typing import Any
 
@@ -18,6 +18,11 @@ Vector = tuple[float, float, float]
 def sum_by_index(indices: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
     """Sum the values with each index 0, 1, ..., (count,); `indices` and `values` have the same shape."""
     return np.asarray(np.bincount(indices.reshape(-1), values.reshape(-1), count), dtype=np.float64)
+
+
+def divide_or_zero(a: NumberArray, b: NumberArray, smallest: float = 0.0) -> NumberArray:
+    """``a/b``, and 0 where the modulus of b is not above `smallest`."""
+    return np.divide(a, b, out=np.zeros_like(a), where=~(np.abs(b) <= smallest))
 
 
 def spread_indices(count: int, most: int) -> IntArray:

@@ -11,13 +11,13 @@ from skfem.helpers import dot, grad
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium
 from tetlux.fem.media.coefficients import coefficients_of
-from tetlux.fem.operators.assembly import Assembly, Mass, system_matrix
+from tetlux.fem.operators.assembly import Assembly, Lumping, system_matrix
 from tetlux.fem.operators.forms import weak_form_matrix
 from tetlux.meshing import TetMesh
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 
 CLEAR = Medium(sigma_a=0.0, sigma_s_prime=9.0, eta=2.0)
-MASSES: tuple[Mass, ...] = ("lumped", "consistent")
+MASSES: tuple[Lumping, ...] = ("lumped", "consistent")
 
 
 def random_mesh(seed: int, nodes: int = 400) -> TetMesh:
@@ -38,7 +38,7 @@ def gap(a: csr_array, b: csr_array) -> float:
 
 @pytest.mark.parametrize("mass", MASSES)
 @pytest.mark.parametrize("seed", range(3))
-def test_it_is_the_matrix_of_the_weak_form(seed: int, mass: Mass) -> None:
+def test_it_is_the_matrix_of_the_weak_form(seed: int, mass: Lumping) -> None:
     mesh = random_mesh(seed)
     # Each term counts: none is lost in the rounding of another.
     for medium in (
@@ -50,12 +50,12 @@ def test_it_is_the_matrix_of_the_weak_form(seed: int, mass: Mass) -> None:
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_it_is_that_of_a_mesh_from_the_mesher(ball_mesh: TetMesh, mass: Mass) -> None:
+def test_it_is_that_of_a_mesh_from_the_mesher(ball_mesh: TetMesh, mass: Lumping) -> None:
     assert gap(system_matrix(ball_mesh, TISSUE, mass), weak_form_matrix(ball_mesh, TISSUE, mass)) < 1e-12
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_coefficients_may_differ_from_tetrahedron_to_tetrahedron(mass: Mass) -> None:
+def test_coefficients_may_differ_from_tetrahedron_to_tetrahedron(mass: Lumping) -> None:
     """Against scikit-fem with coefficients that are constant on each tetrahedron."""
     mesh = random_mesh(3)
     rng = np.random.default_rng(4)
@@ -85,7 +85,7 @@ def test_coefficients_may_differ_from_tetrahedron_to_tetrahedron(mass: Mass) -> 
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_a_shift_adds_to_the_absorption_coefficient(mass: Mass) -> None:
+def test_a_shift_adds_to_the_absorption_coefficient(mass: Lumping) -> None:
     mesh = random_mesh(6)
     sigma_a = np.random.default_rng(7).uniform(0.1, 9.0, len(mesh.tetrahedra))
     assembly = Assembly(mesh)
@@ -100,17 +100,17 @@ def test_a_shift_adds_to_the_absorption_coefficient(mass: Mass) -> None:
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_terms_say_what_is_absorbed_and_what_leaves(ball_mesh: TetMesh, mass: Mass) -> None:
+def test_terms_say_what_is_absorbed_and_what_leaves(ball_mesh: TetMesh, mass: Lumping) -> None:
     sigma_a = np.linspace(0.1, 0.2, len(ball_mesh.tetrahedra))
     terms = Assembly(ball_mesh).terms(0.3, sigma_a, 0.1, mass)
-    absorbed, leaving = terms.absorption.row_sums(ball_mesh), terms.boundary.row_sums(ball_mesh)
+    absorbed, leaving = terms.absorption.row_sums(ball_mesh), terms.boundary_term.row_sums(ball_mesh)
     assert absorbed.sum() == pytest.approx(sigma_a @ ball_mesh.volumes, rel=1e-12)
     assert leaving.sum() == pytest.approx(0.1 * ball_mesh.area, rel=1e-12)
     assert np.abs(terms.stiffness.row_sums(ball_mesh)).max() < 1e-14
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_power_is_kept(ball_mesh: TetMesh, mass: Mass) -> None:
+def test_power_is_kept(ball_mesh: TetMesh, mass: Lumping) -> None:
     """Constants do not diffuse: the matrix times one is what absorbs and what lets out, node by node."""
     matrix = system_matrix(ball_mesh, TISSUE, mass)
     expected = TISSUE.sigma_a * ball_mesh.node_volumes
@@ -135,9 +135,9 @@ def test_linear_functions_are_exact() -> None:
 
 def test_matrices_of_one_assembly_share_their_pattern_and_nothing_else() -> None:
     assembly = Assembly(block((4, 4, 4), (1.0, 1.0, 1.0)))
-    first = assembly.of(coefficients_of(TISSUE))
+    first = assembly.assemble(coefficients_of(TISSUE))
     before = first.toarray()
-    second = assembly.of(coefficients_of(Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.2)))
+    second = assembly.assemble(coefficients_of(Medium(sigma_a=3.0, sigma_s_prime=10.0, eta=1.2)))
     assert np.shares_memory(first.indices, second.indices)
     assert not np.shares_memory(first.data, second.data)
     assert (first.toarray() == before).all()

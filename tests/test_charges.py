@@ -366,7 +366,7 @@ def test_bodies_that_are_not_even_are_refused(ball: Surface) -> None:
     with pytest.raises(InputError, match="crosses itself"):
         solve(replace(ball, overlaps=True), TISSUE, [light], model="charges")
     with pytest.raises(InputError, match="one medium at a time"):
-        solve(ball, [TISSUE, TISSUE], [light], model="charges")
+        solve(ball, [TISSUE, TISSUE], [light], model="charges")  # type: ignore[call-overload]
     with pytest.raises(InputError, match="on a body with regions"):
         solve(ball, TISSUE, [DiffuseLight(1.0)], regions=[Region(sphere(3.0), TISSUE)], model="charges")
     with pytest.raises(InputError, match='give "full" or "charges"'):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.conftest import block
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, System, solve
-from tetlux.fem.operators.limiter import nonnegative
+from tetlux.fem.operators.limiter import limit_to_nonnegative
 from tetlux.meshing import TetMesh, box, sphere, tetrahedralize
 
 DARK = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
@@ -89,7 +89,7 @@ def test_the_limiter_keeps_power(seed: int, count: int, dark: float) -> None:
     weights = rng.uniform(size=count) * (rng.uniform(size=count) < 0.8)
     edges = rng.integers(count, size=(3 * count, 2))
     power = float(weights @ fluence)
-    found, moved = nonnegative(fluence, edges, weights)
+    found, moved = limit_to_nonnegative(fluence, edges, weights)
     if power < 1e-250:
         np.testing.assert_array_equal(found, fluence)
         return
@@ -104,6 +104,6 @@ def test_what_is_lacking_comes_from_next_door() -> None:
     """A chain: nodes far from the dark one keep what they have."""
     fluence = np.array([1.0, 1.0, 1.0, -0.5, 1.0, 1.0])
     edges = np.array([[i, i + 1] for i in range(5)])
-    found, moved = nonnegative(fluence, edges, np.ones(6))
+    found, moved = limit_to_nonnegative(fluence, edges, np.ones(6))
     np.testing.assert_allclose(found, [1.0, 1.0, 0.75, 0.0, 0.75, 1.0], rtol=1e-14)
     assert moved == 0.5

@@ -68,7 +68,7 @@ def test_a_mesh_that_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(memory, "available", lambda: 1.01 * needed)
     solve(mesh, TISSUE, light)
     monkeypatch.setattr(memory, "available", lambda: 0.9 * needed)
-    monkeypatch.setattr("tetlux.fem.operators.assembly.Assembly.of", lambda *_: pytest.fail("assembled"))
+    monkeypatch.setattr("tetlux.fem.operators.assembly.Assembly.assemble", lambda *_: pytest.fail("assembled"))
     with pytest.raises(RunError, match=r"3,072 tetrahedra need about 0.0831 GB .* and 0.0748 GB are available"):
         solve(mesh, TISSUE, light)
 
@@ -153,8 +153,8 @@ def test_a_process_that_may_not_have_more() -> None:
     refused, stopped = done.stdout.splitlines()
     # The check of the given mesh has left its tables of faces, which the solution would use too.
     assert re.match(r"384,000 tetrahedra need about 0\.472 GB of memory, and 0\.[23]\d* GB", refused)
-    assert "tetrahedra that 0.3" in stopped
-    assert "GB of memory suffice for" in stopped
+    # What the given mesh took may be free again.
+    assert re.search(r"tetrahedra that 0\.[34]\d* GB of memory suffice for", stopped)
 
 
 @pytest.mark.slow

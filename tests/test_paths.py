@@ -14,7 +14,7 @@ from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.operators.loads import load_vector
-from tetlux.fem.outcome.solution import Power
+from tetlux.fem.outcome.power import Power
 from tetlux.meshing import TetMesh
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 

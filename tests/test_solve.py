@@ -4,6 +4,7 @@ import math
 import re
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -305,7 +306,24 @@ def test_a_body_too_thin_for_the_mesher_is_refused_before() -> None:
 
 
 def test_a_word_is_said_of_a_slow_mesher(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["tetlux.fem.adapt"], "SLOW", 0.01)
+    monkeypatch.setattr(sys.modules["tetlux.fem.adapt"], "PROGRESS_AFTER_SECONDS", 0.01)
     words: list[str] = []
     solve(sphere(10.0, subdivisions=2), TISSUE, [DiffuseLight(1.0)], tolerance=0.5, cache=False, report=words.append)
     assert words[0].startswith("still tetrahedralizing: ")
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"detector_tolerance": 0.01}, "detector_tolerance"),
+        ({"mass": "consistent"}, "mass"),
+        ({"subtract": "nothing", "cache": False}, "subtract and cache"),
+        ({"limit": False}, "limit"),
+        ({"most_tetrahedra": 1000}, "most_tetrahedra"),
+        ({"report": print}, "report"),
+    ],
+)
+def test_charges_refuse_what_is_for_finite_elements(ball: Surface, options: dict[str, Any], names: str) -> None:
+    expected = f'model "charges" does not take {names}; leave out what it does not take, or give model="full".'
+    with pytest.raises(InputError, match=f"^{expected}$"):
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], model="charges", **options)

@@ -13,7 +13,7 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.known.patch import Patch, _any_inside, _point_cells, patch_of
 from tetlux.fem.known.split import Subtract, sources_of
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 
@@ -72,7 +72,7 @@ def test_images_never_lie_in_another_part_of_the_body(gap: float) -> None:
 
 
 @pytest.mark.parametrize("mass", ["lumped", "consistent"])
-def test_what_is_subtracted_does_not_change_where_the_solution_converges_to(mass: Mass) -> None:
+def test_what_is_subtracted_does_not_change_where_the_solution_converges_to(mass: Lumping) -> None:
     """A source well inside a block, on a mesh that resolves it: plain P1, and both subtractions."""
     mesh = block((20, 20, 20), (10.0, 10.0, 10.0))
     light = [PointSource((0.0, 0.0, -5.0))]

@@ -11,7 +11,7 @@ from tetlux.cases.write.media_rows import media_rows
 from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
 from tetlux.cases.write.run_record import describe_run
 from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.outcome.solution import Power
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray

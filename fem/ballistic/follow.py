@@ -112,7 +112,9 @@ class _Trace:
     def deposit(self) -> Deposit:
         """All of it; rays that ended are partly absorbed points in the tetrahedra behind their facets."""
         ended, coefficients = join_rays(self.ended), self.coefficients
-        scattered = at_cells(coefficients.scattering / coefficients.extinction, ended.cells) * ended.powers
+        scattered = (
+            at_cells(coefficients.delta_eddington_scattering / coefficients.extinction, ended.cells) * ended.powers
+        )
         absorbed = self.absorbed + float((ended.powers - scattered).sum())
         return Deposit(
             Ledger(specular=self.specular, absorbed=absorbed, ballistic=self.ballistic),

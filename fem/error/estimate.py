@@ -31,7 +31,8 @@ from tetlux.fem.error.residual import (
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.linear.solver import Solver
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.operators.fitting import Fitting
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
@@ -76,7 +77,7 @@ def estimate_error(
     load: FloatArray,
     emission: float | FloatArray = 0.0,
     inner: Sequence[Surface] = (),
-    fitting: Fitting | None = None,
+    fitting: LayerFitting | None = None,
 ) -> Estimate:
     """Estimate the error of a solution, or of a part of one.
 
@@ -95,7 +96,7 @@ def estimate_error(
         Of the volume, W/unit³.
     inner : sequence of Surface
         Of the regions of the mesh.
-    fitting : Fitting, optional
+    fitting : LayerFitting, optional
         Of the matrix.
 
     Returns
@@ -107,7 +108,7 @@ def estimate_error(
     if total <= ROUNDING * whole.power.incident:
         # Where no light leaves, the exitance has no error.
         return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
-    duals = solver.roughly(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
+    duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
     mean = nodal_averaging(mesh)
     smooth, difference = subtract_patches(solution, mean)
     gradient_error = root_mean_square(difference)
@@ -147,7 +148,7 @@ def _dual_loads(
 ) -> FloatArray:
     """Loads of the two duals, (n, 2): for the L2 error of the exitance, and for the error of the exited power."""
     loads = np.zeros((len(mesh.points), 2))
-    robin, areas = coefficients.robin, mesh.boundary_node_areas
+    robin, areas = boundary_condition_of(coefficients.outer).robin, mesh.boundary_node_areas
     loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     return loads
@@ -167,7 +168,7 @@ def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
                 border = mesh.tetrahedra[~patch.cells]
                 known[border] = residual[border] = 0.0
             remainder = remainder - known
-            robin = 0.5 / patch.charges.medium.boundary_factor
+            robin = boundary_condition_of(patch.charges.medium).robin
             outward_flux[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
             outward_flux += residual
     return remainder, outward_flux
@@ -190,5 +191,5 @@ def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatAr
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     corners = (mesh.tetrahedra[cells][:, None, :] == faces[:, :, None]).argmax(axis=2)
     on_faces = lumping_error(np.take_along_axis(smooth[cells], corners, axis=1), dual[faces])
-    weights = coefficients.robin * mesh.boundary_areas * on_faces
+    weights = boundary_condition_of(coefficients.outer).robin * mesh.boundary_areas * on_faces
     return np.asarray(np.bincount(cells, weights, minlength=len(mesh.tetrahedra)), dtype=np.float64)

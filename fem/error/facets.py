@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
@@ -60,7 +61,7 @@ def boundary_facets(
     product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
     outflow = np.abs(outward_flux[faces].mean(axis=1) * dual[faces].mean(axis=1))
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
-    extrapolation = diffusion / coefficients.robin
+    extrapolation = diffusion / boundary_condition_of(coefficients.outer).robin
     scale = at_cells(absorption_scale, cells)
     along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma_a * product
     corners = mesh.points[faces]

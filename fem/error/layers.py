@@ -14,7 +14,7 @@ Layers along interfaces are not fitted. Linear elements give a flux into them of
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.operators.fitting import Fitting
+from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
@@ -26,7 +26,7 @@ LAYER_WEIGHT = 0.25
 
 
 def boundary_layers(
-    mesh: TetMesh, coefficients: Coefficients, fitting: Fitting, smooth: FloatArray, dual: FloatArray
+    mesh: TetMesh, coefficients: Coefficients, fitting: LayerFitting, smooth: FloatArray, dual: FloatArray
 ) -> FloatArray:
     """Indicators of the error of layers along the boundary, (m,).
 
@@ -35,7 +35,7 @@ def boundary_layers(
     """
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
-    across = fitting.across[faces].mean(axis=1)
+    across = fitting.kh[faces].mean(axis=1)
     step = _step_across(mesh, cells, faces, smooth)
     indicators = LAYER_WEIGHT * across**2 / (1.0 + across**2) ** 1.5 * np.sqrt(diffusion * sigma_a)
     indicators *= mesh.boundary_areas * step * np.abs(dual[faces].mean(axis=1))

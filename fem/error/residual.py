@@ -19,6 +19,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.mesh import TetMesh
@@ -88,7 +89,8 @@ def ripple_indicators(mesh: TetMesh, coefficients: Coefficients, load: FloatArra
     density = (np.abs(load) / mesh.node_volumes)[mesh.tetrahedra[cells]].min(axis=1)
     # The edge of a regular tetrahedron of this volume, squared.
     square = (6.0 * np.sqrt(2.0) * mesh.volumes[cells]) ** (2.0 / 3.0)
-    height = RIPPLE_FACTOR * square * density * coefficients.robin / at_cells(coefficients.diffusion, cells)
+    robin = boundary_condition_of(coefficients.outer).robin
+    height = RIPPLE_FACTOR * square * density * robin / at_cells(coefficients.diffusion, cells)
     indicators = np.bincount(cells, mesh.boundary_areas * height**2, minlength=len(mesh.tetrahedra))
     total = float(np.sqrt(indicators.sum()))
     return np.asarray(indicators / (total * norm if total > 0 else 1.0), dtype=np.float64)

@@ -11,7 +11,8 @@ from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.fitted import FittedLight, Violation
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
@@ -126,7 +127,7 @@ def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
     return np.where(after[found] == before, found, -1)
 
 
-def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Mass) -> PatchTerms:
+def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> PatchTerms:
     """The load of what is missing, and the ledger of the charges less that of their values at the nodes.
 
     Parameters
@@ -150,7 +151,7 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Mass) -> Patch
         return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
     exited = float(areas @ violation.exitance) + violation.missed
     inflow = float(areas @ (violation.residual - violation.exitance)) - violation.missed
-    robin = 0.5 / charges.medium.boundary_factor
+    robin = boundary_condition_of(charges.medium).robin
     at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
     # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.
     absorbed = float(charges.strengths[: charges.sources].sum()) + inflow

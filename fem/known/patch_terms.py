@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import coefficients_of
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -61,7 +62,7 @@ class BoundaryIntegrals:
     __repr__ = one_line
 
 
-def patch_terms(patch: Patch, mass: Mass, surface: BoundaryIntegrals | None = None) -> PatchTerms:
+def patch_terms(patch: Patch, mass: Lumping, surface: BoundaryIntegrals | None = None) -> PatchTerms:
     """Assemble the terms of a patch.
 
     Parameters
@@ -82,7 +83,7 @@ def patch_terms(patch: Patch, mass: Mass, surface: BoundaryIntegrals | None = No
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)
     faces, on_boundary = patch.faces
-    robin = 1.0 / (2.0 * medium.boundary_factor)
+    robin = boundary_condition_of(medium).robin
     integrated = np.ones(len(faces), dtype=bool) if surface is None else ~on_boundary
     value, through = _integrals(mesh.points[faces[integrated]], charges)
     leaving = robin * value * on_boundary[integrated, None]
@@ -111,8 +112,8 @@ def patch_terms(patch: Patch, mass: Mass, surface: BoundaryIntegrals | None = No
     )
 
 
-def _mass(values: FloatArray, mass: Mass) -> FloatArray:
-    """Mass matrices of simplices of unit size times values at their corners, (m, d + 1)."""
+def _mass(values: FloatArray, mass: Lumping) -> FloatArray:
+    """Lumping matrices of simplices of unit size times values at their corners, (m, d + 1)."""
     corners = values.shape[1]
     if mass == "lumped":
         return np.asarray(values / corners)

@@ -10,7 +10,7 @@ from tetlux.fem.known.fitted import FittedLight
 from tetlux.fem.known.fitted_patch import FittedPatch, fitted_patch, fitted_terms
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.operator import Operator
 from tetlux.meshing.arrays import BoolArray
 from tetlux.meshing.describe import one_line
@@ -36,7 +36,7 @@ class Subtraction:
     light: int
     patch: Patch
     terms: PatchTerms
-    mass: Mass
+    mass: Lumping
 
     def shrink_to(self, good: BoolArray) -> "Subtraction":
         """The same on the tetrahedra whose four nodes are good, (n,), alone."""
@@ -46,14 +46,16 @@ class Subtraction:
     __repr__ = one_line
 
 
-def subtract_on(mesh: TetMesh, light: int, charges: Charges, mass: Mass, good: BoolArray | None = None) -> Subtraction:
+def subtract_on(
+    mesh: TetMesh, light: int, charges: Charges, mass: Lumping, good: BoolArray | None = None
+) -> Subtraction:
     """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
     patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
 
 
 def subtract_fitted(
-    light: int, fitted: FittedLight, operator: Operator, mass: Mass, before: Sequence[Patch] = ()
+    light: int, fitted: FittedLight, operator: Operator, mass: Lumping, before: Sequence[Patch] = ()
 ) -> Subtraction:
     """Subtract fitted charges of a light; where it is whole, its load is that of what is missing.
 
@@ -73,4 +75,4 @@ def subtract_fitted(
     """
     ours = (each for each in before if isinstance(each, FittedPatch) and each.charges is fitted.charges)
     patch = fitted_patch(operator.mesh, fitted, next(ours, None))
-    return Subtraction(light, patch, fitted_terms(patch, operator.absorbing, mass), mass)
+    return Subtraction(light, patch, fitted_terms(patch, operator.absorption_weights, mass), mass)

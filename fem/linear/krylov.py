@@ -11,11 +11,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.meshing.arrays import FloatArray, NumberArray
+from tetlux.meshing.arrays import FloatArray, NumberArray, divide_or_zero
 from tetlux.meshing.host.blocks import THREADS, map_in_threads
 
 # Relative residual at which the iteration stops.
-AIM = 1e-11
+STOP_RESIDUAL = 1e-11
 ITERATIONS = 1000
 # Right-hand sides that share one iteration where every core has so many: each pass over the matrix then serves all of
 # them. Fewer are quicker one by one, since SciPy's products with two or three columns are slow.
@@ -85,10 +85,10 @@ def _rows_of(matrix: csr_array, rows: slice) -> csr_array:
 def jacobi(product: Product) -> Method:
     """Conjugate gradients, preconditioned by the diagonal; by its modulus where it is complex."""
     inverse = 1.0 / abs(product.matrix.diagonal())[:, None]
-    return preconditioned(product, lambda residuals: inverse * residuals)
+    return make_preconditioned_cg(product, lambda residuals: inverse * residuals)
 
 
-def preconditioned(product: Product, precondition: Preconditioner) -> Method:
+def make_preconditioned_cg(product: Product, precondition: Preconditioner) -> Method:
     """Conjugate gradients on one or a few columns at a time, a core each, unless one product keeps all cores busy."""
 
     def iterate(loads: NumberArray) -> tuple[NumberArray, int]:
@@ -104,7 +104,7 @@ def preconditioned(product: Product, precondition: Preconditioner) -> Method:
     return iterate_on_groups
 
 
-def real_bound(matrix: csr_array) -> csr_array:
+def real_majorant(matrix: csr_array) -> csr_array:
     """The real matrix ``A + |B|``, by which a complex symmetric matrix ``A + i B`` is preconditioned.
 
     With A positive definite and B or -B positive semidefinite, eigenvalues of the preconditioned matrix are
@@ -113,42 +113,43 @@ def real_bound(matrix: csr_array) -> csr_array:
     return csr_array(matrix.real + abs(matrix.imag))
 
 
-def as_parts(values: NumberArray) -> FloatArray:
+def split_complex(values: NumberArray) -> FloatArray:
     """Real and imaginary parts of complex columns (n, k), as the real columns (n, 2k)."""
     return np.ascontiguousarray(values).view(np.float64)
 
 
-def from_parts(parts: FloatArray) -> NumberArray:
+def join_complex(parts: FloatArray) -> NumberArray:
     """The complex columns (n, k) of given real and imaginary parts (n, 2k)."""
     return np.ascontiguousarray(parts).view(np.complex128)
 
 
-def on_parts(function: Preconditioner, values: NumberArray) -> NumberArray:
+def apply_to_parts(function: Preconditioner, values: NumberArray) -> NumberArray:
     """Apply a real linear function of columns to real or complex columns (n, k)."""
-    return from_parts(function(as_parts(values))) if np.iscomplexobj(values) else function(values)
+    return join_complex(function(split_complex(values))) if np.iscomplexobj(values) else function(values)
 
 
 def conjugate_gradients(product: Product, precondition: Preconditioner, loads: NumberArray) -> tuple[NumberArray, int]:
     """Preconditioned conjugate gradients (Saad 2003, algorithm 9.1) on all columns of (n, k) loads side by side.
 
-    They stop when the norms of all residuals are below `AIM`, or after `ITERATIONS`. The second result is how many
-    there were. For complex columns this is COCG, with the same real preconditioner.
+    They stop when the norms of all residuals are below `STOP_RESIDUAL`, or after `ITERATIONS`. The second result is the
+    number of iterations. For complex columns this is COCG, with the same real preconditioner.
     """
     solution, residuals = np.zeros_like(loads), loads.copy()
-    direction = on_parts(precondition, residuals)
+    direction = apply_to_parts(precondition, residuals)
     product_of_residuals = dots(residuals, direction)
     iterations = 0
     while iterations < ITERATIONS:
         iterations += 1
         image = product(direction)
-        length = _ratio(product_of_residuals, dots(direction, image))
+        # A dot product is 0 in a column that is solved, or where COCG breaks down.
+        length = divide_or_zero(product_of_residuals, dots(direction, image))
         solution += length * direction
         residuals -= length * image
-        if norms(residuals).max(initial=0.0) <= 0.5 * AIM:
+        if norms(residuals).max(initial=0.0) <= 0.5 * STOP_RESIDUAL:
             break
-        corrections = on_parts(precondition, residuals)
+        corrections = apply_to_parts(precondition, residuals)
         before, product_of_residuals = product_of_residuals, dots(residuals, corrections)
-        direction *= _ratio(product_of_residuals, before)
+        direction *= divide_or_zero(product_of_residuals, before)
         direction += corrections
     return solution, iterations
 
@@ -163,8 +164,3 @@ def norms(columns: NumberArray) -> FloatArray:
     """Euclidean norms (k,) of the columns of an (n, k) array."""
     squares = dots(columns, columns) if not np.iscomplexobj(columns) else dots(columns, columns.conj()).real
     return np.asarray(np.sqrt(squares))
-
-
-def _ratio(a: NumberArray, b: NumberArray) -> NumberArray:
-    """``a/b``, and 0 where b is 0: of a column that is solved, or where COCG breaks down."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b != 0)

@@ -7,14 +7,15 @@ import numpy as np
 from scipy.sparse import csr_array, csr_matrix
 
 from tetlux.fem.linear.direct import factors_of
-from tetlux.fem.linear.krylov import Preconditioner, Product, dots, preconditioned, real_bound
+from tetlux.fem.linear.krylov import Preconditioner, Product, dots, make_preconditioned_cg, real_majorant
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 
 # PyAMG finds the aggregates, and has no wheel for Linux on ARM.
 HAS_PYAMG = find_spec("pyamg") is not None
-# Matrices of this many unknowns or fewer are factorised, and spectral radii are estimated in so many steps.
+# Matrices of this many unknowns or fewer are factorised.
 COARSEST = 500
+# Steps of the power iteration that estimates a spectral radius.
 POWER_STEPS = 8
 
 
@@ -30,7 +31,7 @@ class Multigrid:
 
     def __call__(self, loads: NumberArray) -> tuple[NumberArray, int]:
         """See `tetlux.fem.linear.krylov.Method`."""
-        return preconditioned(self.product, self.cycle)(loads)
+        return make_preconditioned_cg(self.product, self.cycle)(loads)
 
     __repr__ = one_line
 
@@ -38,11 +39,11 @@ class Multigrid:
 def multigrid(product: Product) -> Multigrid:
     """Conjugate gradients, preconditioned by smoothed aggregation (Vaněk, Mandel & Brezina 1996).
 
-    For a complex matrix the hierarchy is that of its `real_bound`.
+    For a complex matrix the hierarchy is that of its `real_majorant`.
     """
     finest, levels = product, list[_Level]()
     if product.is_complex:
-        product = Product(real_bound(product.matrix))
+        product = Product(real_majorant(product.matrix))
     while product.matrix.shape[0] > COARSEST and (level := _level(product)) is not None:
         levels.append(level)
         product = Product(csr_array(level.down.matrix @ (product.matrix @ level.up.matrix)))

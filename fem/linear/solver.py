@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.direct import direct
-from tetlux.fem.linear.krylov import GROUP, Method, Preconditioner, Product, as_parts, from_parts, jacobi, norms
+from tetlux.fem.linear.krylov import GROUP, Method, Preconditioner, Product, jacobi, join_complex, norms, split_complex
 from tetlux.fem.linear.multigrid import HAS_PYAMG, Multigrid, multigrid
 from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.errors import RunError
@@ -17,12 +17,19 @@ from tetlux.meshing.notes import Note
 
 # A solution whose true relative residual is above this is refused.
 REFUSED = 1e-8
-# A rough solution iterates to this relative residual; one ten times as large is not taken for that.
-ROUGH_AIM = 1e-4
-# Factors of larger matrices fill gigabytes.
+# A solution to low accuracy iterates to this relative residual; if its residual is ten times as large, it is solved for
+# in full.
+LOW_ACCURACY_RESIDUAL = 1e-4
+# Matrices of more unknowns are not factorised, since their factors fill gigabytes,
 MOST_FOR_DIRECT = 20_000
-# But where all else fails, they may.
+# unless all other methods have failed.
 MOST_TO_FALL_BACK = 100_000
+# What messages call the methods, by the name of their function.
+DISPLAY_NAMES = {
+    "jacobi": "conjugate gradients with a diagonal preconditioner",
+    "shared_multigrid": "the multigrid of a similar matrix",
+    "direct": "a direct solution",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +117,8 @@ class Solver:
         """
         loads = load.reshape(len(load), -1)
         if self._needs_parts(loads):
-            result = self.solve(as_parts(loads))
-            return replace(result, x=from_parts(result.x).reshape(load.shape))
+            result = self.solve(split_complex(loads))
+            return replace(result, x=join_complex(result.x).reshape(load.shape))
         dtype = np.complex128 if self._product.is_complex else np.float64
         solutions, results = np.empty(loads.shape, dtype), []
         portion = GROUP * THREADS
@@ -127,17 +134,17 @@ class Solver:
             max((result.method for result in results), key=names.index, default=names[0]),
         )
 
-    def roughly(self, loads: NumberArray) -> LinearResult:
+    def solve_to_low_accuracy(self, loads: NumberArray) -> LinearResult:
         """Solve for (n, k) right-hand sides to residuals of 1e-3 at most, in less than half of the iterations."""
         if self._needs_parts(loads):
-            result = self.roughly(as_parts(loads))
-            return replace(result, x=from_parts(result.x))
-        # The iteration stops at AIM: in these units that is ROUGH_AIM of the load.
-        sizes = norms(loads) * ROUGH_AIM / krylov.AIM
+            result = self.solve_to_low_accuracy(split_complex(loads))
+            return replace(result, x=join_complex(result.x))
+        # The iteration stops at STOP_RESIDUAL: with these scales that is LOW_ACCURACY_RESIDUAL of the load.
+        sizes = norms(loads) * LOW_ACCURACY_RESIDUAL / krylov.STOP_RESIDUAL
         sizes[sizes == 0] = 1.0
         x, iterations = self._prepared[0](loads / sizes)
-        residual = float(norms(loads / sizes - self._product(x)).max()) * ROUGH_AIM / krylov.AIM
-        if not residual <= 10.0 * ROUGH_AIM:
+        residual = float(norms(loads / sizes - self._product(x)).max()) * LOW_ACCURACY_RESIDUAL / krylov.STOP_RESIDUAL
+        if not residual <= 10.0 * LOW_ACCURACY_RESIDUAL:
             return self.solve(loads)
         return LinearResult(x * sizes, residual, iterations, self._methods[0].__name__)
 
@@ -152,7 +159,7 @@ class Solver:
         loads = loads / sizes
         state = _State(np.zeros_like(loads), loads, 1.0, 0, self._methods[0].__name__)
         for number in range(len(self._methods)):
-            if state.residual <= krylov.AIM:
+            if state.residual <= krylov.STOP_RESIDUAL:
                 break
             state = self._improve(state, loads, number)
         # Adding a constant makes the residuals sum to zero, and the ledger of power is such a sum.
@@ -172,14 +179,14 @@ class Solver:
         if state.residual > REFUSED and number > 0:
             self.note = Note(
                 "solver-fallback",
-                f"the linear solver had to fall back from {self._methods[0].__name__} to {method.__name__}, which "
+                f"the linear solver had to fall back from {_display(self._methods[0])} to {_display(method)}, which "
                 "takes longer: coefficients are far apart, or tetrahedra flat.",
             )
         if number == len(self._prepared):
             self._prepared.append(method(self._product))
         helps = True
         # The residual that an iteration updates drifts from the true one: solve again for the true residual.
-        while state.residual > krylov.AIM and helps:
+        while state.residual > krylov.STOP_RESIDUAL and helps:
             correction, more = self._prepared[number](state.residuals)
             solution = state.solution + correction
             residuals = loads - self._product(solution)
@@ -189,6 +196,11 @@ class Solver:
             if residual < state.residual:
                 state = replace(state, solution=solution, residuals=residuals, residual=residual)
         return state
+
+
+def _display(method: Callable[[Product], Method]) -> str:
+    """The name of a method in a message."""
+    return DISPLAY_NAMES.get(method.__name__, method.__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,15 +214,15 @@ class _State:
     method: str
 
 
-def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None = None) -> Solver:
+def solver_for(matrix: csr_array, expected_right_hand_sides: int = 1, cycle: Preconditioner | None = None) -> Solver:
     """The solver that is quickest for a matrix.
 
     Parameters
     ----------
     matrix : (n, n) csr_array
         As for `Solver`.
-    loads : int
-        How many right-hand sides are to come, roughly.
+    expected_right_hand_sides : int
+        How many there will be, roughly.
     cycle : callable, optional
         The multigrid cycle of a similar matrix, such as that of A for ``A + i beta M``; it spares the preparation.
 
@@ -236,10 +248,11 @@ def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None =
 
     An albedo of .9999 with eta 1.5 changes nothing; in a strong absorber (sigma_a 3, sigma_s' 10) jacobi takes a
     third of these times, multigrid three quarters. Between regions whose coefficients differ by 1e-4 to 1e6 jacobi
-    takes up to 1.5 times its iterations of an even body, and its residuals are as small as multigrid's; so it serves
-    where PyAMG is missing.
+    takes up to 1.5 times its iterations of a homogeneous body, and its residuals are as small as multigrid's; so it
+    is used where PyAMG is missing.
     """
     nodes = matrix.shape[0]
+    loads = expected_right_hand_sides
     if nodes <= MOST_FOR_DIRECT and loads > 1 + (nodes / 1800) ** 2:
         methods: list[Callable[[Product], Method]] = [direct, multigrid, jacobi]
     elif nodes * loads > 15_000:
@@ -248,10 +261,10 @@ def solver_for(matrix: csr_array, loads: int = 1, cycle: Preconditioner | None =
             methods.append(direct)
         if cycle is not None:
 
-            def multigrid_of_another(product: Product) -> Multigrid:
+            def shared_multigrid(product: Product) -> Multigrid:
                 return Multigrid(product, cycle)
 
-            methods.insert(0, multigrid_of_another)
+            methods.insert(0, shared_multigrid)
     else:
         methods = [jacobi, multigrid, direct]
     return Solver(matrix, [method for method in methods if HAS_PYAMG or method is not multigrid])

@@ -27,8 +27,8 @@ class Coefficients:
     ----------
     sigma_a, sigma_t_prime : float or (m,) ndarray
         Absorption and reduced transport coefficient, 1/unit.
-    scattering, cosine : float or (m,) ndarray
-        Scattering coefficient (1/unit) and mean cosine with the forward peak taken out, see
+    delta_eddington_scattering, delta_eddington_cosine : float or (m,) ndarray
+        Scattering coefficient sigma_s* (1/unit) and mean cosine with the forward peak taken out, see
         `Medium.delta_eddington`.
     mean_cosine : float or (m,) ndarray
         Mean cosine of the scattering angle; nan where sigma_s' alone is given.
@@ -38,8 +38,8 @@ class Coefficients:
 
     sigma_a: float | FloatArray
     sigma_t_prime: float | FloatArray
-    scattering: float | FloatArray
-    cosine: float | FloatArray
+    delta_eddington_scattering: float | FloatArray
+    delta_eddington_cosine: float | FloatArray
     mean_cosine: float | FloatArray
     outer: Medium
 
@@ -56,12 +56,7 @@ class Coefficients:
     @property
     def extinction(self) -> float | FloatArray:
         """Of a beam with the forward peak left in it: sigma_t* = sigma_a + sigma_s*, 1/unit."""
-        return self.sigma_a + self.scattering
-
-    @property
-    def robin(self) -> float:
-        """1/(2A) of the boundary condition."""
-        return 0.5 / self.outer.boundary_factor
+        return self.sigma_a + self.delta_eddington_scattering
 
     __repr__ = one_line
 
@@ -70,22 +65,6 @@ def coefficients_of(medium: Medium) -> Coefficients:
     """Coefficients of a body of one medium."""
     scattering, cosine = medium.delta_eddington
     return Coefficients(medium.sigma_a, medium.sigma_t_prime, scattering, cosine, known_cosine(medium), medium)
-
-
-def condition_bound(one: Coefficients, other: Coefficients) -> float:
-    """A bound of the condition number of one matrix preconditioned by another, from their coefficients on one mesh.
-
-    For any fluence, each term of one weak form is the same term of the other times a ratio of coefficients, and so the
-    sums differ by a factor between the least and the largest ratio. The bound is the largest over the least.
-    """
-    ratios = []
-    for name in ("diffusion", "sigma_a", "robin"):
-        first, second = np.broadcast_arrays(getattr(one, name), getattr(other, name))
-        present = (first > 0) | (second > 0)
-        with np.errstate(divide="ignore"):
-            ratios.append(np.ravel(first[present] / second[present]))
-    every = np.concatenate(ratios)
-    return float(every.max() / every.min()) if every.min() > 0 else np.inf
 
 
 def at_cells(value: float | FloatArray, cells: IntArray) -> FloatArray:

@@ -10,7 +10,7 @@ from tetlux.fem.media.phase import PhaseFunction
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
-Boundary = Literal["exact", "classic"]
+BoundaryKind = Literal["exact", "classic"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Medium:
     sigma_s: float | None = None
     g: float | None = None
     phase: PhaseFunction | None = None
-    boundary: Boundary = "exact"
+    boundary: BoundaryKind = "exact"
 
     def __post_init__(self) -> None:
         for name in ("sigma_a", "eta", "sigma_s_prime", "sigma_s", "g"):

@@ -16,10 +16,10 @@ from tetlux.fem.charges.places import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
-from tetlux.fem.media.fresnel import moments
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
-from tetlux.fem.outcome.solution import Power
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -207,8 +207,8 @@ class ChargeSolution:
     @property
     def _unscattered(self) -> float:
         """Exitance in addition to ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
-        share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1])
-        return share * sum(ledger.transmitted for ledger in self.ledgers)
+        transmitted = sum(ledger.transmitted for ledger in self.ledgers)
+        return float(boundary_condition_of(self.medium).exitance_offset(transmitted))
 
 
 def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
@@ -252,9 +252,8 @@ def charge_solution(
     """
     sources = powers.sum(axis=0)
     if not inner:
-        boundary_source = (
-            2.0 * np.array([ledger.transmitted for ledger in ledgers]) / (1.0 + 3.0 * moments(medium.eta)[1])
-        )
+        transmitted = np.array([ledger.transmitted for ledger in ledgers])
+        boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
         lights = LightSources(points, powers, boundary_source)
         fitted = fit_charges(surface, equation_of(medium), lights, tolerance=tolerance, most=most)
         samples, interface = fitted.places.fitted, Interface(surface, 0, None)

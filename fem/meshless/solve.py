@@ -15,7 +15,7 @@ from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.meshless.solution import ChargeSolution, LightLedger, charge_solution
-from tetlux.fem.outcome.solution import Power
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch

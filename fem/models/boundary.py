@@ -10,10 +10,10 @@ from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, NumberArray
 
 
-class Boundary(Protocol):
-    """A boundary condition ``E.n = robin phi - inflow``, with E.n the net flux that leaves.
+class BoundaryCondition(Protocol):
+    """A boundary condition ``E.n = robin phi - inflow``, with E.n the net flux that leaves the body.
 
-    The factor robin is in the blocks of a model: 1/(2A), or 0 where no light passes (Neumann).
+    All finite elements ask it for these factors; nothing else in `tetlux.fem` writes them.
     """
 
     @property
@@ -21,12 +21,21 @@ class Boundary(Protocol):
         """The medium below the surface, whose refractive index light leaves."""
         ...
 
+    @property
+    def robin(self) -> float:
+        """Net flux that leaves for a fluence of 1; 0 where no light passes (Neumann)."""
+        ...
+
     def inflow(self, transmitted: float | FloatArray) -> float | FloatArray:
         """What diffuse irradiance that passes to the inside adds to the right-hand side, W/unit²."""
         ...
 
+    def exitance_offset(self, transmitted: float | FloatArray) -> float | FloatArray:
+        """Exitance where the fluence is 0, from the transmitted irradiance, W/unit²."""
+        ...
+
     def exitance(self, fluence: NumberArray, transmitted: float | FloatArray) -> NumberArray:
-        """Exitance (q,) from the fluence (q,) at places of the boundary and the transmitted irradiance, W/unit²."""
+        """Exitance (q,) from the fluence (q,) at points of the boundary and the transmitted irradiance, W/unit²."""
         ...
 
 
@@ -44,14 +53,27 @@ class PartialCurrent:
 
     medium: Medium
 
+    @property
+    def robin(self) -> float:
+        """``1/(2A)``."""
+        return 0.5 / self.medium.boundary_factor
+
     def inflow(self, transmitted: float | FloatArray) -> float | FloatArray:
         """``2 E_t/(1 + 3 C2)``, W/unit²."""
         return 2.0 * transmitted / (1.0 + 3.0 * moments(self.medium.eta)[1])
 
+    def exitance_offset(self, transmitted: float | FloatArray) -> float | FloatArray:
+        """``E_t (1 - 2/(1 + 3 C2))``: E_t less the inflow, W/unit²."""
+        return transmitted * (1.0 - 2.0 / (1.0 + 3.0 * moments(self.medium.eta)[1]))
+
     def exitance(self, fluence: NumberArray, transmitted: float | FloatArray) -> NumberArray:
         """``M = E.n + E_t``, W/unit²."""
-        exitance = fluence / (2.0 * self.medium.boundary_factor)
+        exitance = self.robin * fluence
         if np.any(transmitted):
-            _, c2 = moments(self.medium.eta)
-            exitance = exitance + transmitted * (1.0 - 2.0 / (1.0 + 3.0 * c2))
+            exitance = exitance + self.exitance_offset(transmitted)
         return np.asarray(exitance)
+
+
+def boundary_condition_of(medium: Medium) -> BoundaryCondition:
+    """The boundary condition of a body whose outer medium is given; a further kind is chosen here."""
+    return PartialCurrent(medium)

@@ -1,39 +1,52 @@
-"""`Diffusion`: steady light in the diffusion approximation, one real unknown, the fluence."""
+"""`Diffusion`: the diffusion approximation with one unknown, the fluence."""
 
 from dataclasses import dataclass
 
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.models.boundary import PartialCurrent
+from tetlux.fem.models.boundary import BoundaryCondition, boundary_condition_of
 from tetlux.fem.models.model import Block
 from tetlux.meshing.describe import one_line
 
 
 @dataclass(frozen=True, eq=False)
 class Diffusion:
-    """``-div(D grad phi) + sigma_a phi = Q0 - div(Q1/sigma_t')``, with `PartialCurrent` (CS667 notes, eq. 9).
+    """``-div(D grad phi) + (sigma_a + shift) phi = Q0 - div(Q1/sigma_t')`` (CS667 notes, eq. 9, where shift is 0).
 
     Parameters
     ----------
     coefficients : Coefficients
         Of the tetrahedra of a mesh.
+    shift : complex
+        See `tetlux.fem.models.model.Model`; 0 for steady light.
     """
 
     coefficients: Coefficients
+    shift: complex = 0.0
 
     @property
-    def boundary(self) -> PartialCurrent:
+    def boundary_condition(self) -> BoundaryCondition:
         """See `Model`."""
-        return PartialCurrent(self.coefficients.outer)
+        return boundary_condition_of(self.coefficients.outer)
 
     @property
     def blocks(self) -> tuple[tuple[Block]]:
         """One equation for one unknown."""
         coefficients = self.coefficients
-        return ((Block(coefficients.diffusion, coefficients.sigma_a, coefficients.robin),),)
+        return ((Block(coefficients.diffusion, coefficients.sigma_a, self.boundary_condition.robin),),)
 
     @property
     def nonnegative(self) -> bool:
-        """By the maximum principle."""
-        return True
+        """By the maximum principle, which holds for steady light."""
+        return self.shift == 0
 
     __repr__ = one_line
+
+
+def is_steady_diffusion(model: object) -> bool:
+    """Whether a model is `Diffusion` of steady light.
+
+    Only then do these apply: charges that are subtracted (`tetlux.fem.known`), fitted layers
+    (`tetlux.fem.operators.fitting`), quadratic elements (`tetlux.fem.quadratic`) and the estimate of the error
+    (`tetlux.fem.error`).
+    """
+    return isinstance(model, Diffusion) and model.shift == 0

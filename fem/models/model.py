@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from tetlux.fem.media.coefficients import Coefficients
-from tetlux.fem.models.boundary import Boundary
+from tetlux.fem.models.boundary import BoundaryCondition
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
@@ -34,21 +34,9 @@ class Model(Protocol):
     """What a model says of itself; `tetlux.fem.models.diffusion.Diffusion` is one.
 
     Its weak form is a sum of `Block` over equations i and unknowns j. Each block becomes the `Terms` of one matrix
-    (`Assembly.terms`), all of one pattern, real, and combined with any shift.
+    (`Assembly.terms`), all of one pattern and real. `operator_of` combines them with `shift`.
 
-    A model of modulated light has the blocks and the boundary of diffusion. It combines them with the shift
-    ``i omega n/c``, its unknown is complex, and `nonnegative` is False.
-
-    SP3 has two unknowns, phi_1 = phi_0 + 2 phi_2 and phi_2 (Klose & Larsen 2006). It has to implement:
-
-    * `blocks`, two by two: D and sigma of each equation on the diagonal, the coupling sigma off the diagonal with
-      D = 0, and its boundary condition, solved for the two fluxes, as four values of robin;
-    * a `Boundary` that returns the exitance from both unknowns;
-    * an operator that puts the four matrices into one and loads both equations: `fem/operators/operator.py` and
-      `load_vector` have one equation;
-    * the fluence phi_1 - 2 phi_2 of a `Solution`;
-    * and `subtract="nothing"`, since the charges of `tetlux.fem.known` and the estimate of `tetlux.fem.error` know
-      diffusion only.
+    `CONTRIBUTING.md` lists what modulated light and SP3 have to add.
     """
 
     @property
@@ -57,8 +45,17 @@ class Model(Protocol):
         ...
 
     @property
-    def boundary(self) -> Boundary:
+    def boundary_condition(self) -> BoundaryCondition:
         """What passes through the boundary."""
+        ...
+
+    @property
+    def shift(self) -> complex:
+        """What is added to sigma_a, 1/unit: 0 for steady light, ``i omega n/c`` for light modulated at omega (rad/s).
+
+        c is the speed of light in vacuum in unit/s, n the refractive index itself, `eta` times that of
+        the outside. It is one number, as all media of a body have one index.
+        """
         ...
 
     @property

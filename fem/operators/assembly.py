@@ -19,24 +19,26 @@ from scipy.sparse import csr_array
 
 from tetlux.fem.linear.krylov import Preconditioner
 from tetlux.fem.linear.solver import Solver, solver_for
-from tetlux.fem.media.coefficients import Coefficients, coefficients_of, condition_bound
+from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.diffusion import Diffusion
+from tetlux.fem.models.model import Model
 from tetlux.fem.operators.pattern import Pattern, pattern_of
-from tetlux.fem.operators.terms import Mass, Terms, boundary_term, mass_term, stiffness_term
+from tetlux.fem.operators.terms import Lumping, Terms, boundary_term, mass_term, stiffness_term
 from tetlux.meshing.arrays import FloatArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import cross, dot, run_on_corners
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import EDGES
 
-__all__ = ["ALIKE", "Assembly", "Mass", "system_matrix"]
+__all__ = ["SHARE_PRECONDITIONER_BELOW", "Assembly", "Lumping", "condition_bound", "system_matrix"]
 
-# Coefficients whose `condition_bound` is no larger share a preconditioner: it takes at most twice the iterations, and
-# on balls in a beam, with absorption or diffusion up to four times as strong, no more than its own.
-ALIKE = 4.0
+# Matrices whose `condition_bound` is no larger share a preconditioner. A shared one takes at most twice the iterations;
+# on balls in a beam, with absorption or diffusion up to four times as strong, it takes no more than the matrix's own.
+SHARE_PRECONDITIONER_BELOW = 4.0
 
 
-def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
+def system_matrix(mesh: TetMesh, medium: Medium, lumping: Lumping = "lumped") -> csr_array:
     """The matrix of the left-hand side of the weak form in `tetlux.fem.operators.forms`.
 
     Several media on one mesh share an `Assembly`.
@@ -45,7 +47,7 @@ def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_a
     ----------
     mesh : TetMesh
     medium : Medium
-    mass : {"lumped", "consistent"}
+    lumping : {"lumped", "consistent"}
         How the two terms without derivatives are integrated. Lumped (by the corners) is as accurate at
         second order, and keeps the fluence from going negative where consistent mass does.
 
@@ -54,51 +56,59 @@ def system_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_a
     (n, n) csr_array
         Symmetric, positive definite, indices sorted.
     """
-    return Assembly(mesh).of(coefficients_of(medium), mass)
+    return Assembly(mesh).assemble(coefficients_of(medium), lumping)
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What all matrices on a mesh have in common: their pattern, and the integrals of their hat functions.
+    """Assembles matrices on one mesh, which share their pattern and the integrals of their hat functions.
 
     Parameters
     ----------
     mesh : TetMesh
-    cycles : list of tuple of Coefficients and callable
-        What was prepared for multigrid, and the coefficients that it was prepared for.
+    multigrid_cycles : list of tuple of Model and callable
+        Multigrid cycles that were prepared, each with the model that it was prepared for.
     """
 
     mesh: TetMesh
-    cycles: list[tuple[Coefficients, Preconditioner]] = field(default_factory=list)
+    multigrid_cycles: list[tuple[Model, Preconditioner]] = field(default_factory=list)
 
-    def solver(self, coefficients: Coefficients, matrix: csr_array, loads: int) -> Solver:
-        """A solver for the matrix of given coefficients, prepared with what was prepared for similar ones."""
-        known = next((cycle for others, cycle in self.cycles if condition_bound(coefficients, others) <= ALIKE), None)
-        solver = solver_for(matrix, loads, known)
+    def solver(self, model: Model, matrix: csr_array, expected_right_hand_sides: int) -> Solver:
+        """A solver for the matrix of a model with one unknown; it takes the multigrid cycle of a similar one."""
+        known = next(
+            (
+                cycle
+                for other, cycle in self.multigrid_cycles
+                if condition_bound(model, other) <= SHARE_PRECONDITIONER_BELOW
+            ),
+            None,
+        )
+        solver = solver_for(matrix, expected_right_hand_sides, known)
         if known is None and solver.cycle is not None:
-            self.cycles.append((coefficients, solver.cycle))
+            self.multigrid_cycles.append((model, solver.cycle))
         return solver
 
-    def of(self, coefficients: Coefficients, mass: Mass = "lumped") -> csr_array:
-        """The matrix of given coefficients, see `system_matrix`."""
-        return self.matrix(coefficients.diffusion, coefficients.sigma_a, coefficients.robin, mass)
+    def assemble(self, coefficients: Coefficients, lumping: Lumping = "lumped") -> csr_array:
+        """The matrix of steady diffusion for given coefficients, see `system_matrix`."""
+        ((block,),) = Diffusion(coefficients).blocks
+        return self.matrix(block.diffusion, block.sigma, block.robin, lumping)
 
     def matrix(
         self,
         diffusion: float | FloatArray,
         sigma_a: float | FloatArray,
         robin: float | FloatArray,
-        mass: Mass = "lumped",
+        lumping: Lumping = "lumped",
     ) -> csr_array:
         """The matrix of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ robin phi v``, see `terms`."""
-        return self.terms(diffusion, sigma_a, robin, mass).combine()
+        return self.terms(diffusion, sigma_a, robin, lumping).combine()
 
     def terms(
         self,
         diffusion: float | FloatArray,
         sigma_a: float | FloatArray,
         robin: float | FloatArray,
-        mass: Mass = "lumped",
+        lumping: Lumping = "lumped",
         absorption_scale: FloatArray | None = None,
     ) -> Terms:
         """The terms of ``∫ D grad phi . grad v + ∫ sigma_a phi v + ∮ robin phi v``.
@@ -111,7 +121,7 @@ class Assembly:
             Absorption coefficient, 1/unit.
         robin : float or (f,) ndarray
             1/(2A), of all or of each boundary triangle; 0 where no light passes (Neumann).
-        mass : {"lumped", "consistent"}
+        lumping : {"lumped", "consistent"}
         absorption_scale : (n,) ndarray, optional
             The factor on the absorption in the lumped mass of each node, see `tetlux.fem.operators.fitting`.
 
@@ -123,10 +133,10 @@ class Assembly:
         return Terms(
             self.mesh,
             self._pattern,
-            mass,
+            lumping,
             stiffness_term(self.mesh, edges),
-            mass_term(self.mesh, sigma_a, mass, absorption_scale),
-            boundary_term(self.mesh, robin, mass),
+            mass_term(self.mesh, sigma_a, lumping, absorption_scale),
+            boundary_term(self.mesh, robin, lumping),
         )
 
     @cached_property
@@ -155,3 +165,26 @@ class Assembly:
         return pattern_of(self.mesh)
 
     __repr__ = one_line
+
+
+def condition_bound(one: Model, other: Model) -> float:
+    """A bound of the condition number of one matrix preconditioned by that of another model, both of one unknown.
+
+    For any fluence, each term of one weak form is the same term of the other times a ratio of coefficients, and so the
+    sums differ by a factor between the least and the largest ratio. The bound is the largest over the least. Of a shift
+    the modulus counts, as in the real matrices that complex ones are preconditioned by (`real_majorant`).
+    """
+    ratios = []
+    for pair in zip(_moduli(one), _moduli(other), strict=True):
+        first, second = np.broadcast_arrays(*pair)
+        present = (first > 0) | (second > 0)
+        with np.errstate(divide="ignore"):
+            ratios.append(np.ravel(first[present] / second[present]))
+    every = np.concatenate(ratios)
+    return float(every.max() / every.min()) if every.min() > 0 else np.inf
+
+
+def _moduli(model: Model) -> tuple[float | FloatArray, ...]:
+    """D, sigma with the modulus of the shift, and robin of a model of one unknown."""
+    ((block,),) = model.blocks
+    return block.diffusion, block.sigma + abs(model.shift), block.robin

@@ -17,7 +17,7 @@ from skfem import Basis, BilinearForm, ElementTetP1, FacetBasis, MeshTet1
 from skfem.helpers import dot, grad
 
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.operators.assembly import Mass
+from tetlux.fem.operators.assembly import Lumping
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Quadrature at the corners makes the mass matrices diagonal: that is all that lumping is for P1.
@@ -43,14 +43,14 @@ def exitance(phi: Any, v: Any, w: Any) -> Any:
     return phi * v / (2.0 * w.A)
 
 
-def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> csr_array:
+def weak_form_matrix(mesh: TetMesh, medium: Medium, lumping: Lumping = "lumped") -> csr_array:
     """The matrix of the left-hand side by scikit-fem's quadrature, to check `tetlux.fem.operators.assembly` by.
 
     Parameters
     ----------
     mesh : TetMesh
     medium : Medium
-    mass : {"lumped", "consistent"}
+    lumping : {"lumped", "consistent"}
         How the two terms without derivatives are integrated.
 
     Returns
@@ -58,7 +58,7 @@ def weak_form_matrix(mesh: TetMesh, medium: Medium, mass: Mass = "lumped") -> cs
     (n, n) csr_array
         Symmetric, positive definite.
     """
-    lumped = mass == "lumped"
+    lumped = lumping == "lumped"
     body = MeshTet1(np.ascontiguousarray(mesh.points.T), np.ascontiguousarray(mesh.tetrahedra.T))
     element = ElementTetP1()
     whole = {"quadrature": _CORNERS_OF_TETRAHEDRON} if lumped else {"intorder": 2}

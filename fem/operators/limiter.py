@@ -1,24 +1,24 @@
-"""No fluence below zero: what a node lacks is taken from its neighbours, and no power is lost.
+"""Limit a fluence to be nonnegative: what a node lacks is taken from its neighbours, and no power is lost.
 
 With lumped mass the matrix keeps the fluence from going below zero where no angle between faces is obtuse (Brandts,
 Korotov & Křížek 2007); meshers return others too, where the fluence overshoots in the dark by up to some per cent of
-its maximum. Each node stands for the power that is absorbed in its part of the volume and leaves through its part of
-the boundary, which is what a row of the matrix sums to; moving power from node to node leaves the ledger as it is. Of
-all fluences that differ from the one given by this, the one returned is near it: nothing moves farther than needed.
+its maximum. The fluence at a node times the sum of its row of the matrix is the power that is absorbed in its part of
+the volume and leaves through its part of the boundary. Moving this power from node to node leaves the ledger as it is;
+it is moved to the nearest nodes that lack it.
 """
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, divide_or_zero
 
 # Sweeps from neighbour to neighbour; what is still missing after them is taken from all nodes in proportion.
 SWEEPS = 10
-# Quotients by less than this could overflow.
-NOTHING = 1e-250
+# Divisors below this count as 0, since quotients could overflow.
+SMALLEST_DIVISOR = 1e-250
 
 
-def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
-    """Raise a fluence to zero where it is below, at the cost of the nodes around.
+def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tuple[FloatArray, float]:
+    """Raise a fluence to zero where it is negative, and lower it at the nodes around.
 
     Parameters
     ----------
@@ -38,10 +38,13 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
     """
     power = weights * fluence
     total = float(power.sum())
-    if fluence.min(initial=0.0) >= 0 or total < NOTHING:
+    if fluence.min(initial=0.0) >= 0 or total < SMALLEST_DIVISOR:
         return fluence, 0.0
     deficit, available = np.maximum(-power, 0.0), np.maximum(power, 0.0)
     limited_power = float(deficit.sum())
+
+    def ratio(a: FloatArray, b: FloatArray) -> FloatArray:
+        return divide_or_zero(a, b, SMALLEST_DIVISOR)
 
     def at_nodes(nodes: IntArray, values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(nodes, values, minlength=len(power)), dtype=np.float64)
@@ -52,15 +55,10 @@ def nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArray) -> tu
             break
         takers, givers = np.concatenate([pairs, pairs[:, ::-1]]).T
         # Each taker asks its neighbours in proportion to what they have; a giver gives no more than it has.
-        asked = _ratio(deficit, at_nodes(takers, available[givers]))[takers] * available[givers]
-        given = asked * np.minimum(_ratio(available, at_nodes(givers, asked)), 1.0)[givers]
+        asked = ratio(deficit, at_nodes(takers, available[givers]))[takers] * available[givers]
+        given = asked * np.minimum(ratio(available, at_nodes(givers, asked)), 1.0)[givers]
         deficit = np.maximum(deficit - at_nodes(takers, given), 0.0)
         available = np.maximum(available - at_nodes(givers, given), 0.0)
     # The total is kept to rounding.
-    available *= _ratio(np.array(total), available.sum())
-    return np.where(weights > 0, _ratio(available, weights), np.maximum(fluence, 0.0)), limited_power
-
-
-def _ratio(a: FloatArray, b: FloatArray) -> FloatArray:
-    """``a/b``, and 0 where b is next to nothing."""
-    return np.divide(a, b, out=np.zeros_like(a), where=b > NOTHING)
+    available *= ratio(np.array(total), available.sum())
+    return np.where(weights > 0, ratio(available, weights), np.maximum(fluence, 0.0)), limited_power

@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.media.coefficients import Coefficients, at_cells
-from tetlux.fem.models.boundary import PartialCurrent
+from tetlux.fem.models.boundary import BoundaryCondition, boundary_condition_of
 from tetlux.fem.operators.operator import Operator
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.ledger import Ledger
@@ -43,7 +43,8 @@ class Load:
     @property
     def has_first_moment(self) -> bool:
         """Whether it has a Q1, beside which the diffusion equation itself may have a fluence below zero."""
-        return len(self.deposit.terms.segments) > 0 and bool(np.any(self.operator.coefficients.cosine != 0))
+        cosine = self.operator.coefficients.delta_eddington_cosine
+        return len(self.deposit.terms.segments) > 0 and bool(np.any(cosine != 0))
 
     __repr__ = one_line
 
@@ -54,7 +55,7 @@ def load_of(deposit: Deposit, operator: Operator) -> Load:
     A fitted operator absorbs only in the layer: the rest of what is emitted is absorbed where it is emitted.
     """
     mesh = operator.mesh
-    at_nodes = load_vector(mesh, operator.coefficients, deposit.terms)
+    at_nodes = load_vector(mesh, operator.coefficients, deposit.terms, operator.model.boundary_condition)
     if operator.fitting is not None and np.any(deposit.terms.emission):
         emitted = mesh.to_nodes(deposit.terms.emission * mesh.volumes)
         withheld = (1.0 - operator.fitting.absorption_scale) * emitted
@@ -64,7 +65,9 @@ def load_of(deposit: Deposit, operator: Operator) -> Load:
     return Load(deposit, operator, at_nodes)
 
 
-def load_vector(mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
+def load_vector(
+    mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms, boundary: BoundaryCondition | None = None
+) -> FloatArray:
     """Load of source terms on the nodes of a mesh.
 
     Parameters
@@ -73,6 +76,8 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms) -
     coefficients : Coefficients
     terms : SourceTerms
         On this mesh, see `Deposit.evaluate_on`.
+    boundary : BoundaryCondition, optional
+        Of the model; if not given, that of diffusion.
 
     Returns
     -------
@@ -90,7 +95,7 @@ def load_vector(mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms) -
             cells[: len(terms.point_cells)] = terms.point_cells
         load += _point_load(mesh, points, powers, cells)
     if np.any(terms.transmitted_irradiance):
-        inflow = PartialCurrent(coefficients.outer).inflow(terms.transmitted_irradiance)
+        inflow = (boundary or boundary_condition_of(coefficients.outer)).inflow(terms.transmitted_irradiance)
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * inflow
     if np.any(terms.emission):
         load += mesh.to_nodes(terms.emission * mesh.volumes)
@@ -130,11 +135,12 @@ def _line_load(
         extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter
         phi1, phi2 = _phi(extinction * step)
-        carried = segments.fluxes[part.paths] * at_cells(coefficients.scattering, cells) * step
+        carried = segments.fluxes[part.paths] * at_cells(coefficients.delta_eddington_scattering, cells) * step
         carried *= np.exp(-optical_depths(part, coefficients.extinction, cells))
         mean = carried * phi1
-        # What goes with the derivatives along the path: the rest of Q0, and Q1.
-        along = carried * step * phi2 + mean * at_cells(coefficients.cosine / coefficients.sigma_t_prime, cells)
+        forward = coefficients.delta_eddington_cosine / coefficients.sigma_t_prime
+        # The factor of the derivatives along the path: the remainder of Q0, and Q1.
+        along = carried * step * phi2 + mean * at_cells(forward, cells)
         # Both are 0 outside, whatever the nodes there.
         for corner, weights, slopes in zip(mesh.tetrahedra[part.cells].T, part.weights.T, part.slopes.T, strict=True):
             load += np.bincount(corner, mean * weights + along * slopes, len(load))

@@ -1,11 +1,12 @@
-"""`Terms`: a system matrix by its terms, real, on one pattern; whoever needs ``K + s M + B`` combines them.
+"""`Terms`: the real terms of a system matrix, all of one pattern, to be combined with a shift.
 
 Beyond steady light the equation is the same with ``sigma_a + s n/c`` in place of sigma_a, with n the refractive index,
 c the speed of light and ``s = i omega`` for light modulated at the angular frequency omega, so that its matrix is::
 
     K + A + B + (s n/c) M
 
-with K the stiffness, A the absorption, B the boundary term and M the mass matrix.
+with K the stiffness, A the absorption, B the boundary term and M the mass matrix. `mass` is M; `lumping` says how M, A
+and B are integrated.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from tetlux.meshing.arrays import FloatArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
-Mass = Literal["lumped", "consistent"]
+Lumping = Literal["lumped", "consistent"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +59,16 @@ class Terms:
         K, ``∫ D grad phi . grad v``.
     absorption : Term
         A, ``∫ sigma_a phi v``.
-    boundary : Term
+    boundary_term : Term
         B, ``∮ phi v / (2A)``.
     """
 
     mesh: TetMesh
     pattern: Pattern
-    lumping: Mass
+    lumping: Lumping
     stiffness: Term
     absorption: Term
-    boundary: Term
+    boundary_term: Term
 
     @cached_property
     def mass(self) -> Term:
@@ -87,7 +88,7 @@ class Terms:
         (n, n) csr_array
             Symmetric, and not Hermitian where it is complex; it shares its pattern with others of the mesh.
         """
-        parts = [self.stiffness, self.absorption, self.boundary]
+        parts = [self.stiffness, self.absorption, self.boundary_term]
         diagonal = reduce(np.add, [part.diagonal for part in parts])
         edges = reduce(np.add, [part.edges for part in parts if part.edges is not None])
         if shift != 0:
@@ -103,7 +104,7 @@ def stiffness_term(mesh: TetMesh, edges: FloatArray) -> Term:
     return Term(edges, -to_ends(mesh, edges))
 
 
-def mass_term(mesh: TetMesh, sigma_a: float | FloatArray, lumping: Mass, scale: FloatArray | None = None) -> Term:
+def mass_term(mesh: TetMesh, sigma_a: float | FloatArray, lumping: Lumping, scale: FloatArray | None = None) -> Term:
     """``∫ sigma_a phi v``, with sigma_a of all or of each tetrahedron (m,), and a factor on that of each node (n,)."""
     lumped = sigma_a * mesh.node_volumes if np.ndim(sigma_a) == 0 else mesh.to_nodes(sigma_a * mesh.volumes)
     lumped = lumped if scale is None else scale * lumped
@@ -113,7 +114,7 @@ def mass_term(mesh: TetMesh, sigma_a: float | FloatArray, lumping: Mass, scale: 
     return _consistent(mesh, sum_by_index(slots, np.tile(sigma_a * mesh.volumes / 20.0, 6), len(mesh.edges)), lumped)
 
 
-def boundary_term(mesh: TetMesh, robin: float | FloatArray, lumping: Mass) -> Term:
+def boundary_term(mesh: TetMesh, robin: float | FloatArray, lumping: Lumping) -> Term:
     """``∮ robin phi v``, with robin of all or of each boundary triangle (f,)."""
     lumped = np.zeros(len(mesh.points))
     lumped[mesh.boundary_nodes] = mesh.to_boundary_nodes(robin * mesh.boundary_areas)

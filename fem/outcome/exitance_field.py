@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -73,4 +74,4 @@ class LinearFluence:
         """Exitance ``M = phi/(2A)`` (q,) on the facets nearest to points (q, 3), W/unit²."""
         _, face, weights = self.mesh.closest_boundary(queries)
         fluence = (weights * self.fluence[self.mesh.boundary_faces[face]]).sum(axis=1)
-        return np.asarray(fluence / (2.0 * self.medium.boundary_factor))
+        return np.asarray(boundary_condition_of(self.medium).exitance(fluence, 0.0))

@@ -1,12 +1,15 @@
-"""The solution of one light: its fluence, limited where it has to be, and its ledger."""
+"""The solution of one light: its fluence, limited to be nonnegative where that is asked for, and its ledger."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from tetlux.fem.known.subtraction import Subtraction
-from tetlux.fem.operators.limiter import nonnegative
+from tetlux.fem.operators.limiter import limit_to_nonnegative
 from tetlux.fem.operators.loads import Load
-from tetlux.fem.outcome.solution import Power, Solution
+from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -27,7 +30,7 @@ def solution_of_light(
     surface : Surface
         What the mesh stands for.
     limit : bool
-        Whether the fluence is kept from going below zero where the diffusion equation itself keeps it from that.
+        Whether the fluence is limited to be nonnegative where that of the equation itself is.
 
     Returns
     -------
@@ -37,11 +40,11 @@ def solution_of_light(
     mesh, limited_power = operator.mesh, 0.0
     dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
     if limit and operator.model.nonnegative and not dips:
-        fluence, limited_power = nonnegative(fluence, mesh.edges, operator.losses)
+        fluence, limited_power = limit_to_nonnegative(fluence, mesh.edges, operator.loss_weights)
     outside = mesh.boundary_node_areas * terms.irradiance
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
     emitted = float((mesh.volumes * terms.emission).sum())
-    absorbed = float((operator.absorbing * fluence).sum())
+    absorbed = float((operator.absorption_weights * fluence).sum())
     ledger = Power(
         incident=known.incident + float(outside.sum()) + emitted,
         specular=known.specular + float((outside - transmitted).sum()),
@@ -52,7 +55,7 @@ def solution_of_light(
     solution = Solution(
         mesh,
         surface,
-        operator.model.boundary,
+        operator.model.boundary_condition,
         fluence,
         ledger,
         tuple(each.patch for each in subtractions),
@@ -61,3 +64,33 @@ def solution_of_light(
     )
     exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(each.terms.exited for each in subtractions)
     return replace(solution, power=replace(ledger, exited=exited))
+
+
+def attach_quadratic(
+    of_lights: Sequence[Solution], loads: Sequence[Load], operator: QuadraticOperator
+) -> tuple[list[Solution], QuadraticSolution]:
+    """Give the solution of each light its quadratic elements, by which detectors are read.
+
+    Parameters
+    ----------
+    of_lights : sequence of Solution
+    loads : sequence of Load
+        Of the same lights.
+    operator : QuadraticOperator
+
+    Returns
+    -------
+    of_lights : list of Solution
+    quadratic : QuadraticSolution
+        Of all lights together.
+    """
+    lights = QuadraticScene(
+        operator,
+        tuple(load.deposit for load in loads),
+        tuple(solution.patches for solution in of_lights),
+        tuple(solution.fluence for solution in of_lights),
+    )
+    attached = [
+        replace(solution, quadratic=QuadraticSolution(lights, (light,))) for light, solution in enumerate(of_lights)
+    ]
+    return attached, QuadraticSolution(lights, tuple(range(len(loads))))

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.models.boundary import Boundary
+from tetlux.fem.models.boundary import BoundaryCondition
+from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import fluence_with_error
 from tetlux.fem.quadratic.solution import QuadraticSolution
@@ -23,37 +24,6 @@ from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 
-@dataclass(frozen=True)
-class Power:
-    """The ledger of a run: ``incident = specular + absorbed + exited + ballistic``, all in W.
-
-    Attributes
-    ----------
-    incident : float
-        Power that meets the body, or that sources inside it emit.
-    specular : float
-        Reflected at the surface at once.
-    absorbed : float
-        Turned to heat inside.
-    exited : float
-        Left through the surface after having been scattered: the integral of the exitance.
-    ballistic : float
-        Passed through without having been scattered.
-    """
-
-    incident: float
-    specular: float
-    absorbed: float
-    exited: float
-    ballistic: float
-
-    @property
-    def balance_error(self) -> float:
-        """What the ledger lacks, as a share of the incident power."""
-        out = self.specular + self.absorbed + self.exited + self.ballistic
-        return (self.incident - out) / self.incident
-
-
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Light in one body, solved.
@@ -63,7 +33,7 @@ class Solution:
     mesh : TetMesh
     surface : Surface
         What the mesh stands for: exitance at points is taken to this.
-    boundary : Boundary
+    boundary_condition : BoundaryCondition
         How the exitance follows from the fluence: see `tetlux.fem.models.boundary`.
     fluence : (n,) ndarray, real or complex
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
@@ -96,7 +66,7 @@ class Solution:
 
     mesh: TetMesh
     surface: Surface
-    boundary: Boundary
+    boundary_condition: BoundaryCondition
     fluence: NumberArray
     power: Power
     patches: tuple[Patch, ...] = ()
@@ -115,12 +85,12 @@ class Solution:
     @cached_property
     def exitance(self) -> NumberArray:
         """Exitance at the boundary nodes of `mesh`, (b,), W/unit²: see `tetlux.fem.models.boundary`."""
-        return self.boundary.exitance(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
+        return self.boundary_condition.exitance(self.fluence[self.mesh.boundary_nodes], self.transmitted_irradiance)
 
     @property
     def medium(self) -> Medium:
         """The medium below the surface: of a body of several, one of the refractive index that all of them share."""
-        return self.boundary.medium
+        return self.boundary_condition.medium
 
     def exitance_at(self, points: FloatArray) -> NumberArray:
         """Exitance at the points of the surface nearest to given points.
@@ -153,7 +123,7 @@ class Solution:
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        return self.boundary.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        return self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
@@ -199,7 +169,8 @@ class Solution:
         fluence = linear + (known - guessed)
         if np.iscomplexobj(fluence):
             return np.asarray(fluence)
-        # In a tetrahedron across which light fades to nothing the difference may be more than there is; a share is not.
+        # Where light fades within a tetrahedron, adding the difference may give a negative value; scaling by the ratio
+        # cannot.
         below = (fluence < 0) & (linear >= 0)
         shares = below & (known >= 0) & (guessed > 0)
         fluence[shares] = linear[shares] * known[shares] / guessed[shares]

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import (
     REFERENCE_MASS,
     REFERENCE_STIFFNESS,
@@ -24,7 +25,7 @@ BLOCK = 2048
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
     """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
-    boundary_matrices = coefficients.robin * face_matrices(space, faces)
+    boundary_matrices = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
     return csr_array(_assemble(space.cells, elements, space.size) + _assemble(faces, boundary_matrices, space.size))
 
 

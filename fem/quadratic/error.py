@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import at_cells
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.solution import QuadraticSolution
@@ -92,7 +93,8 @@ def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> Re
     squares = (RANDOM_SCALE * local) ** 2
     if not measurement.inside:
         # Along the normal the relative change of the fluence over the extrapolation length is 1.
-        steepness = operator.coefficients.robin / at_cells(operator.coefficients.diffusion, discrete.cells)
+        robin = boundary_condition_of(operator.coefficients.outer).robin
+        steepness = robin / at_cells(operator.coefficients.diffusion, discrete.cells)
         off = float(np.abs(measurement.weights) @ (discrete.distances_from_mesh * steepness)) * abs(value)
         squares[discrete.cells[0]] += off**2
     rays = BEAM_RELATIVE_ERROR * float(solution.broad_beams @ dual)

@@ -12,7 +12,7 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
-from tetlux.fem.media.fresnel import moments
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
 from tetlux.fem.quadratic.operator import QuadraticOperator
@@ -43,9 +43,8 @@ def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: Sou
         points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
         load += _point_load(space, points, powers)
     if np.any(terms.transmitted_irradiance):
-        _, c2 = moments(coefficients.outer.eta)
         entering = np.zeros(len(mesh.points))
-        entering[mesh.boundary_nodes] = 2.0 * terms.transmitted_irradiance / (1.0 + 3.0 * c2)
+        entering[mesh.boundary_nodes] = boundary_condition_of(coefficients.outer).inflow(terms.transmitted_irradiance)
         load += surface_load(space, entering)
     if np.any(terms.emission):
         emitted = volume_load(space, np.broadcast_to(terms.emission, len(mesh.tetrahedra)))
@@ -79,8 +78,9 @@ def line_load(
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
     for part in march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells):
         cells = cells_of(mesh, coefficients, part, segments.starts, segments.directions)
-        extinction, scattering = (at_cells(each, cells) for each in (coefficients.extinction, coefficients.scattering))
-        forward = at_cells(coefficients.cosine / coefficients.sigma_t_prime, cells)
+        extinction = at_cells(coefficients.extinction, cells)
+        scattering = at_cells(coefficients.delta_eddington_scattering, cells)
+        forward = at_cells(coefficients.delta_eddington_cosine / coefficients.sigma_t_prime, cells)
         arriving = segments.fluxes[part.paths] * np.exp(-optical_depths(part, coefficients.extinction, cells))
         step, outside = part.leave - part.enter, part.cells < 0
         lost = np.zeros(len(step))
@@ -142,9 +142,10 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     corners, on_boundary = mesh.tetrahedra[inside[cell, None], FACES[face]], neighbours.reshape(-1)[outer] < 0
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
     load = _product(operator.elements[inside], space.cells[inside], interpolant)
-    load += _product(coefficients.robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
+    robin = boundary_condition_of(coefficients.outer).robin
+    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
     value, flux = _integrals(space, faces, charges)
-    leaving = flux + (coefficients.robin * on_boundary)[:, None] * value
+    leaving = flux + (robin * on_boundary)[:, None] * value
     load -= sum_by_index(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_functions
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -46,7 +47,9 @@ class Measurement:
         face, weights = space.on_boundary(self.points)
         mesh = space.mesh
         dofs, shape_values = space.faces(mesh.boundary_faces[face]), shape_functions(weights, TRIANGLE_EDGES)
-        return DiscreteMeasurement(self, space, coefficients.robin, mesh.boundary_cells[face], dofs, shape_values)
+        return DiscreteMeasurement(
+            self, space, boundary_condition_of(coefficients.outer).robin, mesh.boundary_cells[face], dofs, shape_values
+        )
 
     __repr__ = one_line
 

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, dots
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
@@ -82,9 +83,8 @@ class QuadraticOperator:
         """
         nodes = len(self.mesh.points)
         assembly = Assembly(self.mesh)
-        linear = assembly.solver(
-            self.coefficients, assembly.of(self.coefficients), EXPECTED_RIGHT_HAND_SIDES
-        ).preconditioner
+        matrix = assembly.assemble(self.coefficients)
+        linear = assembly.solver(Diffusion(self.coefficients), matrix, EXPECTED_RIGHT_HAND_SIDES).preconditioner
         inverse = 1.0 / self.matrix.diagonal()[nodes:, None]
 
         def precondition(rest: FloatArray) -> FloatArray:
@@ -96,7 +96,7 @@ class QuadraticOperator:
         """Solutions (size, k) for loads (size, k), to relative residuals of about 1e-7."""
         product, precondition = self._product, self._precondition
         # Loads are scaled so that the iteration stops at STOP_RESIDUAL.
-        size = np.sqrt(dots(loads, loads)) * STOP_RESIDUAL / krylov.AIM
+        size = np.sqrt(dots(loads, loads)) * STOP_RESIDUAL / krylov.STOP_RESIDUAL
         size[size == 0] = 1.0
         scaled = loads / size
         groups = [

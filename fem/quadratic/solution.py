@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.media.coefficients import at_cells
-from tetlux.fem.media.fresnel import moments
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
@@ -204,7 +204,7 @@ class QuadraticSolution:
             return np.zeros(len(discrete.cells))
         transmitted = np.zeros(len(mesh.points))
         transmitted[mesh.boundary_nodes] = given
-        share = 1.0 - 2.0 / (1.0 + 3.0 * moments(self.operator.coefficients.outer.eta)[1])
+        share = boundary_condition_of(self.operator.coefficients.outer).exitance_offset(1.0)
         return np.asarray(share * (transmitted[discrete.dofs[:, :3]] * discrete.shape_values[:, :3]).sum(axis=1))
 
     __repr__ = one_line

@@ -62,7 +62,7 @@ def tetlux(points: FloatArray, tetrahedra: IntArray, method: str) -> Row:
     from tetlux.meshing import TetMesh  # noqa: PLC0415
 
     if method == "jacobi":
-        krylov.AIM = RESIDUAL
+        krylov.STOP_RESIDUAL = RESIDUAL
     medium = Medium(sigma_a=SIGMA_A, sigma_s_prime=SIGMA_S_PRIME, eta=ETA)
     load = np.zeros(len(points))
     load[source_node(points)] = 1.0
