@@ -105,6 +105,7 @@ def test_what_charges_violate_is_integrated_as_finely_as_facets(ball: Surface, b
     assert patch.violation.points.areas.sum() == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
 
 
+@pytest.mark.parametrize(("sigma_a", "depth"), [(0.0, 5.0), (0.0, 0.3), (1e-6, 10.0), (1e-4, 1.0)])
 def test_what_little_is_absorbed_is_right(ball: Surface, sigma_a: float, depth: float) -> None:
     """It is what does not flow out: sums over points miss 7e-4 of that."""
     medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
