@@ -20,7 +20,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
 SHORTER = 0.65
 # Facets shorter than this times the distance of the points at which the violation is integrated have more points.
-FINE = 1.0
+FINE = 0.7
 
 
 @dataclass(frozen=True, eq=False, repr=False)
