@@ -139,6 +139,11 @@ def test_places_serve_for_lights_about_as_deep() -> None:
     assert kept.find("other", 1.0) == (False, None)
 
 
+def test_surfaces_of_many_triangles_are_not_fitted(ball: Surface, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tetlux.fem.known.fitted.MOST_TRIANGLES", len(ball.faces) - 1)
+    assert not is_fitted(solve(ball, TISSUE, [PointSource((0.0, 0.0, 8.0))], tolerance=0.2))
+
+
 def test_what_cannot_be_fitted_has_the_half_space(ball: Surface, ball_mesh: TetMesh) -> None:
     source = PointSource((0.0, 0.0, 8.0))
     core = Region(sphere(3.0), Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4))
