@@ -260,7 +260,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     mesh = block((5, 5, 5), (5.0, 5.0, 5.0))
     segments = from_facets(mesh, 60, 6)
     load = segment_load(mesh, coefficients_of(FORWARD), segments)
-    monkeypatch.setattr(marching, "PORTION", portion)
+    monkeypatch.setattr(marching, "PATHS_AT_ONCE", portion)
     mesh = same_mesh(mesh)
     parts = list(march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells))
     assert len(parts) >= -(-len(segments.starts) // portion)
@@ -354,7 +354,7 @@ def test_no_more_is_kept_than_fits(ball_mesh: TetMesh, marches: list[int], monke
     segment_load(mesh, coefficients_of(FORWARD), several_segments[0])
     held = sum(len(part.segments.paths) for part in mesh.cache.paths.parts)
     # Room for two and a half.
-    monkeypatch.setattr(path_cache, "MOST_SEGMENTS", int(2.5 * held))
+    monkeypatch.setattr(path_cache, "MOST_CACHED_SEGMENTS", int(2.5 * held))
     for segments in several_segments:
         segment_load(mesh, coefficients_of(FORWARD), segments)
     assert len(mesh.cache.paths.parts) == 2
