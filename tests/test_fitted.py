@@ -139,6 +139,14 @@ def test_places_serve_for_lights_about_as_deep() -> None:
     assert kept.find("other", 1.0) == (False, None)
 
 
+def test_light_that_fades_to_nothing_is_not_fitted(ball: Surface, ball_mesh: TetMesh) -> None:
+    absorber, source = Medium(sigma_a=150.0, sigma_s_prime=300.0, eta=1.4), PointSource((0.0, 0.0, 5.0))
+    assert not is_fitted(solve(ball, absorber, [source], mesh=ball_mesh))
+    alone = solve(ball, absorber, [source], model="charges")
+    assert alone.error_estimate == np.inf
+    assert len(repr(alone)) < 300
+
+
 def test_surfaces_of_many_triangles_are_not_fitted(ball: Surface, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tetlux.fem.known.fitted.MOST_TRIANGLES", len(ball.faces) - 1)
     assert not is_fitted(solve(ball, TISSUE, [PointSource((0.0, 0.0, 8.0))], tolerance=0.2))

@@ -63,6 +63,9 @@ def estimate_errors(
 ) -> ErrorEstimates:
     """Bound and estimate by exitance and residual (n,) at samples, for charges a spacing (n,) apart."""
     size = norm(samples.areas, exitance)
+    if size == 0.0:
+        # Light that fades to nothing on its way to the surface: relative errors are not defined.
+        return ErrorEstimates(np.inf, np.inf)
     errors = exitance_error(equation, residual, spacing)
     return ErrorEstimates(norm(samples.areas, residual) / size, norm(samples.areas, errors) / size)
 

@@ -21,6 +21,7 @@ from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.nesting import nesting
@@ -209,6 +210,8 @@ class ChargeSolution:
         """Exitance in addition to ``phi/(2A)``: under diffuse light ``M = E_t + E.n``, W/unit²."""
         transmitted = sum(ledger.transmitted for ledger in self.ledgers)
         return float(boundary_condition_of(self.medium).exitance_offset(transmitted))
+
+    __repr__ = one_line
 
 
 def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
