@@ -51,14 +51,21 @@ class Patch:
     @cached_property
     def faces(self) -> tuple[IntArray, BoolArray]:
         """Its outer faces (f, 3), oriented outward, and whether each is a facet of the body's boundary (f,)."""
-        mesh, inside = self.mesh, np.flatnonzero(self.cells)
-        if len(inside) == len(self.cells):
+        mesh = self.mesh
+        if self.cells.all():
             return mesh.boundary_faces, np.ones(len(mesh.boundary_faces), dtype=bool)
-        neighbours = mesh.neighbours[inside]
+        cells, opposite, on_boundary = self.outer
+        return mesh.tetrahedra[cells[:, None], FACES[opposite]], on_boundary
+
+    @cached_property
+    def outer(self) -> tuple[IntArray, IntArray, BoolArray]:
+        """Its outer faces by their tetrahedra (f,) and opposite corners (f,), and whether each is of the boundary."""
+        inside = np.flatnonzero(self.cells)
+        neighbours = self.mesh.neighbours[inside]
         # At the boundary the index -1 reads the last tetrahedron; the first condition overrides what it says.
         places = np.flatnonzero((neighbours < 0) | ~self.cells[neighbours])
-        cells, faces = np.divmod(places, 4)
-        return mesh.tetrahedra[inside[cells, None], FACES[faces]], neighbours.reshape(-1)[places] < 0
+        cells, opposite = np.divmod(places, 4)
+        return inside[cells], opposite, neighbours.reshape(-1)[places] < 0
 
     __repr__ = one_line
 

@@ -1,10 +1,8 @@
 """What a patch adds to the load vector and to the ledger: integrals over its faces, less those of the interpolant."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
@@ -12,16 +10,14 @@ from tetlux.fem.media.coefficients import coefficients_of
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.loads import load_vector
+from tetlux.fem.simplex_rules import cut_near_charges
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 
-# Degrees of the quadrature rules for the faces of a patch, by the largest ratio of the longest edge to the distance of
-# the nearest charge. A face above the last limit is cut in four, at most _CUTS times.
+# Degrees of the quadrature rules for the faces of a patch: see `cut_near_charges`.
 _DEGREES = ((0.15, 2), (0.5, 4), (2.0, 8))
-_CUTS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,63 +109,27 @@ def patch_terms(patch: Patch, mass: Lumping, surface: BoundaryIntegrals | None =
 
 
 def _mass(values: FloatArray, mass: Lumping) -> FloatArray:
-    """Lumping matrices of simplices of unit size times values at their corners, (m, d + 1)."""
+    """Mass matrices of simplices of unit size times values at their corners, (m, d + 1)."""
     corners = values.shape[1]
     if mass == "lumped":
         return np.asarray(values / corners)
     return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
 
 
-@lru_cache(maxsize=1)
-def _rules() -> list[tuple[float, FloatArray, FloatArray]]:
-    """The limit, nodes (2, q) and weights (q,) of each quadrature rule of the unit triangle."""
-    # Imported here, since scikit-fem takes a sixth of the time that tetlux.fem takes to import.
-    from skfem.quadrature import get_quadrature  # noqa: PLC0415
-    from skfem.refdom import RefTri  # noqa: PLC0415
-
-    return [(limit, *get_quadrature(RefTri, degree)) for limit, degree in _DEGREES]
-
-
 def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
     """Integrals over triangles (f, 3, 3) of G and of ``D dG/dn`` against their three hat functions, (f, 3) each."""
     value, flux = np.zeros((len(corners), 3)), np.zeros((len(corners), 3))
-    tree = cKDTree(charges.positions)
-    # Triangles left to integrate: the face they belong to, and the barycentric coordinates of their corners in it.
-    owner, place = np.arange(len(corners)), np.broadcast_to(np.eye(3), (len(corners), 3, 3))
-    for cut in range(_CUTS + 1):
-        part = place @ corners[owner]
-        size = longest_sides(part)
-        near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
-        done = np.zeros(len(part), dtype=bool)
-        for limit, nodes, weights in _rules():
-            last = limit == _DEGREES[-1][0] and cut == _CUTS
-            now = ~done & ((near < limit) | last)
-            done |= now
-            _add_rule(value, flux, owner[now], place[now], part[now], nodes, weights, charges)
-        if done.all():
-            break
-        owner, place = np.repeat(owner[~done], 4), quarter_triangles(place[~done])
+
+    def locate(owner: IntArray, places: FloatArray) -> FloatArray:
+        return np.asarray(places @ corners[owner])
+
+    for pieces in cut_near_charges(len(corners), locate, charges.positions, _DEGREES):
+        owner, parts = pieces.owner, locate(pieces.owner, pieces.corners)
+        fluence, gradient = charges.fluence_and_gradient((pieces.rule.points @ parts).reshape(-1, 3))
+        normals = 0.5 * np.cross(parts[:, 1] - parts[:, 0], parts[:, 2] - parts[:, 0])  # as long as the area
+        areas = np.linalg.norm(normals, axis=1)[:, None] * pieces.rule.weights
+        through = np.einsum("fqi,fi->fq", gradient.reshape(len(parts), -1, 3), normals) * pieces.rule.weights
+        hats = pieces.rule.points @ pieces.corners
+        np.add.at(value, owner, np.einsum("fq,fqi->fi", fluence.reshape(areas.shape) * areas, hats))
+        np.add.at(flux, owner, np.einsum("fq,fqi->fi", charges.medium.diffusion * through, hats))
     return value, flux
-
-
-def _add_rule(
-    value: FloatArray,
-    flux: FloatArray,
-    owner: IntArray,
-    place: FloatArray,
-    part: FloatArray,
-    nodes: FloatArray,
-    weights: FloatArray,
-    charges: Charges,
-) -> None:
-    """Add a quadrature rule's integrals over parts of faces to `value` and `flux` (f, 3) of their owners."""
-    if len(owner) == 0:
-        return
-    hats = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]])
-    fluence, gradient = charges.fluence_and_gradient((hats @ part).reshape(-1, 3))
-    normal = np.cross(part[:, 1] - part[:, 0], part[:, 2] - part[:, 0])  # as long as twice the area
-    area = np.linalg.norm(normal, axis=1)
-    through = charges.medium.diffusion * np.einsum("fqi,fi->fq", gradient.reshape(len(part), -1, 3), normal)
-    tests = hats @ place
-    np.add.at(value, owner, np.einsum("fq,fqi->fi", fluence.reshape(len(part), -1) * area[:, None] * weights, tests))
-    np.add.at(flux, owner, np.einsum("fq,fqi->fi", through * weights, tests))

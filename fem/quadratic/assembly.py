@@ -6,11 +6,11 @@ from scipy.sparse import coo_array, csr_array
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import (
-    REFERENCE_MASS,
-    REFERENCE_STIFFNESS,
-    TETRAHEDRON_RULE,
     TRIANGLE_EDGES,
-    TRIANGLE_RULE,
+    cell_rule,
+    face_rule,
+    reference_mass,
+    reference_stiffness,
     shape_derivatives,
     shape_functions,
 )
@@ -44,14 +44,14 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
     diffusion, sigma_a = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma_a))
     hats, volumes = mesh.hat_gradients, mesh.volumes
     products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
-    values = products @ REFERENCE_STIFFNESS + (sigma_a * volumes)[:, None] * REFERENCE_MASS
+    values = products @ reference_stiffness() + (sigma_a * volumes)[:, None] * reference_mass()
     values = values.reshape(-1, 10, 10)
 
     def integrate(block: slice) -> None:
         some = curved[block]
-        slopes, weights = gradients(space, some, TETRAHEDRON_RULE[0], TETRAHEDRON_RULE[1])
+        slopes, weights = gradients(space, some, cell_rule().points, cell_rule().weights)
         own = np.einsum("cq,cqai,cqbi->cab", diffusion[some, None] * weights, slopes, slopes, optimize=True)
-        shape_values = shape_functions(TETRAHEDRON_RULE[0])
+        shape_values = shape_functions(cell_rule().points)
         pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 100)
         values[some] = own + ((sigma_a[some, None] * weights) @ pairs).reshape(-1, 10, 10)
 
@@ -74,8 +74,8 @@ def gradients(
 
 def face_matrices(space: QuadraticSpace, faces: IntArray) -> FloatArray:
     """Integrals of products of shape functions over triangles with DOF numbers (f, 6), (f, 6, 6)."""
-    shape_values = shape_functions(TRIANGLE_RULE[0], TRIANGLE_EDGES)
-    areas = TRIANGLE_RULE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE_RULE[0]), axis=2)
+    shape_values = shape_functions(face_rule().points, TRIANGLE_EDGES)
+    areas = face_rule().weights * np.linalg.norm(face_normals(space, faces, face_rule().points), axis=2)
     pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 36)
     return np.asarray((areas @ pairs).reshape(-1, 6, 6))
 
@@ -94,11 +94,9 @@ def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     values = (density * mesh.volumes)[:, None] * means
     curved = space.curved
     volumes = (
-        mesh.volumes[curved][:, None]
-        * TETRAHEDRON_RULE[1]
-        * np.linalg.det(space.jacobians(curved, TETRAHEDRON_RULE[0]))
+        mesh.volumes[curved][:, None] * cell_rule().weights * np.linalg.det(space.jacobians(curved, cell_rule().points))
     )
-    values[curved] = density[curved, None] * (volumes @ shape_functions(TETRAHEDRON_RULE[0]))
+    values[curved] = density[curved, None] * (volumes @ shape_functions(cell_rule().points))
     return sum_by_index(space.cells, values, space.size)
 
 
@@ -106,6 +104,6 @@ def surface_load(space: QuadraticSpace, at_nodes: FloatArray) -> FloatArray:
     """``∮ q v`` of densities q that are linear on boundary triangles, by their values at all nodes (n,), (size,)."""
     corners = space.mesh.boundary_faces
     faces = space.faces(corners)
-    areas = TRIANGLE_RULE[1] * np.linalg.norm(face_normals(space, faces, TRIANGLE_RULE[0]), axis=2)
-    values = (areas * (at_nodes[corners] @ TRIANGLE_RULE[0].T)) @ shape_functions(TRIANGLE_RULE[0], TRIANGLE_EDGES)
+    areas = face_rule().weights * np.linalg.norm(face_normals(space, faces, face_rule().points), axis=2)
+    values = (areas * (at_nodes[corners] @ face_rule().points.T)) @ shape_functions(face_rule().points, TRIANGLE_EDGES)
     return sum_by_index(faces, values, space.size)

@@ -4,16 +4,17 @@ The shape functions of a tetrahedron are its barycentric coordinates lambda_i, a
 its edges, in the order of `TetMesh.tetrahedron_edges`; those of a triangle likewise, for the edges 01, 12 and 20.
 """
 
-import numpy as np
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefTet, RefTri
+from functools import cache
 
+import numpy as np
+
+from tetlux.fem.simplex_rules import Rule, tetrahedron_rule, triangle_rule
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.topology import EDGES
 
 TRIANGLE_EDGES = np.array([[0, 1], [1, 2], [2, 0]])
 # Degree of the quadrature rules: exact for products of two quadratic functions.
-_DEGREE = 4
+DEGREE = 4
 
 
 def shape_functions(weights: FloatArray, edges: IntArray = EDGES) -> FloatArray:
@@ -33,27 +34,28 @@ def shape_derivatives(weights: FloatArray, edges: IntArray = EDGES) -> FloatArra
     return found
 
 
-def _rule(element: type, degree: int) -> tuple[FloatArray, FloatArray]:
-    points, weights = get_quadrature(element, degree)
-    return np.column_stack([1.0 - points.sum(axis=0), points.T]), weights / weights.sum()
+def cell_rule() -> Rule:
+    """The quadrature rule of a tetrahedron."""
+    return tetrahedron_rule(DEGREE)
 
 
-# Barycentric coordinates (q, 4) or (q, 3) of points, and their weights (q,), which sum to 1.
-TETRAHEDRON_RULE = _rule(RefTet, _DEGREE)
-TRIANGLE_RULE = _rule(RefTri, _DEGREE)
+def face_rule() -> Rule:
+    """The quadrature rule of a triangle."""
+    return triangle_rule(DEGREE)
 
 
-def _stiffness() -> FloatArray:
-    slopes = shape_derivatives(TETRAHEDRON_RULE[0])
-    return np.asarray(np.einsum("q,qap,qbr->prab", TETRAHEDRON_RULE[1], slopes, slopes).reshape(16, 100))
+@cache
+def reference_stiffness() -> FloatArray:
+    """The map of products of the gradients of the barycentric coordinates, (m, 16), to a stiffness matrix, (16, 100).
+
+    That is, to integrals of products of the gradients of shape functions over a straight tetrahedron of unit volume.
+    """
+    slopes = shape_derivatives(cell_rule().points)
+    return np.asarray(np.einsum("q,qap,qbr->prab", cell_rule().weights, slopes, slopes).reshape(16, 100))
 
 
-def _mass() -> FloatArray:
-    values = shape_functions(TETRAHEDRON_RULE[0])
-    return np.asarray(np.einsum("q,qa,qb->ab", TETRAHEDRON_RULE[1], values, values).reshape(100))
-
-
-# REFERENCE_STIFFNESS (16, 100) maps products of the gradients of the barycentric coordinates, (m, 16), to integrals of
-# products of the gradients of shape functions over a straight tetrahedron of unit volume, (m, 100). REFERENCE_MASS
-# (100,) are the integrals of products of shape functions over it.
-REFERENCE_STIFFNESS, REFERENCE_MASS = _stiffness(), _mass()
+@cache
+def reference_mass() -> FloatArray:
+    """Integrals of products of shape functions over a straight tetrahedron of unit volume, (100,)."""
+    values = shape_functions(cell_rule().points)
+    return np.asarray(np.einsum("q,qa,qb->ab", cell_rule().weights, values, values).reshape(100))

@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
-from skfem.quadrature import get_quadrature
-from skfem.refdom import RefTri
 
 from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.known.charges import Charges
@@ -17,21 +14,17 @@ from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
+from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
-from tetlux.meshing.surface.subdivide import quarter_triangles
-from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.topology import FACES
 
 # Gauss rule along a beam in each tetrahedron.
 BEAM_RULE = np.polynomial.legendre.leggauss(4)
-# Quadrature rules for triangles, each up to a ratio of the longest edge to the distance of the nearest charge. A
-# triangle with a ratio above the last limit is cut in four.
-TRIANGLE_RULES = tuple((limit, *get_quadrature(RefTri, degree)) for limit, degree in ((0.2, 4), (0.6, 6), (2.0, 10)))
-# A triangle is cut in four at most this often.
-MOST_CUTS = 12
+# Degrees of the quadrature rules for the faces of a patch: see `cut_near_charges`.
+FACE_DEGREES = ((0.2, 4), (0.6, 6), (2.0, 10))
 
 
 def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
@@ -135,11 +128,8 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
         return QuadraticPatch(patch, np.zeros(space.size), quadratic_load(space, coefficients, sources))
     interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
-    neighbours = mesh.neighbours[inside]
-    # At the boundary the index -1 reads the last tetrahedron; the first condition overrides that value.
-    outer = np.flatnonzero((neighbours < 0) | ~patch.cells[neighbours])
-    cell, face = np.divmod(outer, 4)
-    corners, on_boundary = mesh.tetrahedra[inside[cell, None], FACES[face]], neighbours.reshape(-1)[outer] < 0
+    cell, face, on_boundary = patch.outer
+    corners = mesh.tetrahedra[cell[:, None], FACES[face]]
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
     load = _product(operator.elements[inside], space.cells[inside], interpolant)
     robin = boundary_condition_of(coefficients.outer).robin
@@ -149,7 +139,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     load -= sum_by_index(faces, leaving, space.size)
     within = ~on_boundary
     if within.any():
-        load += _jump_load(space, charges, interpolant, inside[cell[within]], face[within])
+        load += _jump_load(space, charges, interpolant, cell[within], face[within])
     return QuadraticPatch(patch, interpolant, load)
 
 
@@ -163,15 +153,15 @@ def _jump_load(
     space: QuadraticSpace, charges: Charges, interpolant: FloatArray, cells: IntArray, local: IntArray
 ) -> FloatArray:
     """``∮ (G - I G) D dv/dn``, (size,), over faces of tetrahedra (f,) given by their opposite corners (f,)."""
-    nodes, weights = TRIANGLE_RULES[-1][1], TRIANGLE_RULES[-1][2]
-    on_face = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]])
+    rule = triangle_rule(FACE_DEGREES[-1][1])
+    on_face, weights = rule.points, rule.weights
     corners = space.mesh.tetrahedra[cells[:, None], FACES[local]]
     faces = space.faces(corners)
     shape_values = shape_functions(on_face, TRIANGLE_EDGES)
     points = shape_values @ space.corners_and_bends(faces)
     fluence = charges.fluence(points.reshape(-1, 3)).reshape(len(cells), -1)
     jumps = fluence - interpolant[faces] @ shape_values.T
-    normals = 2.0 * weights[:, None] * face_normals(space, faces, on_face)
+    normals = weights[:, None] * face_normals(space, faces, on_face)
     barycentric = np.zeros((len(cells), len(weights), 4))
     for corner in range(3):
         np.put_along_axis(barycentric, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
@@ -184,46 +174,20 @@ def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tupl
     """Integrals over triangles (f, 6) of G and of ``D dG/dn`` times their shape functions, (f, 6) each."""
     shapes = space.corners_and_bends(faces)
     value, flux = np.zeros((len(faces), 6)), np.zeros((len(faces), 6))
-    tree = cKDTree(charges.positions)
-    # Triangles left to integrate: the face they belong to, and the barycentric coordinates of their corners in it.
-    owner, place = np.arange(len(faces)), np.broadcast_to(np.eye(3), (len(faces), 3, 3))
-    for cut in range(MOST_CUTS + 1):
-        part = shape_functions(place, TRIANGLE_EDGES) @ shapes[owner]
-        size = longest_sides(part)
-        near = size / np.maximum(tree.query(part.mean(axis=1))[0], 1e-12 * size) if len(part) else size
-        done = np.zeros(len(part), dtype=bool)
-        for limit, nodes, weights in TRIANGLE_RULES:
-            now = np.flatnonzero(~done & ((near < limit) | (limit == TRIANGLE_RULES[-1][0] and cut == MOST_CUTS)))
-            done[now] = True
-            if len(now):
-                where = np.column_stack([1.0 - nodes[0] - nodes[1], nodes[0], nodes[1]]) @ place[now]
-                share = 4.0 ** (1 - cut) * 0.5 * weights
-                _add_rule(value, flux, owner[now], shapes[owner[now]], where, share, charges)
-        if done.all():
-            break
-        owner, place = np.repeat(owner[~done], 4), quarter_triangles(place[~done])
+
+    def locate(owner: IntArray, places: FloatArray) -> FloatArray:
+        return np.asarray(shape_functions(places, TRIANGLE_EDGES) @ shapes[owner])
+
+    for pieces in cut_near_charges(len(faces), locate, charges.positions, FACE_DEGREES):
+        owner, places = pieces.owner, pieces.rule.points @ pieces.corners
+        shape_values = shape_functions(places, TRIANGLE_EDGES)
+        points = shape_values @ shapes[owner]
+        slopes = shape_derivatives(places, TRIANGLE_EDGES).swapaxes(-1, -2) @ shapes[owner][:, None]
+        normals = 0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0])
+        normals *= pieces.share * pieces.rule.weights[:, None]
+        fluence, gradient = charges.fluence_and_gradient(points.reshape(-1, 3))
+        through = charges.medium.diffusion * np.einsum("fqi,fqi->fq", gradient.reshape(points.shape), normals)
+        amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)
+        np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, shape_values))
+        np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, shape_values))
     return value, flux
-
-
-def _add_rule(
-    value: FloatArray,
-    flux: FloatArray,
-    owner: IntArray,
-    shapes: FloatArray,
-    where: FloatArray,
-    weights: FloatArray,
-    charges: Charges,
-) -> None:
-    """Add integrals over parts of triangles to those of their owners.
-
-    `where` are barycentric coordinates (p, q, 3) of quadrature points in the owners.
-    """
-    shape_values = shape_functions(where, TRIANGLE_EDGES)
-    points = shape_values @ shapes
-    slopes = shape_derivatives(where, TRIANGLE_EDGES).swapaxes(-1, -2) @ shapes[:, None]
-    normals = weights[:, None] * 0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0])
-    fluence, gradient = charges.fluence_and_gradient(points.reshape(-1, 3))
-    through = charges.medium.diffusion * np.einsum("fqi,fqi->fq", gradient.reshape(points.shape), normals)
-    amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)
-    np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, shape_values))
-    np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, shape_values))

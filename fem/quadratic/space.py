@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem.quadratic.elements import TETRAHEDRON_RULE, TRIANGLE_EDGES, shape_derivatives, shape_functions
+from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, cell_rule, shape_derivatives, shape_functions
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
@@ -166,7 +166,7 @@ def _bend(mesh: TetMesh, bends: FloatArray, edges: IntArray, surface: Surface) -
 
 def _inverted_cells(space: QuadraticSpace) -> IntArray:
     """The tetrahedra that bending inverts or compresses below `LEAST_VOLUME_SHARE`."""
-    corners = np.vstack([np.eye(4), TETRAHEDRON_RULE[0]])
+    corners = np.vstack([np.eye(4), cell_rule().points])
     cells = space.curved
     shares = np.linalg.det(space.jacobians(cells, corners)) if len(cells) else np.ones((0, 1))
     return np.asarray(cells[shares.min(axis=1, initial=1.0) < LEAST_VOLUME_SHARE])
