@@ -13,8 +13,7 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
 from tetlux.fem.notes import notes_on, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
-from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA as MOST_TO_READ
-from tetlux.fem.outcome.detectors import Detector, place_detector, read_all
+from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
@@ -128,7 +127,7 @@ def solve_each(
         placed = tuple(place_detector(detector, dark) for detector in detectors)
         tolerances = Tolerances(tolerance, detector_tolerance, placed)
     if detector_tolerance is not None:
-        most_tetrahedra = min(most_tetrahedra, MOST_TO_READ)
+        most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
     problem = Problem(checked, sources, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)

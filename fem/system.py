@@ -201,8 +201,7 @@ class System:
             columns = [each.terms.load for each in [*subtractions, *fitted]] + [loads[light].at_nodes for light in lit]
             fluences, results = solve_columns(operators, columns, len(self.mesh.points))
             for column, each in enumerate(fitted, len(subtractions)):
-                if each.patch.cells.all():
-                    fluences[:, column] += each.patch.at_nodes
+                fluences[:, column] = each.fluence_of(fluences[:, column])
         accurate = tuple(
             good_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False)
         )

@@ -215,7 +215,7 @@ def test_light_that_fades_within_a_tetrahedron_is_read_by_linear_elements_and_sa
 
 
 def test_a_mesh_that_is_too_large_is_read_by_linear_elements(far: Solution, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tetlux.fem.outcome.detectors.MOST_TETRAHEDRA", 100)
+    monkeypatch.setattr("tetlux.fem.outcome.detectors.MOST_TETRAHEDRA_TO_READ", 100)
     reading = read(on_ball(ARCS)[1], far)
     assert reading.relative_error is None
     assert reading.exitance == far.exitance_on(np.array([reading.position]))[0]

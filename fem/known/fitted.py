@@ -11,6 +11,7 @@ apart: a coarse mesh will do, and is refined where u asks for it.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,8 +30,6 @@ from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
-# Points at which the residual is integrated lie so many times the spacing of charges apart, as which it ripples.
-INTEGRATED = 1.0
 # A source nearer to the surface than this share of a mean free path is not fitted: it would take many charges.
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
@@ -67,6 +66,11 @@ class Violation:
     residual: FloatArray
     missed: float
 
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the points."""
+        return cKDTree(self.points.points)
+
     __repr__ = one_line
 
 
@@ -96,7 +100,7 @@ class FittedLight:
         """Whether the charges are accurate at the point of `violation` nearest to each of some points (n, 3), (n,)."""
         if self.accurate.all():
             return np.ones(len(points), dtype=bool)
-        return np.asarray(self.accurate[cKDTree(self.violation.points.points).query(points)[1]])
+        return np.asarray(self.accurate[self.violation.tree.query(points)[1]])
 
     def violation_within(self, wanted: Spacing) -> Violation:
         """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
@@ -145,7 +149,7 @@ def fit_light(
 def _accurate(violation: Violation, medium: Medium) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
     points = violation.points
-    nearest = cKDTree(points.points).query(points.points, k=min(AVERAGED, len(points.points)))[1]
+    nearest = violation.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
     errors = exitance_error(equation_of(medium), violation.residual, points.spacing)
     error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(violation.exitance[nearest]).mean(axis=1)
     return np.asarray(error <= ACCURATE * exitance)
@@ -178,7 +182,7 @@ def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: S
     tree = cKDTree(samples.points)
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = INTEGRATED * EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
     points, equation = quadrature(surface, spacing), equation_of(charges.medium)

@@ -105,7 +105,7 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
     violation = light.violation
     corners = mesh.points[mesh.boundary_faces]
     sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
-    nearest = apart[cKDTree(points.points).query(corners.mean(axis=1))[1]]
+    nearest = apart[light.violation.tree.query(corners.mean(axis=1))[1]]
     if (sides < FINE * nearest).any():
         limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
         violation = light.violation_within(lambda queries: limits[tree.query(queries)[1]])

@@ -12,7 +12,7 @@ from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.operator import Operator
-from tetlux.meshing.arrays import BoolArray
+from tetlux.meshing.arrays import BoolArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -42,6 +42,11 @@ class Subtraction:
         """The same on the tetrahedra whose four nodes are good, (n,), alone."""
         patch = patch_of(self.patch.mesh, self.patch.charges, good, self.patch.at_nodes)
         return replace(self, patch=patch, terms=patch_terms(patch, self.mass))
+
+    def fluence_of(self, solution: NumberArray) -> NumberArray:
+        """Fluence at the nodes, (n,), by the solution (n,) for the load of `terms`."""
+        missing = isinstance(self.patch, FittedPatch) and self.patch.is_whole
+        return solution + self.patch.at_nodes if missing else solution
 
     __repr__ = one_line
 

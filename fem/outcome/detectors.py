@@ -28,7 +28,7 @@ CIRCLES = 16
 SPOKES = 32
 # Most tetrahedra of a mesh that is read by quadratic elements; on larger ones these take a minute and gigabytes. Larger
 # meshes are read by linear elements, without an error.
-MOST_TETRAHEDRA = 400_000
+MOST_TETRAHEDRA_TO_READ = 400_000
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
 
 def is_quadratic(solution: Solution) -> bool:
     """Whether a solution is read by quadratic elements: its mesh may be too large."""
-    return solution.quadratic is not None and len(solution.mesh.tetrahedra) <= MOST_TETRAHEDRA
+    return solution.quadratic is not None and len(solution.mesh.tetrahedra) <= MOST_TETRAHEDRA_TO_READ
 
 
 def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingError:
