@@ -42,7 +42,7 @@ def triangle_rule(degree: int) -> Rule:
 
 @cache
 def tetrahedron_rule(degree: int) -> Rule:
-    """The rule of a tetrahedron that is exact for polynomials of a degree."""
+    """The rule of a tetrahedron that is exact for polynomials of a degree up to 4; beyond, scikit-fem's is not."""
     return _rule("RefTet", degree)
 
 
