@@ -232,6 +232,21 @@ def share_mesh(
     return SharedMesh(refine_for_most(mesh, problem, tolerances, limit, report))
 
 
+def choose_places(
+    surface: Surface,
+    medium: AnyMedium | Sequence[AnyMedium],
+    scenes: Sequence[Sequence[Light]],
+    start: SharedMesh,
+    *,
+    regions: Sequence[Region] = (),
+    tolerance: float = 0.02,
+) -> None:
+    """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
+    checked = build_scenes(surface, None, medium, regions, len(scenes))
+    for lights, body in zip(scenes, checked.bodies, strict=True):
+        sources_of(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
+
+
 def _in_words(limit: MeshLimit) -> str:
     """A clause that says where refinement stopped."""
     if limit.memory is None:

@@ -39,6 +39,10 @@ class KeptPlaces:
         """Remember a choice."""
         self.choices.setdefault(light, []).append((depth, fit))
 
+    def copy(self) -> "KeptPlaces":
+        """The same choices, to which others can be added."""
+        return KeptPlaces({light: list(choices) for light, choices in self.choices.items()})
+
     __repr__ = one_line
 
 
