@@ -32,19 +32,6 @@ THREAD_LIMITS = dict.fromkeys(
     ),
     "1",
 )
-    (
-        THREADS_VARIABLE,
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "VTK_SMP_MAX_THREADS",
-    ),
-    "1",
-)
 # Workers that die before they have answered anything: there is something wrong with the machine, not with a run.
 MOST_DEATHS_AT_START = 3
 

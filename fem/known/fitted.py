@@ -69,7 +69,7 @@ class Violation:
     @cached_property
     def tree(self) -> cKDTree:
         """Of the points."""
-        return cKDTree(self.points.points)
+        return self.points.tree
 
     __repr__ = one_line
 
@@ -102,9 +102,9 @@ class FittedLight:
             return np.ones(len(points), dtype=bool)
         return np.asarray(self.accurate[self.violation.tree.query(points)[1]])
 
-    def violation_within(self, wanted: Spacing) -> Violation:
-        """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return violation_of(self.charges, self.places.fitted, self.surface, wanted)
+    def points_within(self, wanted: Spacing) -> Samples:
+        """Points as far apart as wanted at most, where a mesh is finer than those of the violation."""
+        return _violation_points(self.places.fitted, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -141,7 +141,10 @@ def fit_light(
     else:
         fitted = fit_at_places(like.places, equation, lights)
     charges = _charges(fitted, surface, medium)
-    violation = violation_of(charges, fitted.places.fitted, surface)
+    if like is not None and like.surface is surface:
+        violation = violation_at(like.violation.points, charges)
+    else:
+        violation = violation_of(charges, fitted.places.fitted, surface)
     accurate = like.accurate if like is not None else _accurate(violation, medium)
     return FittedLight(charges, violation, fitted.places, accurate, surface)
 
@@ -177,19 +180,30 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Violation:
+def violation_of(charges: Charges, samples: Samples, surface: Surface) -> Violation:
     """What charges violate on the true surface, at points that follow from samples where they were fitted."""
-    tree = cKDTree(samples.points)
+    return violation_at(_violation_points(samples, surface), charges)
+
+
+def _violation_points(samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Samples:
+    """Points at which a violation is integrated; they do not depend on the coefficients."""
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points, equation = quadrature(surface, spacing), equation_of(charges.medium)
+    points = quadrature(surface, spacing)
+    # Many runs may have these points on one mesh, which then finds them once.
+    points.points.setflags(write=False)
+    return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
+
+
+def violation_at(points: Samples, charges: Charges) -> Violation:
+    """What charges violate on the true surface, at points of it."""
+    equation = equation_of(charges.medium)
     fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
     exitance = equation.robin * fluence
-    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return Violation(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    return Violation(points, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:
