@@ -9,7 +9,7 @@ import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
-from tetlux.fem.known.split import Sources
+from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
@@ -107,7 +107,7 @@ class Problem:
     ----------
     scenes : Scenes
         The body and the media of each scene.
-    sources : list of Sources
+    lights : list of SplitLights
         The lights of each scene.
     lumping : {"lumped", "consistent"}
     limit : bool
@@ -120,7 +120,7 @@ class Problem:
     """
 
     scenes: Scenes
-    sources: list[Sources]
+    lights: list[SplitLights]
     lumping: Lumping
     limit: bool
     watch: Stopwatch
@@ -135,7 +135,7 @@ class Problem:
     @property
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
-        return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
+        return len(set(self.media)), sum(len(split.deposits) for split in self.lights)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
@@ -147,7 +147,7 @@ class Problem:
             systems = {
                 media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit) for media in each
             }
-        return lambda scene, coarser: systems[self.media[scene]].step(self.sources[scene], self.watch, coarser)
+        return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
 
     def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
         return shared.system(
@@ -171,7 +171,7 @@ def first_mesh(
                 mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
         slack = 1.0 if problem.shared is None else SLACK
         for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
-            deposits = [each for sources in problem.sources for each in sources.deposits_if(fitted=fitted)]
+            deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
             # The lights of others are taken to be of the same kind.
             source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
@@ -179,7 +179,7 @@ def first_mesh(
             )
         if tolerances.readings is not None:
             detector_points = np.array([placed.position for placed in tolerances.placed])
-            all_points, _ = places_to_resolve([each for sources in problem.sources for each in sources.deposits])
+            all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
                     mesh,
@@ -280,14 +280,14 @@ def refine_for_most(
     -------
     TetMesh
     """
-    pending: dict[int, MeshSolution | None] = dict.fromkeys(range(len(problem.sources)))
+    pending: dict[int, MeshSolution | None] = dict.fromkeys(range(len(problem.lights)))
     allowed = MOST_MISSING * len(pending)
     while True:
         solve_on = problem.solver_on(mesh)
         steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
         with problem.watch.stage("solve"):
             missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.sources)} need more")
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
         if len(missing) <= allowed:
             return mesh
         with problem.watch.stage("mesh"):

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from tetlux.fem.known.kept import KeptPlaces
+from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.system import System
@@ -29,12 +29,12 @@ class SharedMesh:
     Attributes
     ----------
     mesh : TetMesh
-    kept : KeptPlaces
+    kept : KeptFits
         Places of charges, chosen once for each light.
     """
 
     mesh: TetMesh
-    kept: KeptPlaces = field(default_factory=KeptPlaces)
+    kept: KeptFits = field(default_factory=KeptFits)
     _systems: dict[SystemKey, System] = field(default_factory=dict)
 
     @cached_property

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, refine_for_most, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
+from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
@@ -125,9 +125,9 @@ def solve_each(
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
         kept = _kept_for(mesh, start)
         if isinstance(body, TetMesh):
-            subtract = without_fit(subtract)
-        sources = [
-            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
+            subtract = replace_fitted(subtract)
+        split = [
+            split_lights(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
@@ -135,7 +135,7 @@ def solve_each(
         tolerances = Tolerances(tolerance, detector_tolerance, placed)
     if detector_tolerance is not None:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    problem = Problem(checked, sources, mass, limit, watch, start)
+    problem = Problem(checked, split, mass, limit, watch, start)
     given, reading = mesh is not None, len(detectors) > 0
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
@@ -143,13 +143,13 @@ def solve_each(
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
     if start is None:
-        keep_with(steps[0].solution.mesh, kept)
+        keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
             readings = read_all(detectors, step.solution)
-        notes = notes_on(step.solution, sources[number], tolerance, where)
+        notes = notes_on(step.solution, split[number], tolerance, where)
         notes += notes_on_readings(readings, detector_tolerance, where)
         notes += checked.warnings(number, step.solution, given=given)
         solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
@@ -157,11 +157,11 @@ def solve_each(
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
-def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptPlaces:
+def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptFits:
     """The places of charges to follow, and to add to."""
     if start is not None:
         return start.kept
-    return KeptPlaces() if mesh is None else kept_on(mesh)
+    return KeptFits() if mesh is None else fits_of(mesh)
 
 
 def share_mesh(
@@ -212,8 +212,8 @@ def share_mesh(
     """
     _check_tolerances(tolerance, detectors, detector_tolerance)
     checked = build_scenes(surface, None, medium, regions, len(scenes))
-    sources = [
-        sources_of(lights, body, "fitted", tolerance=tolerance or detector_tolerance or 0.02, kept=KeptPlaces())
+    split = [
+        split_lights(lights, body, "fitted", tolerance=tolerance or detector_tolerance or 0.02, kept=KeptFits())
         for lights, body in zip(scenes[:pilots], checked.bodies, strict=False)
     ]
     others = [
@@ -226,7 +226,7 @@ def share_mesh(
     tolerances = Tolerances(
         tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors)
     )
-    problem = Problem(checked, sources, "lumped", True, Stopwatch(), others=others)
+    problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)
     limit = limit_by_memory(MOST_SHARED_TETRAHEDRA, *problem.size, reading=len(detectors) > 0).tetrahedra
     mesh = first_mesh(problem, tolerances, limit, report, cache=cache)
     return SharedMesh(refine_for_most(mesh, problem, tolerances, limit, report))
@@ -244,7 +244,7 @@ def choose_places(
     """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
     checked = build_scenes(surface, None, medium, regions, len(scenes))
     for lights, body in zip(scenes, checked.bodies, strict=True):
-        sources_of(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
+        split_lights(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
 
 
 def _in_words(limit: MeshLimit) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.cases.batch.plan import Plan, PlannedMesh, PlannedSurface, PlannedTask
 from tetlux.cases.file.case import Case
-from tetlux.fem.known.kept import OTHER_DEPTH
+from tetlux.fem.known.kept_fits import OTHER_DEPTH
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.meshing.mesher.cache import mesh_key
 

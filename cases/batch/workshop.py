@@ -9,7 +9,7 @@ from tetlux.cases.batch.jobs import MeshJob, MeshMade, MeshNotMade, RunJob, Solv
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import FinishedCase, finish_case
 from tetlux.cases.write.publish import disk_is_full
-from tetlux.fem.known.kept import KeptPlaces
+from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve_scenes import choose_places
 from tetlux.meshing.errors import TetluxError
@@ -39,7 +39,7 @@ class Workshop:
         self._name, self._emit, self._wants_to_stop = name, emit, wants_to_stop
         # The last mesh, which the next task mostly has too, and the places that leaders have on it.
         self._mesh: tuple[int, TetMesh] | None = None
-        self._places: dict[int, KeptPlaces] = {}
+        self._places: dict[int, KeptFits] = {}
 
     def adapt(self, job: MeshJob) -> MeshMade | MeshNotMade:
         """Adapt the mesh of a group. Where that fails, runs make their own, and say what is wrong."""
@@ -72,7 +72,7 @@ class Workshop:
         """Give a shared mesh the places of a leader, and no others."""
         places = self._places.pop(leader, None)
         if places is None:
-            start.kept = places = KeptPlaces()
+            start.kept = places = KeptFits()
             _choose_places(job.leaders[leader], start)
         self._places[leader] = places
         while len(self._places) > MOST_LEADERS:
