@@ -117,6 +117,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--jobs", type=int, metavar="N", help="worker processes; default: the cores that this process may use"
     )
+    run.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
+    )
     run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
@@ -168,6 +173,7 @@ def _run(options: argparse.Namespace) -> int:
         options.out,
         jobs=options.jobs,
         resume=options.resume,
+        scheduler=options.scheduler,
         cache=not options.no_cache,
         listeners=[Lines()],
     )
