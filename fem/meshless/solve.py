@@ -156,7 +156,7 @@ def check_simple(surface: Surface) -> None:
 def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -> None:
     """Refuse sources on the surfaces of regions, where fluence has a pole on both sides."""
     for number, surface in enumerate(inner, 1):
-        away = np.linalg.norm(surface.project(points)[0] - points, axis=1)
+        away = surface.distances(points)
         if (away < LEAST_DISTANCE_TO_INTERFACE * medium.mean_free_path).any():
             place = ", ".join(f"{x:.4g}" for x in points[away.argmin()])
             raise InputError(
