@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 from tests.conftest import TISSUE, block, needs
 from tetlux.fem import Body, Medium, PointSource, Power, Solution, System
 from tetlux.fem.exact import sphere as exact
-from tetlux.fem.known.split import sources_of
+from tetlux.fem.known.split import split_lights
 from tetlux.fem.linear.direct import direct
 from tetlux.fem.linear.krylov import Method, Product, jacobi
 from tetlux.fem.linear.multigrid import Multigrid, multigrid
@@ -237,7 +237,7 @@ def test_what_knows_steady_diffusion_only_is_refused_or_left_out() -> None:
     with pytest.raises(InputError, match='charges are subtracted; give subtract="nothing"'):
         system.solve(light)
     with pytest.raises(InputError, match=r"errors are estimated; call System\.solve"):
-        system.step(sources_of(light, Body(mesh.surface, (TISSUE,)), "nothing"), Stopwatch())
+        system.step(split_lights(light, Body(mesh.surface, (TISSUE,)), "nothing"), Stopwatch())
     assert system.layer_operator is system.plain
     with pytest.raises(InputError, match="has no errors of single points"):
         system.solve(light, subtract="nothing").fluence_with_error(np.zeros((1, 3)))

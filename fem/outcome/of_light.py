@@ -38,8 +38,8 @@ def solution_of_light(
     """
     known, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
     mesh, limited_power = operator.mesh, 0.0
-    dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
-    if limit and operator.model.nonnegative and not dips:
+    may_be_negative = load.has_first_moment or any(each.patch.charges.has_negative_source for each in subtractions)
+    if limit and operator.model.nonnegative and not may_be_negative:
         fluence, limited_power = limit_to_nonnegative(fluence, mesh.edges, operator.loss_weights)
     outside = mesh.boundary_node_areas * terms.irradiance
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance

@@ -132,7 +132,7 @@ class Solution:
         Middles of boundary facets and their longest sides, and where charges were fitted, how far these are apart.
         """
         facets = self.mesh.points[self.mesh.boundary_faces]
-        fitted = [patch.violation.points for patch in self.patches if isinstance(patch, FittedPatch)]
+        fitted = [patch.residual.points for patch in self.patches if isinstance(patch, FittedPatch)]
         places = np.vstack([facets.mean(axis=1), *(each.points for each in fitted)])
         return places, np.concatenate([longest_sides(facets), *(each.spacing for each in fitted)])
 
