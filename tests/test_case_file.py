@@ -132,7 +132,7 @@ def at(line: int) -> str:
         (
             "outputs: [surface]",
             "sweep: {media.eta: [1]}",
-            at(13) + r'sweep\.media\.eta: unknown key; did you mean "medium\.eta"\?\n',
+            at(13) + r'sweep\.media\.eta: unknown key; did you mean "medium\.eta"\? write keys in full',
         ),
         ("outputs: [surface]", "sweep: {medium.eta: [1.4, 1.4]}", "a value is given twice"),
         (

@@ -62,8 +62,9 @@ def test_zipped_lists_go_together_and_make_a_grid_with_the_rest(tmp_path: Path) 
 def test_lists_and_sections_are_values_too(tmp_path: Path) -> None:
     cases = load(
         tmp_path,
-        "{lights.0.pencil.origin: [[0, 0, 20], [1, 0, 20]], surface: [{sphere: {radius: 10}}, {box: {size: [20, 19, 18]}}],"
-        " medium: [{material: marble}, {sigma_a: [0.1, 0.2], sigma_s_prime: 2, eta: 1.3}]}",
+        "{lights.0.pencil.origin: [[0, 0, 20], [1, 0, 20]], "
+        "surface: [{sphere: {radius: 10}}, {box: {size: [20, 19, 18]}}], "
+        "medium: [{material: marble}, {sigma_a: [0.1, 0.2], sigma_s_prime: 2, eta: 1.3}]}",
     )
     assert len(cases) == 8
     assert re.fullmatch(
@@ -98,7 +99,7 @@ def test_a_latin_hypercube_has_one_point_in_each_part_of_each_range(tmp_path: Pa
     assert [case.sweep_values for case in other] != [case.sweep_values for case in cases]
     random = load(tmp_path, text.replace("SEED", "1").replace("lhs", "random"))
     parts = np.floor(20 * (np.array([case.medium.sigma_s_prime for case in random]) - 0.5) / 2)
-    assert 0 <= parts.min()
+    assert parts.min() >= 0
     assert parts.max() < 20
     assert len(set(parts)) < 20
 
@@ -127,10 +128,12 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
     [
         ("{medium.sigma_aa: [1]}", 'sweep.medium.sigma_aa: unknown key; did you mean "medium.sigma_a"?'),
         ("{sigma_a: [1]}", 'sweep.sigma_a: unknown key; did you mean "medium.sigma_a"?'),
-        ("{sample: {size: 2, sigma: {start: 1, stop: 2}}}", 'sweep.sample.sigma: unknown key; did you mean "medium.sig'),
+        ("{sample: {size: 2, sigma: {start: 1, stop: 2}}}",
+         'sweep.sample.sigma: unknown key; did you mean "medium.sig'),
         ("{zip: {Medium.sigma_a: [1]}}", 'sweep.zip.Medium.sigma_a: unknown key; did you mean "medium.sigma_a"?'),
         ("{'lights[0].pencil.power': [1]}", 'unknown key; write "lights.0.pencil.power".'),
-        ("{lights.pencil.power: [1]}", "unknown key; lights is a list, whose items have numbers from 0, as in lights.0."),
+        ("{lights.pencil.power: [1]}",
+         "unknown key; lights is a list, whose items have numbers from 0, as in lights.0."),
         ("{lights.1.pencil.power: [1]}", "unknown key; lights has one item, 0, here."),
         ("{regions.0.medium.sigma_a: [1]}", "unknown key; regions has no items here."),
         ("{lights.0.pencil.power.watts: [1]}", "unknown key; lights.0.pencil.power is a single value."),
@@ -141,10 +144,13 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
         ("{medium.eta: 3}", "sweep.medium.eta: give a list of values, or a range as in {start: 1, stop: 100, num: 5,"),
         ("{medium.eta: {start: 1, stop: 2, num: 0}}", "sweep.medium.eta.num: expected a number greater than or equal"),
         ("{medium.eta: {start: 1, stop: 2, num: 1}}", "sweep.medium.eta.num: expected a number greater than or equal"),
-        ("{medium.eta: {start: 1, stop: 2, num: 2.5}}", "sweep.medium.eta.num: expected a whole number, but found 2.5."),
+        ("{medium.eta: {start: 1, stop: 2, num: 2.5}}",
+         "sweep.medium.eta.num: expected a whole number, but found 2.5."),
         ("{medium.eta: {start: 1, stop: 2}}", "sweep.medium.eta.num: this key is missing"),
-        ("{medium.eta: {start: 1, stop: 1, num: 3}}", "this range is empty, since start and stop are equal; give a list."),
-        ("{medium.eta: {start: -1, stop: 1, num: 3, scale: log}}", "a range of scale log has no 0 and no negative numb"),
+        ("{medium.eta: {start: 1, stop: 1, num: 3}}",
+         "this range is empty, since start and stop are equal; give a list."),
+        ("{medium.eta: {start: -1, stop: 1, num: 3, scale: log}}",
+         "a range of scale log has no 0 and no negative numb"),
         ("{medium.eta: {start: 1, stop: 2, num: 3, scale: logg}}", 'scale: did you mean "log"?'),
         ("{medium.eta: {from: 1, stop: 2, num: 3}}", "sweep.medium.eta.from: unknown key; "),
         ("{zip: {medium.eta: [1, 2], medium.sigma_a: [1, 2, 3]}}",
@@ -152,10 +158,13 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
         ("{zip: {medium.eta: [1, 1], medium.sigma_a: [2, 2]}}", "sweep.zip: the same values are given twice"),
         ("{medium.eta: [1, 1.0]}", "sweep.medium.eta: a value is given twice; give each once."),
         ("{medium.eta: [1, 2], zip: {medium.eta: [1]}}", "sweep.zip.medium.eta: medium.eta is swept twice"),
-        ("{sample: {size: 0, medium.eta: {start: 1, stop: 2}}}", "sweep.sample.size: expected a number greater than or"),
+        ("{sample: {size: 0, medium.eta: {start: 1, stop: 2}}}",
+         "sweep.sample.size: expected a number greater than or"),
         ("{sample: {medium.eta: {start: 1, stop: 2}}}", "sweep.sample.size: this key is missing"),
-        ("{sample: {size: 2, seed: -1, medium.eta: {start: 1, stop: 2}}}", "sweep.sample.seed: expected a number great"),
-        ("{sample: {size: 2, method: lsh, medium.eta: {start: 1, stop: 2}}}", 'sweep.sample.method: did you mean "lhs"?'),
+        ("{sample: {size: 2, seed: -1, medium.eta: {start: 1, stop: 2}}}",
+         "sweep.sample.seed: expected a number great"),
+        ("{sample: {size: 2, method: lsh, medium.eta: {start: 1, stop: 2}}}",
+         'sweep.sample.method: did you mean "lhs"?'),
         ("{sample: {size: 2, medium.eta: [1, 2]}}", "sweep.sample: no key has a range to draw from; give one"),
         ("{sample: {size: 2, medium.eta: {start: 1, stop: 2, num: 3}}}", "sweep.sample.medium.eta.num: unknown key;"),
         ("{sample: {size: 300, medium.eta: {start: 1, stop: 2}}, medium.sigma_a: {start: 1, stop: 2, num: 100}}",

@@ -37,8 +37,7 @@ def check_key(document: Document, at: Key, key: str) -> None:
     for depth, part in enumerate(parts):
         kinds = _kinds_at(parts[:depth])
         if not any(True for kind in kinds for _ in _step(kind, part)) or parts[0] in NOT_SWEPT:
-            hint = _hint(kinds, parts, depth)
-            raise document.error(at, f"unknown key; {hint}{'?' if hint.startswith('did') else '.'}")
+            raise document.error(at, f"unknown key; {_hint(kinds, parts, depth)}.")
 
 
 def with_value(document: Document, at: Key, data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
@@ -143,7 +142,8 @@ def _hint(kinds: list[Any], parts: Key, depth: int) -> str:
         word = nearest_word(part, inner) or ""
         found = f"{inner[word]}.{word}" if word else None
     if found:
-        return f'did you mean "{_dotted((*before, found, *after))}"'
+        meant = _dotted((*before, found, *after))
+        return f'did you mean "{meant}"? write keys in full, as in lights.0.pencil.power'
     if not names and all(get_origin(kind) in (list, tuple) for kind in kinds):
         return f"{_dotted(before)} is a list, whose items have numbers from 0, as in {_dotted((*before, 0))}"
     if not names:
