@@ -128,6 +128,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
     check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
     check.set_defaults(command=_check)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
@@ -183,7 +184,7 @@ def _run(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
-    return check_all(options.cases)
+    return check_all(options.cases, plan=options.plan)
 
 
 def _list(_: argparse.Namespace) -> int:
