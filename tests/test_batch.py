@@ -123,7 +123,8 @@ def test_one_failing_run_does_not_end_the_others(tmp_path: Path, monkeypatch: py
     events: list[Event] = []
     ended = run_batch(read(tmp_path), tmp_path / "out", jobs=1, listeners=[events.append])
     assert (ended.finished, ended.failed, ended.left) == (4, 2, 0)
-    first, second = (event for event in events if isinstance(event, RunFailed))
+    failures = [event for event in events if isinstance(event, RunFailed)]
+    first, second = sorted(failures, key=lambda event: event.run)
     assert first.reason == "no luck."
     assert first.sweep == {"medium.sigma_a": 0.012}
     assert "ZeroDivisionError" in second.reason

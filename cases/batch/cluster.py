@@ -37,31 +37,34 @@ _Files = dict[str, bytes]
 _Results = list[tuple[Event, _Files]]
 
 
-def run_on_cluster(batch: Batch, scheduler: str, listener: Listener) -> None:
+def run_on_cluster(batch: Batch, client: Any, listener: Listener) -> None:
     """Do a batch on the workers of a Dask scheduler.
 
     Parameters
     ----------
     batch : Batch
-    scheduler : str
-        Its address, as ``tcp://host:port``, or the path of a scheduler file.
+    client : distributed.Client
+        From `connect`.
     listener : callable
         Is called with each event, in this thread.
 
     Raises
     ------
-    InputError
-        If there is no such scheduler, it has no workers, or these have another version of tetlux or Python.
     RunError
         If the scheduler is lost.
     """
-    with connect(scheduler) as client, _probe(Path(batch.out)) as probe:
+    with _probe(Path(batch.out)) as probe:
         _Cluster(batch, client, str(probe), listener).work()
 
 
 @contextmanager
 def connect(scheduler: str) -> Iterator[Any]:
     """Connect to a scheduler whose workers can do the work.
+
+    Parameters
+    ----------
+    scheduler : str
+        Its address, as ``tcp://host:port``, or the path of a scheduler file.
 
     Yields
     ------
@@ -70,7 +73,7 @@ def connect(scheduler: str) -> Iterator[Any]:
     Raises
     ------
     InputError
-        See `run_on_cluster`.
+        If there is no such scheduler, it has no workers, or these have another version of tetlux or Python.
     """
     try:
         from distributed import Client  # noqa: PLC0415

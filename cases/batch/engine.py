@@ -3,7 +3,8 @@
 import json
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -76,27 +77,34 @@ def run_batch(
     kept = _finished(cases, out, contents) if resume else {}
     plan = make_plan(cases)
     batch = Batch(plan, cases, frozenset(kept), str(out.absolute()), cache, MeshStore(out, plan, contents))
-    workers = worker_count(jobs, len(cases) - len(kept))
-    track = _Track(len(cases), listeners)
-    track(BatchStarted(plan.names, out, workers, tuple(str(case.source) for case in cases)))
-    for run, summary in kept.items():
-        track(RunFinished(run, plan.names[run], out / plan.names[run], summary, 0.0, kept=True))
-    try:
-        if scheduler is not None:
-            from tetlux.cases.batch.cluster import run_on_cluster  # noqa: PLC0415 - Dask takes half a second
-
-            run_on_cluster(batch, scheduler, track)
-        elif workers > 1:
-            run_in_processes(batch, workers, track)
-        else:
-            _run_here(batch, track)
-    except BaseException as error:
-        track.end("interrupted" if isinstance(error, KeyboardInterrupt) else "stopped")
-        raise
-    ended = track.end("stopped" if track.left else "complete")
+    with _workers(scheduler, worker_count(jobs, len(cases) - len(kept))) as (workers, run_on):
+        track = _Track(len(cases), listeners)
+        track(BatchStarted(plan.names, out, workers, tuple(str(case.source) for case in cases)))
+        for run, summary in kept.items():
+            track(RunFinished(run, plan.names[run], out / plan.names[run], summary, 0.0, kept=True))
+        try:
+            run_on(batch, track)
+        except BaseException as error:
+            track.end("interrupted" if isinstance(error, KeyboardInterrupt) else "stopped")
+            raise
+        ended = track.end("stopped" if track.left else "complete")
     if not ended.failed:
         batch.store.clear()
     return ended
+
+
+@contextmanager
+def _workers(scheduler: str | None, count: int) -> Iterator[tuple[int, Callable[[Batch, "_Track"], None]]]:
+    """How many runs are solved at a time, and what does a batch: a cluster, worker processes, or this process."""
+    if scheduler is not None:
+        from tetlux.cases.batch.cluster import connect, run_on_cluster  # noqa: PLC0415 - Dask takes half a second
+
+        with connect(scheduler) as client:
+            yield len(client.nthreads()), lambda batch, track: run_on_cluster(batch, client, track)
+    elif count > 1:
+        yield count, lambda batch, track: run_in_processes(batch, count, track)
+    else:
+        yield 1, _run_here
 
 
 def worker_count(jobs: int | None, runs: int) -> int:

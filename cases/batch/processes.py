@@ -47,6 +47,7 @@ class _Worker:
     in_flight: tuple[int, str] | None = None
     ended: set[int] = field(default_factory=set)
     has_answered: bool = False
+    listener: threading.Thread = field(default_factory=threading.Thread)
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ class _Pool:
         for worker in self._workers:
             worker.process.kill()
         for worker in self._workers:
-            worker.process.wait()
+            _close(worker)
 
     def _stop(self) -> None:
         """Let the runs in flight end, and begin no others."""
@@ -151,12 +152,13 @@ class _Pool:
         assert process.stdin is not None
         assert process.stdout is not None
         worker = _Worker(name, process, Sender(process.stdin))
-        threading.Thread(target=self._listen, args=(worker, process.stdout), daemon=True).start()
+        worker.listener = threading.Thread(target=self._listen, args=(worker, process.stdout), daemon=True)
+        worker.listener.start()
         self._workers.append(worker)
         return worker
 
     def _listen(self, worker: _Worker, stream: IO[bytes]) -> None:
-        with contextlib.suppress(Exception):  # a worker killed within a message leaves half of it
+        with stream, contextlib.suppress(Exception):  # a worker killed within a message leaves half of it
             for answer in receive(stream):
                 self._answers.put((worker, answer))
         self._answers.put((worker, _Gone()))
@@ -186,7 +188,7 @@ class _Pool:
     def _replace(self, worker: _Worker) -> None:
         """Put back the job of a worker that died; another one starts when that is handed out."""
         self._workers.remove(worker)
-        reason = _reason(worker.process.wait())
+        reason = _reason(_close(worker))
         if worker.job is None or self._stopping:
             return
         self._deaths_at_start += not worker.has_answered
@@ -203,6 +205,16 @@ class _Pool:
 
     def _emit(self, event: Event) -> None:
         self._listener(event)
+
+
+def _close(worker: _Worker) -> int:
+    """Wait for the end of a process, and return its exit code."""
+    if worker.process.stdin is not None:
+        with contextlib.suppress(OSError):
+            worker.process.stdin.close()
+    code = worker.process.wait()
+    worker.listener.join()
+    return code
 
 
 def _reason(code: int) -> str:
