@@ -129,10 +129,9 @@ def solve_each(
         kept = _kept_for(mesh, start)
         if isinstance(body, TetMesh):
             subtract = replace_fitted(subtract)
+        wanted = tolerance or detector_tolerance or DEFAULT_TOLERANCE
         split = [
-            split_lights(
-                lights, each, subtract, tolerance=tolerance or detector_tolerance or DEFAULT_TOLERANCE, kept=kept
-            )
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept)
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
