@@ -161,7 +161,7 @@ def _write(results: Results, folder: Path, started: float) -> tuple[list[str], l
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     if "picture" in case.outputs:
-        warnings += draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
+        draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
     if readings:
         write_readings(readings, unit, folder / READINGS)
         if len(case.detectors) >= ENOUGH_TO_DRAW:
