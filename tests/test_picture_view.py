@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import run
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
@@ -234,7 +233,7 @@ def test_a_run_draws_its_regions_and_detectors(tmp_path: Path, monkeypatch: pyte
         scenes.append(scene)
         path.write_bytes(b"")
 
-    monkeypatch.setattr(run, "draw_picture", kept)
+    monkeypatch.setattr(picture, "draw_picture", kept)
     case = case_of(
         "up: [0, 1, 0]\ncamera: {azimuth: 10}\n"
         "regions: [{name: core, surface: {sphere: {radius: 4}}, medium: {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}}]\n"

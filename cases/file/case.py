@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tetlux.cases.compare.comparison import Comparison
 from tetlux.cases.file.detectors import NamedDetector
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.picture.view import UPRIGHT
@@ -17,6 +17,9 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.notes import Note, in_region
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+if TYPE_CHECKING:
+    from tetlux.cases.compare.comparison import Comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,7 @@ class Case:
     up: Vector = UPRIGHT
     toward: FloatArray | None = None
     reading_seconds: float = 0.0
-    comparison: Comparison | None = None
+    comparison: "Comparison | None" = None
     mesh: TetMesh | None = None
 
     @property

@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.file.body import CaseBody, read_body
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
@@ -23,6 +23,9 @@ from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_m
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
+
+if TYPE_CHECKING:
+    from tetlux.cases.compare.comparison import Comparison
 
 
 def load_cases(path: Path) -> list[Case]:
@@ -100,9 +103,14 @@ def _build_case(
     )
 
 
-def _build_comparison(document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]) -> Comparison | None:
+def _build_comparison(
+    document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]
+) -> "Comparison | None":
     if not spec.compare:
         return None
+    # Closed forms take a tenth of a second to import.
+    from tetlux.cases.compare.comparison import comparison_for  # noqa: PLC0415
+
     with document.at(("compare",)):
         if len(body.media) > 1 or body.regions or not isinstance(body.media[0], Medium):
             raise InputError("closed forms exist for one channel and one uniform medium only; leave compare out.")
