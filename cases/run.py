@@ -14,7 +14,7 @@ from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
+from tetlux.cases.write.results import AnySolution, Results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
@@ -97,7 +97,7 @@ def run_case(
         with claim_folder(out, case.name) as folder:
             solutions = _solve(case, report, cache=cache)
             try:
-                warnings, readings = _write(collect_results(case, solutions), folder, started)
+                warnings, readings = _write(Results(case, tuple(solutions)), folder, started)
                 publish(folder, target, ALL_FILES)
             except OSError as error:
                 raise write_error(target, error) from error

@@ -1,6 +1,5 @@
 """`Results`: the solutions of all channels of a run, and their exitance at the vertices of one surface."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
 
@@ -13,7 +12,7 @@ from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
-from tetlux.fem.outcome.radiance import radiance
+from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
@@ -43,6 +42,10 @@ class _ChannelSum:
         places, sizes = zip(*(channel.resolution for channel in self.channels), strict=True)
         return np.vstack(places), np.concatenate(sizes)
 
+    @property
+    def error_estimate(self) -> float:
+        return min(channel.error_estimate for channel in self.channels)
+
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
 
@@ -56,16 +59,45 @@ class Results:
     case : Case
     solutions : tuple of Solution or ChargeSolution
         One for each channel.
-    surface : Surface
-        The case's surface, with vertices added where its triangles are too large to show the exitance.
-    parts : dict of (v,) ndarray
-        Exitance at the surface's vertices by channel and light, W/unit².
     """
 
     case: Case
     solutions: tuple[AnySolution, ...]
-    surface: Surface
-    parts: dict[tuple[str, str], FloatArray]
+
+    @property
+    def shows_surface(self) -> bool:
+        """Whether an output shows the exitance all over the surface."""
+        return any(output in self.case.outputs for output in ("surface", "picture"))
+
+    @cached_property
+    def _on_surface(self) -> tuple[Surface, dict[tuple[str, str], FloatArray]]:
+        """The surface with vertices that resolve the summed exitance, and that of each channel and light there."""
+        whole: ResolvedField = self.solutions[0] if len(self.solutions) == 1 else _ChannelSum(self.solutions)
+        surface, total = surface_exitance(whole)
+        parts = {}
+        for channel, solution in zip(self.case.channels, self.solutions, strict=True):
+            for name, part in solutions_by_light(list(channel.lights), solution):
+                parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
+        return surface, parts
+
+    @property
+    def surface(self) -> Surface:
+        """The case's surface, with vertices added where its triangles are too large to show the exitance."""
+        return self._on_surface[0]
+
+    @property
+    def parts(self) -> dict[tuple[str, str], FloatArray]:
+        """Exitance at the surface's vertices (v,) by channel and light, W/unit²."""
+        return self._on_surface[1]
+
+    def exitance_range(self, channel: str) -> tuple[float, float]:
+        """Least and largest exitance of a channel, W/unit².
+
+        Those at the vertices of the surface that is shown; if none is, those at the boundary nodes of the mesh.
+        """
+        shown = self.shows_surface or not self.mesh_solutions
+        values = self.exitance(channel) if shown else self.solutions[self.case.channel_names.index(channel)].exitance
+        return float(values.min()), float(values.max())
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
         """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit²."""
@@ -104,17 +136,6 @@ def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[st
     return list(zip(names, solution.of_lights or (solution,), strict=True))
 
 
-def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
-    """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
-    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
-    surface, total = surface_exitance(whole)
-    parts = {}
-    for channel, solution in zip(case.channels, solutions, strict=True):
-        for name, part in solutions_by_light(list(channel.lights), solution):
-            parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
-    return Results(case, tuple(solutions), surface, parts)
-
-
 def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
     """The arrays of ``surface.ply`` and ``surface.vtp`` at the vertices."""
     case = results.case
@@ -134,7 +155,11 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
             [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
         )
     if case.camera is not None:
-        radiances = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        _, cosine = view_cosine(case.surface, results.surface.points, np.asarray(case.camera))
+        radiances = [
+            radiance_of(results.exitance(channel), cosine, solution.medium.eta)
+            for channel, solution in zip(channels, results.solutions, strict=True)
+        ]
         values["radiance"] = np.sum(radiances, axis=0)
         if len(channels) > 1:
             values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}

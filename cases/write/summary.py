@@ -14,7 +14,6 @@ from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
-from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.tets.mesh import TetMesh
@@ -48,7 +47,7 @@ def summarize(
         _channel(
             channel,
             solution,
-            results.exitance(channel.name),
+            results.exitance_range(channel.name),
             several,
             media,
         )
@@ -63,7 +62,7 @@ def summarize(
         "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
-        **({"preview_white": results.preview[1]} if results.has_colours else {}),
+        **({"preview_white": results.preview[1]} if results.has_colours and results.shows_surface else {}),
         **({"detectors": readings} if readings else {}),
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
@@ -85,7 +84,7 @@ def _mesh(case: Case, mesh: TetMesh) -> dict[str, Any]:
 
 
 def _channel(
-    channel: Channel, solution: AnySolution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
+    channel: Channel, solution: AnySolution, exitance: tuple[float, float], several: bool, media: list[dict[str, Any]]
 ) -> dict[str, Any]:
     area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
     figures: dict[str, Any] = {
@@ -96,8 +95,8 @@ def _channel(
         "media": media,
         "power": _power(solution.power),
         "exitance": {
-            "min": float(exitance.min()),
-            "max": float(exitance.max()),
+            "min": exitance[0],
+            "max": exitance[1],
             "mean": solution.power.exited / area,
         },
         "error_estimate": _finite(solution.error_estimate),

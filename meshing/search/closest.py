@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.search.box_tree import BoxTree
+from tetlux.meshing.search.located import Located
 
 # Queries farther away than this many times the extent of the triangles are moved nearer, along their direction, so that
 # squares of distances keep their digits. What is closest to them does not change by more than the inverse of this.
@@ -20,7 +21,7 @@ class ClosestPoint:
     """Closest points of a set of triangles: 4 to 8 µs for each that is near to them.
 
     A first guess is the triangle with the nearest centre. All triangles whose boxes are no farther than that are then
-    compared.
+    compared. What was found is remembered: whatever is asked of the points of a surface, they are located once.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ class ClosestPoint:
     """
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
-        self._triangles = points, faces
+        self._triangles, self._located = (points, faces), Located()
         low, high = points[faces].min(axis=(0, 1)), points[faces].max(axis=(0, 1))
         self._middle, self._extent = 0.5 * (low + high), float(np.linalg.norm(high - low))
         # By corner, coordinate and triangle, relative to the middle.
@@ -43,9 +44,17 @@ class ClosestPoint:
 
     def __call__(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         """Closest points (q, 3) of the triangles to queries (q, 3), and the triangle of each, (q,)."""
+        queries = np.asarray(queries, dtype=float)
+        known, nearest, faces = self._located.find(queries)
+        new = np.flatnonzero(~known)
+        if len(new):
+            nearest[new], faces[new] = self._find(queries[new])
+            self._located.add(queries[new], nearest[new], faces[new])
+        return nearest, faces
+
+    def _find(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
         places = self._place(queries)
-        guess = self._centres.query(places)[1] if len(places) else np.zeros(0, dtype=np.int64)
-        faces = np.asarray(guess, dtype=np.int64)
+        faces = np.asarray(self._centres.query(places)[1], dtype=np.int64)
         reach = np.sqrt(self._squares(places, faces))
         for rows, candidates in self._candidates(places, reach):
             squares = self._squares(places[rows], candidates)
