@@ -14,7 +14,7 @@ from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import AnySolution, Results, surface_values, volume_values
+from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
@@ -95,10 +95,15 @@ def run_case(
     started, target = time.perf_counter(), out / case.name
     try:
         with claim_folder(out, case.name) as folder:
+            report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
             solutions = _solve(case, report, cache=cache)
+            seconds = solutions[0].seconds
+            report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
+            writing = time.perf_counter()
             try:
-                warnings, readings = _write(Results(case, tuple(solutions)), folder, started)
+                warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
                 publish(folder, target, ALL_FILES)
+                report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
                 raise write_error(target, error) from error
     except (MemoryError, RuntimeError) as error:
@@ -148,10 +153,9 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
-def _write(results: Results, folder: Path, started: float) -> tuple[list[str], list[dict[str, Any]]]:
+def _write(results: Results, folder: Path, started: float, writing: float) -> tuple[list[str], list[dict[str, Any]]]:
     """Write all files of a run into a folder, and return its warnings and readings."""
-    writing = time.perf_counter()
-    case, first = results.case, results.solutions[0]
+    case = results.case
     unit = case.surface.unit
     warnings = _warnings(results)
     if "surface" in case.outputs:
@@ -179,15 +183,28 @@ def _write(results: Results, folder: Path, started: float) -> tuple[list[str], l
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
-    now = time.perf_counter()
-    seconds = {**first.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
-    seconds["surface"] += case.reading_seconds
-    figures = summarize(results, readings, seconds, warnings)
+    figures = summarize(results, readings, warnings)
     if compared is not None:
         figures["compare"] = compared.differences
+    figures["seconds"] = _seconds(results, started, writing)
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
     return warnings, readings
+
+
+def _seconds(results: Results, started: float, writing: float) -> dict[str, float]:
+    """Seconds by stage, from the start of the command until now, of a run that began and was written at some time."""
+    case, of_solve, now = results.case, results.solutions[0].seconds, time.perf_counter()
+    seconds = {
+        "start": case.start_seconds,
+        **of_solve,
+        "surface": case.reading_seconds + of_solve["surface"],
+        # With what is between the stages of the solver.
+        "solve": of_solve["solve"] + writing - started - of_solve["total"],
+        "write": now - writing,
+        "total": case.start_seconds + case.reading_seconds + now - started,
+    }
+    return {stage: round(value, 4) for stage, value in seconds.items()}
 
 
 def _places_lit(case: Case) -> FloatArray:

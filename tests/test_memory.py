@@ -88,7 +88,7 @@ def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("error", [MemoryError(), RuntimeError("can't start new thread")])
-@pytest.mark.parametrize("stage", ["solve_each", "Results", "write_mesh"])
+@pytest.mark.parametrize("stage", ["solve_each", "collect_results", "write_mesh"])
 def test_memory_that_runs_out_fails_its_case_only(
     error: Exception, stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

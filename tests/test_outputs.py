@@ -18,7 +18,7 @@ from tetlux.cases.file.colours import LUMINANCE, preview, to_linear, to_srgb
 from tetlux.cases.file.detectors import read_detectors
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import run_case
-from tetlux.cases.write.results import Results
+from tetlux.cases.write.results import Results, collect_results
 from tetlux.fem import PointDetector, read, solve
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
@@ -52,7 +52,7 @@ class Finished:
 
     @property
     def results(self) -> Results:
-        return Results(self.case, tuple(self.solutions))
+        return collect_results(self.case, self.solutions)
 
 
 @pytest.fixture(scope="module")
@@ -269,7 +269,7 @@ def test_one_channel_and_one_light_have_no_names_beside(tmp_path: Path) -> None:
 
 def test_vertices_are_chosen_by_all_channels_together(finished: Finished) -> None:
     case, solutions = finished.case, finished.solutions
-    results = Results(case, tuple(solutions))
+    results = collect_results(case, solutions)
     given = len(case.surface.points)
     np.testing.assert_array_equal(results.surface.points[:given], case.surface.points)
     assert len(results.surface.points) > 10 * given

@@ -74,8 +74,10 @@ class Case:
         The direction that is up in the picture.
     toward : (3,) ndarray, optional
         Unit vector from the body to the eye of the picture; if not given, it is chosen by the light.
+    start_seconds : float
+        From the start of the command until its first case file was read; 0 for other cases.
     reading_seconds : float
-        Time spent on reading and checking the surface.
+        Time spent on reading and checking the case and its files.
     mesh : TetMesh, optional
         A mesh that is used as it is; `surface` is then its boundary.
     comparison : Comparison, optional
@@ -101,6 +103,7 @@ class Case:
     camera: Vector | None = None
     up: Vector = UPRIGHT
     toward: FloatArray | None = None
+    start_seconds: float = 0.0
     reading_seconds: float = 0.0
     comparison: "Comparison | None" = None
     mesh: TetMesh | None = None

@@ -1,6 +1,8 @@
 """`load_cases`: from a case file to its runs, with all that can be checked before meshing."""
 
+import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,6 +18,7 @@ from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.sweep import LONGEST_NAME, expand_sweep
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
+from tetlux.cases.start import take_start_seconds
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.medium import Medium
@@ -54,6 +57,7 @@ def load_cases(path: Path) -> list[Case]:
     >>> case.name, case.channel_names, case.surface.unit
     ('sphere', ('all',), 'mm')
     """
+    start_seconds, started = take_start_seconds(), time.perf_counter()
     document = read_document(path)
     spec = validate(document, document.data)
     reader = Reader(path.parent)
@@ -65,14 +69,17 @@ def load_cases(path: Path) -> list[Case]:
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise of_run.error(("name",), "this cannot be the name of a folder; give a short, printable name.")
         folder = name if run.label is None else f"{name}/{run.label}"
-        cases.append(_build_case(of_run, spec_of_run, folder, reader, run.values))
+        case = _build_case(of_run, spec_of_run, folder, reader, run.values)
+        # What several runs share is read for the first.
+        now = time.perf_counter()
+        cases.append(replace(case, start_seconds=start_seconds, reading_seconds=now - started))
+        start_seconds, started = 0.0, now
     return cases
 
 
 def _build_case(
     document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]
 ) -> Case:
-    reader.seconds = 0.0
     channels = channel_names(document, spec)
     body = read_body(document, spec, len(channels), reader)
     if spec.model == "charges":
@@ -98,7 +105,6 @@ def _build_case(
         camera=spec.camera.position if spec.camera else None,
         up=spec.up,
         toward=_direction_to_camera(document, spec, body.surface),
-        reading_seconds=reader.seconds,
         comparison=_build_comparison(document, spec, body, deposits),
     )
 

@@ -1,6 +1,5 @@
 """`Reader`: reads the files that a case names, each once for all runs of its sweep."""
 
-import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -27,12 +26,9 @@ class Reader:
     ----------
     folder : Path
         The folder of the case file, to which file names are relative.
-    seconds : float
-        Time spent on reading and checking surfaces and meshes since this was last set to 0.
     """
 
     folder: Path
-    seconds: float = 0.0
     _surfaces: dict[str, Surface] = field(default_factory=dict)
     _meshes: dict[str, TetMesh] = field(default_factory=dict)
     _fields: dict[str, Field] = field(default_factory=dict)
@@ -41,20 +37,16 @@ class Reader:
     def surface(self, spec: SurfaceSpec, unit: str) -> Surface:
         """Read a surface file, or make a built-in shape."""
         label = spec.model_dump_json() + unit
-        started = time.perf_counter()
         if label not in self._surfaces:
             self._surfaces[label] = replace(_surface(spec, unit, self.folder), crease_angle=spec.crease_angle)
-        self.seconds += time.perf_counter() - started
         return self._surfaces[label]
 
     def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
         """Read a volume mesh."""
         label = f"{spec.file} {spec.scale!r} {spec.array} {unit}"
-        started = time.perf_counter()
         if label not in self._meshes:
             path = self.folder / spec.file
             self._meshes[label] = read_mesh(path, unit=unit, scale=spec.scale, labels=spec.array)
-        self.seconds += time.perf_counter() - started
         return self._meshes[label]
 
     def field(self, spec: FieldSpec) -> Field:

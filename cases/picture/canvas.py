@@ -55,10 +55,17 @@ class Canvas:
         outline : str, optional
             Colour of a rim round the letters.
         """
-        options = {"stroke_width": 2, "stroke_fill": outline} if outline else {}
-        if "\n" in text:
-            options |= {"align": "center", "spacing": 0.35 * size}
-        self._draw.text(place, text, fill=color, font=_font(size), anchor=anchor, **options)
+        self._draw.text(
+            place,
+            text,
+            fill=color,
+            font=_font(size),
+            anchor=anchor,
+            align="center",
+            spacing=0.35 * size,
+            stroke_width=2 if outline else 0,
+            stroke_fill=outline,
+        )
 
     def line(self, points: Sequence[Point], width: float, color: str, *, round_ends: bool = False) -> None:
         """Draw a line through points."""

@@ -1,6 +1,7 @@
 """`Results`: the solutions of all channels of a run, and their exitance at the vertices of one surface."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
 import numpy as np
@@ -12,6 +13,7 @@ from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
+from tetlux.fem.outcome.extremes import extreme_places, vertices_of
 from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
@@ -59,45 +61,16 @@ class Results:
     case : Case
     solutions : tuple of Solution or ChargeSolution
         One for each channel.
+    surface : Surface
+        The case's surface, with vertices added where its triangles are too large to show the exitance.
+    parts : dict of (v,) ndarray
+        Exitance at the surface's vertices by channel and light, W/unit².
     """
 
     case: Case
     solutions: tuple[AnySolution, ...]
-
-    @property
-    def shows_surface(self) -> bool:
-        """Whether an output shows the exitance all over the surface."""
-        return any(output in self.case.outputs for output in ("surface", "picture"))
-
-    @cached_property
-    def _on_surface(self) -> tuple[Surface, dict[tuple[str, str], FloatArray]]:
-        """The surface with vertices that resolve the summed exitance, and that of each channel and light there."""
-        whole: ResolvedField = self.solutions[0] if len(self.solutions) == 1 else _ChannelSum(self.solutions)
-        surface, total = surface_exitance(whole)
-        parts = {}
-        for channel, solution in zip(self.case.channels, self.solutions, strict=True):
-            for name, part in solutions_by_light(list(channel.lights), solution):
-                parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
-        return surface, parts
-
-    @property
-    def surface(self) -> Surface:
-        """The case's surface, with vertices added where its triangles are too large to show the exitance."""
-        return self._on_surface[0]
-
-    @property
-    def parts(self) -> dict[tuple[str, str], FloatArray]:
-        """Exitance at the surface's vertices (v,) by channel and light, W/unit²."""
-        return self._on_surface[1]
-
-    def exitance_range(self, channel: str) -> tuple[float, float]:
-        """Least and largest exitance of a channel, W/unit².
-
-        Those at the vertices of the surface that is shown; if none is, those at the boundary nodes of the mesh.
-        """
-        shown = self.shows_surface or not self.mesh_solutions
-        values = self.exitance(channel) if shown else self.solutions[self.case.channel_names.index(channel)].exitance
-        return float(values.min()), float(values.max())
+    surface: Surface
+    parts: dict[tuple[str, str], FloatArray]
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
         """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit²."""
@@ -134,6 +107,40 @@ class Results:
 def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[str, AnySolution]]:
     """The part of each light in a solution, with the name of the light."""
     return list(zip(names, solution.of_lights or (solution,), strict=True))
+
+
+def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
+    """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
+    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
+    parts = {}
+    if not _shows_surface(case) and all(isinstance(solution, Solution) for solution in solutions):
+        surface, total = _extremes([solution for solution in solutions if isinstance(solution, Solution)])
+    else:
+        surface, total = surface_exitance(whole)
+    for channel, solution in zip(case.channels, solutions, strict=True):
+        for name, part in solutions_by_light(list(channel.lights), solution):
+            parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
+    return Results(case, tuple(solutions), surface, parts)
+
+
+def _shows_surface(case: Case) -> bool:
+    """Whether the exitance is written or drawn, or an even preview of it needs vertices everywhere."""
+    return bool({"surface", "picture"} & set(case.outputs)) or case.channel_names == RGB
+
+
+def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
+    """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
+    first = solutions[0].surface
+    if len(solutions) == 1:
+        points = extreme_places(solutions[0])
+    else:
+        brightest = [extreme_places(solution)[len(first.points) :] for solution in solutions]
+        points = np.vstack([first.points, *brightest])
+    vertices = vertices_of(first)
+    total = sum(
+        np.concatenate([each.exitance_on(vertices), each.exitance_on(points[len(vertices) :])]) for each in solutions
+    )
+    return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
 
 
 def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:

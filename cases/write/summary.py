@@ -14,6 +14,7 @@ from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.tets.mesh import TetMesh
@@ -21,18 +22,14 @@ from tetlux.meshing.tets.mesh import TetMesh
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
-def summarize(
-    results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
-) -> dict[str, Any]:
-    """Summarize a run as plain data.
+def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[str]) -> dict[str, Any]:
+    """Summarize a run as plain data, but for its seconds.
 
     Parameters
     ----------
     results : Results
     readings : list of dict
         Rows of the detectors.
-    seconds : dict of str to float
-        By stage.
     warnings : list of str
 
     Returns
@@ -47,7 +44,7 @@ def summarize(
         _channel(
             channel,
             solution,
-            results.exitance_range(channel.name),
+            results.exitance(channel.name),
             several,
             media,
         )
@@ -62,9 +59,8 @@ def summarize(
         "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
-        **({"preview_white": results.preview[1]} if results.has_colours and results.shows_surface else {}),
+        **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
-        "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
@@ -84,7 +80,7 @@ def _mesh(case: Case, mesh: TetMesh) -> dict[str, Any]:
 
 
 def _channel(
-    channel: Channel, solution: AnySolution, exitance: tuple[float, float], several: bool, media: list[dict[str, Any]]
+    channel: Channel, solution: AnySolution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
 ) -> dict[str, Any]:
     area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
     figures: dict[str, Any] = {
@@ -95,8 +91,8 @@ def _channel(
         "media": media,
         "power": _power(solution.power),
         "exitance": {
-            "min": exitance[0],
-            "max": exitance[1],
+            "min": float(exitance.min()),
+            "max": float(exitance.max()),
             "mean": solution.power.exited / area,
         },
         "error_estimate": _finite(solution.error_estimate),

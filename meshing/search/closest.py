@@ -85,7 +85,7 @@ class ClosestPoint:
         limit = FARTHEST * self._extent
         far = size > limit
         places[far] *= (limit / size[far])[:, None]
-        return places
+        return np.asarray(places)
 
     def _candidates(self, places: FloatArray, reach: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:
         """Pairs of a query and a triangle whose box is within reach."""
