@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from tetlux.cases.file.detectors import NamedDetector
 from tetlux.cases.file.schema.case import CaseSpec
@@ -84,8 +84,8 @@ class Case:
         Closed forms to compare the run with.
     spec : CaseSpec
         The validated case file of this run.
-    sweep_values : mapping of str to float or str
-        The values of this run of a sweep, by dotted key; empty without a sweep.
+    sweep_values : mapping
+        The values of this run of a sweep, plain data by dotted key; empty without a sweep.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Case:
     tolerance: float | None
     outputs: tuple[str, ...]
     spec: CaseSpec
-    sweep_values: Mapping[str, float | str]
+    sweep_values: Mapping[str, Any]
     detectors: tuple[NamedDetector, ...] = ()
     detector_tolerance: float | None = None
     camera: Vector | None = None
