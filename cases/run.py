@@ -197,8 +197,9 @@ def _seconds(results: Results, started: float, writing: float) -> dict[str, floa
     case, of_solve, now = results.case, results.solutions[0].seconds, time.perf_counter()
     seconds = {
         "start": case.start_seconds,
-        **of_solve,
         "surface": case.reading_seconds + of_solve["surface"],
+        "mesh": of_solve["mesh"],
+        "assemble": of_solve["assemble"],
         # With what is between the stages of the solver.
         "solve": of_solve["solve"] + writing - started - of_solve["total"],
         "write": now - writing,
