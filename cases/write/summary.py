@@ -23,18 +23,14 @@ from tetlux.meshing.tets.mesh import TetMesh
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
-def summarize(
-    results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
-) -> dict[str, Any]:
-    """Summarize a run as plain data.
+def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[str]) -> dict[str, Any]:
+    """Summarize a run as plain data, but for its seconds.
 
     Parameters
     ----------
     results : Results
     readings : list of dict
         Rows of the detectors.
-    seconds : dict of str to float
-        By stage.
     warnings : list of str
 
     Returns
@@ -66,7 +62,6 @@ def summarize(
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
-        "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
         "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
