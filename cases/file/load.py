@@ -88,6 +88,8 @@ def _build_case(
         mesh=body.mesh,
         tolerance=spec.tolerances.exitance,
         detector_tolerance=spec.tolerances.detectors,
+        everywhere_tolerance=spec.tolerances.everywhere,
+        volume_tolerance=spec.tolerances.volume,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         spec=spec,
         sweep_values=values,
