@@ -7,8 +7,9 @@ import numpy as np
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
+from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
+from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
@@ -39,7 +40,7 @@ def solve_each(
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
+    tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     everywhere_tolerance: float | None = None,
@@ -118,6 +119,8 @@ def solve_each(
         Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance), detectors
     )
     check_scenes(scenes)
+    if not most_tetrahedra >= 1:
+        raise InputError(f"most_tetrahedra is {most_tetrahedra}; give a number of at least 1.")
     if isinstance(body, TetMesh):
         if mesh is not None:
             raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
@@ -125,31 +128,32 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        kept = KeptFits() if mesh is None else fits_of(mesh)
         if isinstance(body, TetMesh):
-            subtract = without_fit(subtract)
-        sources = [
-            sources_of(lights, each, subtract, tolerance=tolerances.exitance or detector_tolerance or 0.02, kept=kept)
+            subtract = replace_fitted(subtract)
+        wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
+        split = [
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept)
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
         tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    problem = Problem(checked, sources, mass, limit, watch)
+    problem = Problem(checked, split, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    keep_with(steps[0].solution.mesh, kept)
+    keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
             solution = _with_fields(replace(step.solution, readings=read_all(detectors, step.solution)), tolerances)
-        notes = notes_on(solution, sources[number], tolerances.exitance, where)
+        notes = notes_on(solution, split[number], tolerances.exitance, where)
         notes += notes_on_readings(solution.readings, detector_tolerance, where)
         notes += notes_on_fields(solution, everywhere_tolerance, volume_tolerance, where)
         notes += checked.warnings(number, solution, given=given)

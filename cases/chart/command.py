@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tetlux.cases.batch import load_all
+from tetlux.cases.batch.requests import load_all
 from tetlux.cases.chart.benchmark import prepare_benchmark
 from tetlux.cases.chart.files import FILES, write_chart
 from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS

@@ -8,6 +8,7 @@ from pydantic_core import PydanticCustomError
 from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
 
 class SphereSpec(Section):
@@ -157,7 +158,7 @@ class CaseSpec(Section):
         "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
     )
     tolerance: Tolerance = Field(
-        0.02,
+        DEFAULT_TOLERANCE,
         description="wanted relative L2 error of the exitance, or exitance, detectors, everywhere, volume",
     )
     detectors: list[DetectorSpec] = Field([])
