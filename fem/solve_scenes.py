@@ -133,8 +133,8 @@ def solve_each(
             subtract = replace_fitted(subtract)
         wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
         split = [
-            split_lights(lights, each, subtract, tolerance=wanted, kept=kept)
-            for lights, each in zip(scenes, checked.bodies, strict=True)
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene)
+            for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
         tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from tetlux.fem.known.fitted_patch import FittedPatch
+from tetlux.fem.known.kept_patches import keep_or_choose
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.loads import LineLoad, QuadraticPatch, line_load, quadratic_load, quadratic_patch
@@ -109,7 +110,10 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
     The residual of fitted charges is integrated over the bent facets. With the quadrature points of linear elements, a
     reading of a thousandth of the largest had an error of 4 %.
     """
-    return quadratic_patch(operator, patch if isinstance(patch, FittedPatch) else _widen(patch, fluence))
+    if isinstance(patch, FittedPatch):
+        return quadratic_patch(operator, patch)
+    wide = keep_or_choose(patch.mesh, patch.charges, patch.at_nodes, "quadratic", lambda: _widen(patch, fluence))
+    return quadratic_patch(operator, wide)
 
 
 def _widen(patch: Patch, fluence: FloatArray) -> Patch:
