@@ -132,6 +132,8 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
         tolerance=case.tolerance,
         detectors=[entry.detector for entry in case.detectors],
         detector_tolerance=case.detector_tolerance,
+        everywhere_tolerance=case.everywhere_tolerance,
+        volume_tolerance=case.volume_tolerance,
         cache=cache,
         report=report,
     )
