@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from tetlux.cases.start import mark_start
+
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
 
@@ -26,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
+    mark_start()
     try:
         _treat_signals_as_interrupts()
         return _main(arguments)

@@ -7,13 +7,15 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
+from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
-from tetlux.fem.quadratic.error import ReadingError
+from tetlux.fem.quadratic.field_error import field_errors
+from tetlux.fem.quadratic.reading_error import ReadingError
+from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
 from tetlux.fem.sources.deposit import Deposit
@@ -32,6 +34,8 @@ MOST_MISSING = 0.25
 SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
 PROGRESS_AFTER_SECONDS = 8.0
+# How progress lines call errors of fields.
+FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
@@ -50,11 +54,27 @@ class Tolerances:
         Wanted relative error of what each detector reads.
     placed : tuple of PlacedDetector
         The detectors.
+    everywhere, volume : float, optional
+        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside: see
+        `tetlux.fem.quadratic.field_error`.
     """
 
     exitance: float | None
     readings: float | None = None
     placed: tuple[PlacedDetector, ...] = ()
+    everywhere: float | None = None
+    volume: float | None = None
+
+    @property
+    def fields(self) -> dict[Where, float]:
+        """Those of the exitance everywhere and of the fluence inside that are given."""
+        given: dict[Where, float | None] = {"surface": self.everywhere, "inside": self.volume}
+        return {where: tolerance for where, tolerance in given.items() if tolerance is not None}
+
+    @property
+    def need_quadratic(self) -> bool:
+        """Whether quadratic elements are solved for on each mesh."""
+        return self.readings is not None or len(self.fields) > 0
 
     def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
         """Compare the errors of solutions on one mesh with the tolerances."""
@@ -70,14 +90,25 @@ class Tolerances:
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
+        for where, tolerance in self.fields.items():
+            bands = [band for step in steps for band in _bands(step, where)]
+            error = max((band.relative for band in bands), default=0.0)
+            largest_ratio = max(largest_ratio, error / tolerance)
+            summary += f", {FIELD_NAMES[where]} {error:.2%}"
+            splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
         return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
-        # All duals at once.
-        quadratic.operator.duals([placed.measurement for placed in self.placed])
-        return [estimate_reading(step.solution, placed.measurement) for placed in self.placed]
+        parts = quadratic.prepare([placed.measurement for placed in self.placed])
+        return [estimate_reading(step.solution, measurement) for some in parts for measurement in some]
+
+
+def _bands(step: MeshSolution, where: Where) -> list[ReadingError]:
+    quadratic = step.solution.quadratic
+    assert quadratic is not None
+    return field_errors(quadratic, where)
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+<<<<<<< HEAD
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, refine_for_most, solve_and_refine
+=======
+import numpy as np
+
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
+>>>>>>> main
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
@@ -12,10 +18,11 @@ from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
-from tetlux.fem.notes import notes_on, notes_on_readings
+from tetlux.fem.notes import notes_on, notes_on_fields, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.outcome.fields import error_of_field, use_quadratic_elements
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
 from tetlux.fem.shared import SharedMesh
@@ -44,6 +51,8 @@ def solve_each(
     tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
+    everywhere_tolerance: float | None = None,
+    volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     start: SharedMesh | None = None,
     mass: Lumping = "lumped",
@@ -71,6 +80,8 @@ def solve_each(
         What is to be read in each scene.
     detector_tolerance : float, optional
         Wanted relative error of what each detector reads.
+    everywhere_tolerance, volume_tolerance : float, optional
+        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     start : SharedMesh, optional
@@ -115,7 +126,9 @@ def solve_each(
     >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
     (True, True)
     """
-    _check_tolerances(tolerance, detectors, detector_tolerance)
+    tolerances = _check_tolerances(
+        Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance), detectors
+    )
     check_scenes(scenes)
     if not most_tetrahedra >= 1:
         raise InputError(f"most_tetrahedra is {most_tetrahedra}; give a number of at least 1.")
@@ -129,18 +142,22 @@ def solve_each(
         kept = _kept_for(mesh, start)
         if isinstance(body, TetMesh):
             subtract = replace_fitted(subtract)
-        wanted = tolerance or detector_tolerance or DEFAULT_TOLERANCE
+        wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
         split = [
-            split_lights(lights, each, subtract, tolerance=wanted, kept=kept)
-            for lights, each in zip(scenes, checked.bodies, strict=True)
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene)
+            for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        placed = tuple(place_detector(detector, dark) for detector in detectors)
-        tolerances = Tolerances(tolerance, detector_tolerance, placed)
-    if detector_tolerance is not None:
+        tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
+    if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
+<<<<<<< HEAD
     problem = Problem(checked, split, mass, limit, watch, start)
     given, reading = mesh is not None, len(detectors) > 0
+=======
+    problem = Problem(checked, split, mass, limit, watch)
+    given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
+>>>>>>> main
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
@@ -152,11 +169,12 @@ def solve_each(
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
-            readings = read_all(detectors, step.solution)
-        notes = notes_on(step.solution, split[number], tolerance, where)
-        notes += notes_on_readings(readings, detector_tolerance, where)
-        notes += checked.warnings(number, step.solution, given=given)
-        solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
+            solution = _with_fields(replace(step.solution, readings=read_all(detectors, step.solution)), tolerances)
+        notes = notes_on(solution, split[number], tolerances.exitance, where)
+        notes += notes_on_readings(solution.readings, detector_tolerance, where)
+        notes += notes_on_fields(solution, everywhere_tolerance, volume_tolerance, where)
+        notes += checked.warnings(number, solution, given=given)
+        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
 
@@ -258,8 +276,22 @@ def _in_words(limit: MeshLimit) -> str:
     return f"at the {limit.tetrahedra:,} tetrahedra that {gigabytes(limit.memory)} GB of memory suffice for"
 
 
-def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
+def _with_fields(solution: Solution, tolerances: Tolerances) -> Solution:
+    """The solution by quadratic elements with their errors, where these were asked for."""
+    if not tolerances.fields:
+        return solution
+    errors = {where: error_of_field(solution, where) for where in tolerances.fields}
+    return replace(
+        use_quadratic_elements(solution),
+        everywhere_error=errors.get("surface", np.nan),
+        volume_error=errors.get("inside", np.nan),
+    )
+
+
+def _check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
     """Refuse tolerances that are not sensible or do not go with the detectors.
+
+    A tolerance everywhere is one of the L2 error too.
 
     Raises
     ------
@@ -267,11 +299,18 @@ def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], de
     """
     if not isinstance(detectors, Sequence):
         raise InputError(f"detectors are given in a list, but {detectors!r} is none; write [detector].")
-    if tolerance is not None:
-        check_tolerance(tolerance)
-    if detector_tolerance is not None:
-        check_tolerance(detector_tolerance, "detector_tolerance")
-        if len(detectors) == 0:
-            raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
-    elif tolerance is None:
+    for name, value in (
+        ("tolerance", given.exitance),
+        ("detector_tolerance", given.readings),
+        ("everywhere_tolerance", given.everywhere),
+        ("volume_tolerance", given.volume),
+    ):
+        if value is not None:
+            check_tolerance(value, name)
+    if given.readings is not None and len(detectors) == 0:
+        raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
+    if given.exitance is None and given.everywhere is not None:
+        return replace(given, exitance=given.everywhere)
+    if given.exitance is None and not given.need_quadratic:
         raise InputError("there is no tolerance; give tolerance, or detectors and a detector_tolerance.")
+    return given

@@ -14,7 +14,11 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places, vertices_of
+<<<<<<< HEAD
 from tetlux.fem.outcome.radiance import radiance
+=======
+from tetlux.fem.outcome.radiance import radiance_of, view_cosine
+>>>>>>> main
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
@@ -43,6 +47,10 @@ class _ChannelSum:
         # The nearest of these points to any place belongs mostly to the channel that is resolved finest there.
         places, sizes = zip(*(channel.resolution for channel in self.channels), strict=True)
         return np.vstack(places), np.concatenate(sizes)
+
+    @property
+    def error_estimate(self) -> float:
+        return min(channel.error_estimate for channel in self.channels)
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
@@ -158,7 +166,11 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
             [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
         )
     if case.camera is not None:
-        radiances = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        _, cosine = view_cosine(case.surface, results.surface.points, np.asarray(case.camera))
+        radiances = [
+            radiance_of(results.exitance(channel), cosine, solution.medium.eta)
+            for channel, solution in zip(channels, results.solutions, strict=True)
+        ]
         values["radiance"] = np.sum(radiances, axis=0)
         if len(channels) > 1:
             values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}

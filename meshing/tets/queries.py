@@ -5,7 +5,7 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.search.proximity import ClosestPoint
+from tetlux.meshing.search.closest import ClosestPoint
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import barycentric_on_triangles
 
