@@ -2,8 +2,8 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,25 +12,15 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
-<<<<<<< HEAD
-from tetlux.cases.picture.arrows import light_rays
-from tetlux.cases.picture.draw import PictureScene, RegionOutline, draw_picture
-from tetlux.cases.picture.readings import draw_readings
+from tetlux.cases.solve import solve_case
 from tetlux.cases.write.content import content_of
-=======
->>>>>>> main
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
+from tetlux.cases.write.results import Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
-from tetlux.fem.media.region import Region
-from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
-from tetlux.fem.solve import solve
-from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
@@ -139,19 +129,13 @@ def finish_case(
     started, target = time.perf_counter(), out / case.name
     try:
         with claim_folder(out, case.name) as folder:
-<<<<<<< HEAD
-            solutions = _solve(case, report, cache=cache, start=start)
-            try:
-                summary, warnings, readings = _write(collect_results(case, solutions), folder, started)
-=======
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
-            solutions = _solve(case, report, cache=cache)
+            solutions = solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
->>>>>>> main
+                summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
                 publish(folder, target, ALL_FILES)
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
@@ -163,55 +147,11 @@ def finish_case(
     return FinishedCase(target, summary, warnings, describe_readings(readings, case.surface.unit))
 
 
-def _solve(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> Sequence[AnySolution]:
-    """Solve each channel by the model of the case."""
-    if case.spec.model == "charges":
-        return _solve_with_charges(case, report)
-    return solve_each(
-        case.mesh or case.surface,
-        [channel.media for channel in case.channels],
-        [list(channel.lights.values()) for channel in case.channels],
-        regions=case.regions,
-        tolerance=case.tolerance,
-        detectors=[entry.detector for entry in case.detectors],
-        detector_tolerance=case.detector_tolerance,
-<<<<<<< HEAD
-        start=start,
-=======
-        everywhere_tolerance=case.everywhere_tolerance,
-        volume_tolerance=case.volume_tolerance,
->>>>>>> main
-        cache=cache,
-        report=report,
-    )
-
-
-def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
-    """Solve each channel by charges; the seconds of each solution are those of all channels together."""
-    solutions = []
-    assert case.tolerance is not None
-    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
-    for channel, (body, *inner) in zip(case.channels, media, strict=True):
-        regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
-        lights = list(channel.lights.values())
-        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
-        where = f"{channel.name}: " if len(case.channels) > 1 else ""
-        report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
-        solutions.append(solution)
-    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
-    return [replace(solution, seconds=seconds) for solution in solutions]
-
-
-<<<<<<< HEAD
-def _write(results: Results, folder: Path, started: float) -> tuple[dict[str, Any], list[str], list[dict[str, Any]]]:
+def _write(
+    results: Results, folder: Path, started: float, writing: float
+) -> tuple[dict[str, Any], list[str], list[dict[str, Any]]]:
     """Write all files of a run into a folder, and return its summary, warnings and readings."""
-    writing = time.perf_counter()
-    case, first = results.case, results.solutions[0]
-=======
-def _write(results: Results, folder: Path, started: float, writing: float) -> tuple[list[str], list[dict[str, Any]]]:
-    """Write all files of a run into a folder, and return its warnings and readings."""
     case = results.case
->>>>>>> main
     unit = case.surface.unit
     warnings = _warnings(results)
     if "surface" in case.outputs:
@@ -239,14 +179,7 @@ def _write(results: Results, folder: Path, started: float, writing: float) -> tu
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
-<<<<<<< HEAD
-    now = time.perf_counter()
-    seconds = {**first.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
-    seconds["surface"] += case.reading_seconds
-    figures = summarize(results, readings, seconds, warnings) | {"content": content_of(case)}
-=======
-    figures = summarize(results, readings, warnings)
->>>>>>> main
+    figures = summarize(results, readings, warnings) | {"content": content_of(case)}
     if compared is not None:
         figures["compare"] = compared.differences
     figures["seconds"] = _seconds(results, started, writing)

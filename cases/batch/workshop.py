@@ -9,9 +9,10 @@ from tetlux.cases.batch.jobs import MeshData, MeshJob, MeshMade, MeshNotMade, Ru
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import FinishedCase, finish_case
 from tetlux.cases.write.publish import disk_is_full
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits
+from tetlux.fem.share import choose_places
 from tetlux.fem.shared import SharedMesh
-from tetlux.fem.solve_scenes import choose_places
 from tetlux.meshing.errors import TetluxError
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -126,5 +127,5 @@ def _choose_places(case: Case, start: SharedMesh) -> None:
         [list(channel.lights.values()) for channel in case.channels],
         start,
         regions=case.regions,
-        tolerance=case.tolerance or case.detector_tolerance or 0.02,
+        tolerance=case.tolerance or case.everywhere_tolerance or case.detector_tolerance or DEFAULT_TOLERANCE,
     )

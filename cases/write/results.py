@@ -14,11 +14,7 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places, vertices_of
-<<<<<<< HEAD
-from tetlux.fem.outcome.radiance import radiance
-=======
 from tetlux.fem.outcome.radiance import radiance_of, view_cosine
->>>>>>> main
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray

@@ -33,8 +33,9 @@ from tetlux.cases.batch.requests import load_all
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.shipped import library_folder
 from tetlux.fem import solve
+from tetlux.fem.share import choose_places
 from tetlux.fem.shared import SharedMesh
-from tetlux.fem.solve_scenes import choose_places, solve_each
+from tetlux.fem.solve_scenes import solve_each
 
 TETLUX = [sys.executable, "-m", "tetlux"]
 SINGLES, DRAWN, KILLS, SEED = 20, 20, 10, 17
