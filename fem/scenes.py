@@ -50,10 +50,17 @@ class Scenes:
     mesh_is_body: bool
 
     def system_on(
-        self, mesh: TetMesh, media: tuple[AnyMedium, ...], lumping: Lumping, assembly: Assembly, *, limit: bool
+        self,
+        mesh: TetMesh,
+        media: tuple[AnyMedium, ...],
+        lumping: Lumping,
+        assembly: Assembly,
+        *,
+        limit: bool,
+        expected: int = 0,
     ) -> System:
-        """Assemble the system of one set of media on a mesh."""
-        expected = self.media.count(media)
+        """Assemble the system of one set of media on a mesh, for as many lights as scenes have it or are expected."""
+        expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
             return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit)

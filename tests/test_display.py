@@ -16,9 +16,11 @@ from tetlux.cases.batch.events import (
     RunFailed,
     RunFinished,
     RunStarted,
+    StageEnded,
     WorkerLost,
 )
 from tetlux.cases.batch.lines import Lines
+from tetlux.cases.batch.logs import RunLogs
 from tetlux.cases.batch.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 
 
@@ -169,3 +171,29 @@ def test_the_display_fits_where_output_goes(monkeypatch: pytest.MonkeyPatch) -> 
     assert isinstance(choose_display(3), LiveDisplay)
     monkeypatch.setenv("CI", "true")
     assert type(choose_display(5000)) is PlainDisplay
+
+
+def test_each_run_has_a_log_also_one_that_failed(tmp_path: Path) -> None:
+    logs = RunLogs()
+    for event in (
+        BatchStarted(("a/x=1", "a/x=2", "a/x=3", "a/x=4"), tmp_path, 2),
+        RunStarted(0, "a/x=1", "w", repairs=("2 holes closed",)),
+        StageEnded(0, "5 nodes", 0.25),
+        RunStarted(1, "a/x=2", "v"),
+        RunStarted(2, "a/x=3", "v"),
+        RunFinished(0, "a/x=1", tmp_path / "a", {}, 1.5, notes=("it is thin.",), readings=("eye: 1 W",)),
+        RunFailed(1, "a/x=2", "memory ran out.", 2.0),
+        RunFinished(3, "a/x=4", tmp_path / "b", {}, 0.0, kept=True),
+        BatchEnded(1, 1, 1, 1, 2.0, "interrupted"),
+    ):
+        logs(event)
+    assert {path.name: path.read_text() for path in (tmp_path / "logs" / "a").iterdir()} == {
+        "x=1.log": "repaired: 2 holes closed\n    0.25 s  5 nodes\n    1.50 s  eye: 1 W\n"
+        f"    1.50 s  note: it is thin.\n    1.50 s  written to {tmp_path / 'a'}\n",
+        "x=2.log": "    2.00 s  failed: memory ran out.\n",
+        "x=3.log": "the batch was interrupted before this run ended\n",
+    }
+    # A log that cannot be written stops nothing.
+    (tmp_path / "file").write_text("")
+    logs(BatchStarted(("b",), tmp_path / "file", 1))
+    logs(RunFailed(0, "b", "memory ran out.", 2.0))

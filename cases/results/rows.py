@@ -76,7 +76,7 @@ def result_rows(summary: Mapping[str, Any]) -> list[Row]:
     """
     mesh = summary.get("mesh", {})
     rows = []
-    for channel in summary["channels"]:
+    for channel in summary.get("channels", ()):
         row: Row = {**_head(summary), "channel": channel["name"], "status": "finished"}
         row |= {"unit": summary["unit"], "model": summary["model"], "tolerance": summary.get("tolerance")}
         row |= channel["power"]
