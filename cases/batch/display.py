@@ -144,7 +144,7 @@ class LiveDisplay(PlainDisplay):
         progress = self.progress
         done = progress.finished + progress.kept
         head = Table.grid(padding=(0, 2))
-        cells = [
+        cells: list[ProgressBar | Text] = [
             ProgressBar(total=max(progress.total, 1), completed=done + progress.failed, width=24),
             Text(f"{done:,}/{progress.total:,} done"),
             Text(f"{progress.failed:,} failed", style="red" if progress.failed else ""),
