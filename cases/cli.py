@@ -160,9 +160,9 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch.display import choose_display  # noqa: PLC0415
+    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
+    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
-    from tetlux.cases.batch.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
     from tetlux.cases.results.batch_tables import BatchTables  # noqa: PLC0415
     from tetlux.meshing.errors import RunError  # noqa: PLC0415

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.batch.display import LiveDisplay, PlainDisplay, Quiet, choose_display
+from tetlux.cases.batch.display.displays import LiveDisplay, PlainDisplay, Quiet, choose_display
+from tetlux.cases.batch.display.lines import Lines
+from tetlux.cases.batch.display.logs import RunLogs
+from tetlux.cases.batch.display.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 from tetlux.cases.batch.events import (
     BatchEnded,
     BatchStarted,
@@ -19,9 +22,6 @@ from tetlux.cases.batch.events import (
     StageEnded,
     WorkerLost,
 )
-from tetlux.cases.batch.lines import Lines
-from tetlux.cases.batch.logs import RunLogs
-from tetlux.cases.batch.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 
 
 class Clock:

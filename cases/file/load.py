@@ -14,9 +14,9 @@ from tetlux.cases.file.detectors import NamedDetector, build_detector
 from tetlux.cases.file.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
 from tetlux.cases.file.reader import FilesRead, Reader
-from tetlux.cases.file.run_names import LONGEST_NAME
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep import expand_sweep
+from tetlux.cases.file.sweeps.expand import expand_sweep
+from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
 from tetlux.fem.inputs import unit_vector

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from tetlux.cases.batch.display.lines import Lines
+from tetlux.cases.batch.display.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, Listener, WorkerLost
-from tetlux.cases.batch.lines import Lines
-from tetlux.cases.batch.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 
 if TYPE_CHECKING:
     from rich.console import Console, Group

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.file.document import Document, Key
-from tetlux.cases.file.run_names import folder_names, identity
 from tetlux.cases.file.schema.sweep import MOST_RUNS, RangeSpec, SampledRangeSpec, SampleSpec, SweepSpec
+from tetlux.cases.file.sweeps.names import folder_names, identity
 from tetlux.meshing.arrays import FloatArray
 
 Point = dict[str, Any]
