@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.schema.sweep import MOST_RUNS, RangeSpec, SampledRangeSpec, SampleSpec, SweepSpec
 from tetlux.cases.file.sweeps.names import folder_names, identity
 from tetlux.meshing.arrays import FloatArray
