@@ -117,6 +117,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--jobs", type=int, metavar="N", help="worker processes; default: the cores that this process may use"
     )
+    run.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
+    )
     run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
     run.add_argument("--quiet", action="store_true", help="print nothing but what failed")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
@@ -124,6 +129,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
     check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
     check.set_defaults(command=_check)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
@@ -174,6 +180,7 @@ def _run(options: argparse.Namespace) -> int:
             options.out,
             jobs=options.jobs,
             resume=options.resume,
+            scheduler=options.scheduler,
             cache=not options.no_cache,
             listeners=[choose_display(len(cases), quiet=options.quiet), RunLogs(), BatchTables()],
         )
@@ -185,7 +192,7 @@ def _run(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
-    return check_all(options.cases)
+    return check_all(options.cases, plan=options.plan)
 
 
 def _list(_: argparse.Namespace) -> int:

@@ -59,7 +59,10 @@ class Scenes:
         limit: bool,
         expected: int = 0,
     ) -> System:
-        """Assemble the system of one set of media on a mesh, for as many lights as scenes have it or are expected."""
+        """Prepare the system of one set of media on a mesh, for as many lights as its scenes have, or are expected.
+
+        `solve` and `solve_each` make all their systems here, of steady diffusion: another model enters as `model_of`.
+        """
         expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))

@@ -34,6 +34,7 @@ def run_batch(
     *,
     jobs: int | None = None,
     resume: bool = False,
+    scheduler: str | None = None,
     cache: bool = True,
     listeners: Sequence[Listener] = (),
 ) -> BatchEnded:
@@ -50,6 +51,8 @@ def run_batch(
         this process does the work.
     resume : bool
         Whether runs that are finished in `out`, by their content, are kept as they are.
+    scheduler : str, optional
+        Address or file of a Dask scheduler, whose workers do the work.
     cache : bool
         Whether meshes are looked up and kept in the user's cache directory.
     listeners : sequence of callable
@@ -62,7 +65,9 @@ def run_batch(
     Raises
     ------
     InputError
-        If `out` cannot be written to, or `jobs` is no positive number.
+        If `out` cannot be written to, `jobs` is no positive number, or the scheduler cannot do the work.
+    RunError
+        If the scheduler or worker processes are lost; listeners have had `BatchEnded` all the same.
     KeyboardInterrupt
         If it was interrupted; listeners have had `BatchEnded` all the same.
     """
@@ -70,14 +75,18 @@ def run_batch(
     contents = [content_of(case) for case in cases]
     kept = _finished(cases, out, contents) if resume else {}
     plan = make_plan(cases)
-    batch = Batch(plan, cases, frozenset(kept), str(out), cache, MeshStore(out, plan, contents))
+    batch = Batch(plan, cases, frozenset(kept), str(out.absolute()), cache, MeshStore(out, plan, contents))
     workers = worker_count(jobs, len(cases) - len(kept))
     track = _Track(len(cases), listeners)
     track(BatchStarted(plan.names, out, workers, tuple(str(case.source) for case in cases)))
     for run, summary in kept.items():
         track(RunFinished(run, plan.names[run], out / plan.names[run], summary, 0.0, kept=True))
     try:
-        if workers > 1:
+        if scheduler is not None:
+            from tetlux.cases.batch.cluster import run_on_cluster  # noqa: PLC0415 - Dask takes half a second
+
+            run_on_cluster(batch, scheduler, track)
+        elif workers > 1:
             run_in_processes(batch, workers, track)
         else:
             _run_here(batch, track)

@@ -45,7 +45,9 @@ def make_plan(cases: Sequence[Case]) -> Plan:
         key: Hashable = (body, *_wanted(case)) if _can_share(case) else (body, number)
         groups.setdefault(key, []).append(number)
         surface_of[key] = planned.number
-    meshes, tasks, leaders = [], [], list(range(len(cases)))
+    meshes: list[PlannedMesh] = []
+    tasks: list[PlannedTask] = []
+    leaders = list(range(len(cases)))
     longest = min(MOST_RUNS_OF_TASK, max(1, len(cases) // FEWEST_TASKS))
     for number, (key, runs) in enumerate(groups.items()):
         meshes.append(PlannedMesh(number, surface_of[key], _pilots(runs), len(runs)))

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from tetlux.cases.batch.events import Event, Listener, RunFailed, RunFinished, RunStarted, WorkerLost
 from tetlux.cases.batch.jobs import Job, JobEnded, MeshJob, MeshMade, MeshNotMade, SolveJob, StopAfterRun
@@ -155,7 +155,7 @@ class _Pool:
         self._workers.append(worker)
         return worker
 
-    def _listen(self, worker: _Worker, stream: BinaryIO) -> None:
+    def _listen(self, worker: _Worker, stream: IO[bytes]) -> None:
         with contextlib.suppress(Exception):  # a worker killed within a message leaves half of it
             for answer in receive(stream):
                 self._answers.put((worker, answer))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tetlux.cases.batch.describe import describe_plan, print_plan
+from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.reader import FilesRead
@@ -46,31 +48,40 @@ def load_all(requests: Sequence[str]) -> list[Case]:
     return cases
 
 
-def check_all(requests: Sequence[str]) -> int:
-    """Print for each case file whether it is valid, and what it describes.
+def check_all(requests: Sequence[str], *, plan: bool = False) -> int:
+    """Print for each case file whether it is valid and what it describes, and what all runs together amount to.
 
     Parameters
     ----------
     requests : sequence of str
         Case files, patterns of them, or names of those that ship.
+    plan : bool
+        Whether to print, as JSON and nothing else, how a batch of them would be run.
 
     Returns
     -------
     int
         0 if all are valid, else 2.
     """
+    if plan:
+        print_plan(make_plan(load_all(requests)))
+        return 0
     wrong = 0
     files = FilesRead()
+    valid: list[Case] = []
     for request in requests:
         try:
             for path in find_case_files(request):
                 cases = load_cases(path, files)
+                valid += cases
                 print(f"{path if glob.has_magic(request) else request}: ok: {_describe(cases)}")
                 for note in _notes_of(cases[0]):
                     print(f"  {note}")
         except InputError as error:
             print(f"tetlux: {error}", file=sys.stderr)
             wrong += 1
+    if len(valid) > 1:
+        print(describe_plan(make_plan(valid), valid))
     return 2 if wrong else 0
 
 

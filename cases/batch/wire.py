@@ -7,7 +7,7 @@ import io
 import pickle
 import struct
 from collections.abc import Iterator
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from tetlux.cases.batch.jobs import MeshData
 from tetlux.meshing.surface.surface import Surface
@@ -60,7 +60,7 @@ def unpack(data: bytes, shared: dict[int, object]) -> Any:
 class Sender:
     """Sends messages into a stream."""
 
-    def __init__(self, stream: BinaryIO) -> None:
+    def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         # Kept alive, so that no other object gets their number.
         self._sent: dict[int, object] = {}
@@ -84,7 +84,7 @@ class Sender:
         self._stream.write(data)
 
 
-def receive(stream: BinaryIO) -> Iterator[Any]:
+def receive(stream: IO[bytes]) -> Iterator[Any]:
     """Receive messages until the sender is gone."""
     shared: dict[int, object] = {}
     while (head := stream.read(_LENGTH.size)) and len(head) == _LENGTH.size:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tetlux.cases.batch.events import Event, MeshFinished, MeshStarted, RunFailed, RunFinished, RunStarted, StageEnded
-from tetlux.cases.batch.jobs import MeshJob, MeshMade, MeshNotMade, RunJob, SolveJob
+from tetlux.cases.batch.jobs import MeshData, MeshJob, MeshMade, MeshNotMade, RunJob, SolveJob
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import FinishedCase, finish_case
 from tetlux.cases.write.publish import disk_is_full
@@ -36,21 +36,21 @@ class Workshop:
     """
 
     def __init__(self, name: str, emit: Emit, wants_to_stop: WantsToStop = lambda: False) -> None:
-        self._name, self._emit, self._wants_to_stop = name, emit, wants_to_stop
+        self._name, self.emit, self._wants_to_stop = name, emit, wants_to_stop
         # The last mesh, which the next task mostly has too, and the places that leaders have on it.
-        self._mesh: tuple[int, TetMesh] | None = None
+        self._mesh: tuple[MeshData, TetMesh] | None = None
         self._places: dict[int, KeptFits] = {}
 
     def adapt(self, job: MeshJob) -> MeshMade | MeshNotMade:
         """Adapt the mesh of a group. Where that fails, runs make their own, and say what is wrong."""
-        self._emit(MeshStarted(job.mesh, job.runs, self._name))
+        self.emit(MeshStarted(job.mesh, job.runs, self._name))
         started = time.perf_counter()
         try:
             data = job.adapt()
         except (TetluxError, MemoryError, RuntimeError, ArithmeticError):
             return MeshNotMade(job.mesh)
         seconds = time.perf_counter() - started
-        self._emit(MeshFinished(job.mesh, len(data.tetrahedra), seconds, self._name))
+        self.emit(MeshFinished(job.mesh, len(data.tetrahedra), seconds, self._name))
         return MeshMade(job.mesh, data)
 
     def solve(self, job: SolveJob) -> None:
@@ -64,8 +64,8 @@ class Workshop:
     def _start(self, job: SolveJob) -> SharedMesh | None:
         if job.start is None:
             return None
-        if self._mesh is None or self._mesh[0] != job.mesh:
-            self._mesh, self._places = (job.mesh, job.start.mesh()), {}
+        if self._mesh is None or self._mesh[0] is not job.start:
+            self._mesh, self._places = (job.start, job.start.mesh()), {}
         return SharedMesh(self._mesh[1])
 
     def _follow(self, leader: int, job: SolveJob, start: SharedMesh) -> None:
@@ -82,22 +82,22 @@ class Workshop:
 
     def _solve(self, run: RunJob, start: SharedMesh | None, job: SolveJob) -> None:
         case, started = run.case, time.perf_counter()
-        self._emit(RunStarted(run.run, case.name, self._name, case.repairs))
+        self.emit(RunStarted(run.run, case.name, self._name, case.repairs))
 
         def report(line: str) -> None:
-            self._emit(StageEnded(run.run, line, time.perf_counter() - started))
+            self.emit(StageEnded(run.run, line, time.perf_counter() - started))
 
         try:
             if start is not None:
                 self._follow(run.leader, job, start)
             finished = finish_case(case, Path(job.out), report, cache=job.cache, start=start)
         except TetluxError as error:
-            self._emit(self._failure(run, str(error), started, ends_batch=disk_is_full(error)))
+            self.emit(self._failure(run, str(error), started, ends_batch=disk_is_full(error)))
         except Exception as error:  # a fault of one run must not end the others
             fault = f"a fault of tetlux ({type(error).__name__}: {error}); report it with the case file."
-            self._emit(self._failure(run, " ".join(fault.split()), started))
+            self.emit(self._failure(run, " ".join(fault.split()), started))
         else:
-            self._emit(_success(run, finished, time.perf_counter() - started, self._name))
+            self.emit(_success(run, finished, time.perf_counter() - started, self._name))
 
     def _failure(self, run: RunJob, reason: str, started: float, *, ends_batch: bool = False) -> RunFailed:
         seconds = time.perf_counter() - started

@@ -9,6 +9,7 @@ from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Section, Vector3, shape_of
 from tetlux.cases.file.schema.sweep import SweepSpec
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
 
 class SphereSpec(Section):
@@ -143,7 +144,8 @@ class CaseSpec(Section):
         "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
     )
     tolerance: Tolerance = Field(
-        0.02, description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors"
+        DEFAULT_TOLERANCE,
+        description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors",
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
