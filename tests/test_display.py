@@ -22,6 +22,7 @@ from tetlux.cases.batch.events import (
     StageEnded,
     WorkerLost,
 )
+from tetlux.meshing.notes import Note
 
 
 class Clock:
@@ -49,7 +50,7 @@ def play(display: Listener, clock: Clock, between: Callable[[], None] = lambda: 
         if number % 10 == 9:
             display(RunFailed(number, names[number], "the mesher failed.", 0.4, "worker 1"))
         else:
-            notes = ("it is thin.",) if number < 20 else ()
+            notes = (Note("thin", f"it is {number} mm thin."),) if number < 20 else ()
             display(RunFinished(number, names[number], Path("out"), {}, 0.4, "worker 1", notes=notes))
     display(WorkerLost("worker 2", "it was killed", (45,)))
     display(RunStarted(45, names[45], "worker 2"))
@@ -114,7 +115,9 @@ def test_plain_lines_come_every_few_seconds_and_failures_at_the_end(capsys: pyte
     assert "worker worker 2 is lost: it was killed; its runs are done again\n" in text
     assert "\n41 of 1,000 runs done (5 kept), 4 failed, 955 left, 2 runs/s, 7 min 58 s to go\n" in text
     assert "to go; interrupted after 20 s\n" in shown.out
-    assert "note, in 13 runs: it is thin. (a/x=5, a/x=6, a/x=7 and 10 more)\n" in shown.out
+    assert (
+        "note, with figures of the first, in 13 runs: it is 5 mm thin. (a/x=5, a/x=6, a/x=7 and 10 more)\n" in shown.out
+    )
     assert shown.err == (
         "tetlux: 4 of 1,000 runs failed.\n"
         "  4 runs: the mesher failed. (a/x=9, a/x=19, a/x=29 and 1 more)\n"

@@ -9,8 +9,8 @@ from tetlux.cases.file.case import Case
 from tetlux.meshing.describe import count
 from tetlux.meshing.host.blocks import CORES
 
-# CPU seconds, measured on surfaces of 5,000 to 10,000 triangles at tolerances of .02 to .1: to start; for a mesh that is
-# not in the cache; for each channel of a run with a mesh of its own, or of one that starts from a shared mesh; for a
+# CPU seconds, measured on surfaces of 5,000 to 10,000 triangles at tolerances of .02 to .1: to start; for a mesh that
+# is not in the cache; for each channel of a run with a mesh of its own, or of one that starts from a shared mesh; for a
 # picture.
 TO_START, PER_MESH, PER_OWN_RUN, PER_SHARED_RUN, PER_PICTURE = 2.0, 2.0, 1.5, 0.2, 3.0
 

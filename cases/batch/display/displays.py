@@ -103,7 +103,7 @@ class PlainDisplay(Quiet):
         self._print(f"{self.progress.describe()}; {event.how} after {describe_seconds(event.seconds)}")
         notes = list_by_sentence(self.progress.notes)
         for line in notes[:MOST_NOTES]:
-            self._print(f"note, in {line}")
+            self._print(f"note, with figures of the first, in {line}")
         if len(notes) > MOST_NOTES:
             self._print(f"and {len(notes) - MOST_NOTES:,} more notes, in the summaries of the runs")
         self._list_failures()
