@@ -69,8 +69,9 @@ def finished(folder: Path) -> float | None:
 
 
 def left(folder: Path) -> list[str]:
-    """What is in a folder of results beside those of the ball."""
-    return sorted(path.name for path in folder.iterdir() if path.name != "ball")
+    """What is in a folder of results beside those of the ball, tables, and logs."""
+    known = ("ball", "results.csv", "results.parquet", "index.html", "logs")
+    return sorted(path.name for path in folder.iterdir() if path.name not in known)
 
 
 def processes_in(folder: Path) -> list[int]:

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.document import Document
+from tetlux.cases.file.documents.document import Document
 from tetlux.cases.file.load import load_cases
-from tetlux.cases.file.run_names import LONGEST_LABEL, RESERVED, folder_names, identity
 from tetlux.cases.file.schema.sweep import SweepSpec
-from tetlux.cases.file.sweep_points import sweep_points
+from tetlux.cases.file.sweeps.names import LONGEST_LABEL, RESERVED, folder_names, identity
+from tetlux.cases.file.sweeps.points import sweep_points
 from tetlux.cases.shipped import find_case_files
 from tetlux.fem import PencilBeam
 from tetlux.meshing import InputError

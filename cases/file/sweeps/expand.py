@@ -2,10 +2,10 @@
 
 from typing import Any, NamedTuple
 
-from tetlux.cases.file.document import Document, Key, Place
+from tetlux.cases.file.documents.document import Document, Key, Place
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep_keys import check_key, split_key, with_value
-from tetlux.cases.file.sweep_points import sweep_points
+from tetlux.cases.file.sweeps.keys import check_key, split_key, with_value
+from tetlux.cases.file.sweeps.points import sweep_points
 
 
 class SweepRun(NamedTuple):
