@@ -113,7 +113,7 @@ def test_errors_that_are_no_lack_of_memory_are_not_hidden(tmp_path: Path, monkey
     def wrong(*_: object, **__: object) -> None:
         raise RuntimeError("a mistake in the programme")
 
-    monkeypatch.setattr(run, "solve_each", wrong)
+    monkeypatch.setattr("tetlux.cases.solve.solve_each", wrong)
     (tmp_path / "a.yaml").write_text(CASE)
     with pytest.raises(RuntimeError, match="a mistake in the programme"):
         main(["run", str(tmp_path / "a.yaml"), "--out", str(tmp_path / "out")])
