@@ -156,8 +156,10 @@ class LiveDisplay(PlainDisplay):
         workers = Table.grid(padding=(0, 2))
         now = progress.clock()
         for worker, (what, since) in sorted(dict(progress.working).items()):
-            workers.add_row(Text(f"worker {worker}" if worker else "at work on"), Text(what, overflow="ellipsis", no_wrap=True),
-                            Text(describe_seconds(now - since)))  # fmt: skip
+            who = f"worker {worker}" if worker else "at work on"
+            workers.add_row(
+                Text(who), Text(what, overflow="ellipsis", no_wrap=True), Text(describe_seconds(now - since))
+            )
         return Group(head, workers)
 
 
