@@ -126,6 +126,7 @@ def _parser() -> argparse.ArgumentParser:
         help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
     )
     run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
+    run.add_argument("--quiet", action="store_true", help="print nothing but what failed")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
@@ -168,19 +169,26 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
+    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
-    from tetlux.cases.batch.lines import Lines  # noqa: PLC0415
     from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
+    from tetlux.cases.results.batch_tables import BatchTables  # noqa: PLC0415
+    from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
-    ended = run_batch(
-        load_all(options.cases),
-        options.out,
-        jobs=options.jobs,
-        resume=options.resume,
-        scheduler=options.scheduler,
-        cache=not options.no_cache,
-        listeners=[Lines()],
-    )
+    cases = load_all(options.cases)
+    try:
+        ended = run_batch(
+            cases,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            scheduler=options.scheduler,
+            cache=not options.no_cache,
+            listeners=[choose_display(len(cases), quiet=options.quiet), RunLogs(), BatchTables()],
+        )
+    except RunError as error:
+        return _report(str(error), 1)
     return 1 if ended.failed or ended.left else 0
 
 
