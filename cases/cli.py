@@ -158,13 +158,13 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch import load_all, run_all  # noqa: PLC0415
+    from tetlux.cases.batch.requests import load_all, run_all  # noqa: PLC0415
 
     return run_all(load_all(options.cases), options.out, cache=not options.no_cache)
 
 
 def _check(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch import check_all  # noqa: PLC0415
+    from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
     return check_all(options.cases)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
-from tetlux.fem.known.split import Sources
+from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
@@ -101,7 +101,7 @@ class Problem:
     ----------
     scenes : Scenes
         The body and the media of each scene.
-    sources : list of Sources
+    lights : list of SplitLights
         The lights of each scene.
     lumping : {"lumped", "consistent"}
     limit : bool
@@ -110,7 +110,7 @@ class Problem:
     """
 
     scenes: Scenes
-    sources: list[Sources]
+    lights: list[SplitLights]
     lumping: Lumping
     limit: bool
     watch: Stopwatch
@@ -123,7 +123,7 @@ class Problem:
     @property
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
-        return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
+        return len(set(self.media)), sum(len(split.deposits) for split in self.lights)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
@@ -132,7 +132,7 @@ class Problem:
             media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
             for media in dict.fromkeys(self.media)
         }
-        return lambda scene, coarser: systems[self.media[scene]].step(self.sources[scene], self.watch, coarser)
+        return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
 
 
 def first_mesh(
@@ -144,14 +144,14 @@ def first_mesh(
         with _report_if_slow(report):
             mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
         for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
-            deposits = [each for sources in problem.sources for each in sources.deposits_if(fitted=fitted)]
+            deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
             source_points = places_to_resolve(deposits)
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
         if tolerances.readings is not None:
             detector_points = np.array([placed.position for placed in tolerances.placed])
-            all_points, _ = places_to_resolve([each for sources in problem.sources for each in sources.deposits])
+            all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
                     mesh,

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.error.estimate import ROUNDING
 from tetlux.fem.known.fitted_patch import FittedPatch
-from tetlux.fem.known.split import Sources
+from tetlux.fem.known.split import SplitLights
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warnings_for
@@ -22,14 +22,14 @@ LARGEST_BULGE = 0.015
 SHALLOW = 0.1
 
 
-def notes_on(solution: Solution, sources: Sources, tolerance: float | None, where: str) -> list[str]:
+def notes_on(solution: Solution, split: SplitLights, tolerance: float | None, where: str) -> list[str]:
     """Collect the notes on a solution.
 
     Parameters
     ----------
     solution : Solution
-    sources : Sources
-        What the lights of the solution leave in the body.
+    split : SplitLights
+        The lights of the solution.
     tolerance : float, optional
         Of the exitance, if it has one.
     where : str
@@ -43,12 +43,12 @@ def notes_on(solution: Solution, sources: Sources, tolerance: float | None, wher
     notes = list(solution.surface.warnings)
     if solution.validity is not None:
         notes += warnings_for(solution.surface, solution.validity)
-    notes += [*sources.warnings, *solution.warnings]
+    notes += [*split.warnings, *solution.warnings]
     if tolerance is not None:
         notes += _on_tolerance(solution, tolerance, where)
     notes += _on_bulge(solution)
     notes += _on_power(solution)
-    notes += _on_fluence(solution, dips=sources.dips)
+    notes += _on_fluence(solution, may_be_negative=split.has_negative_source)
     notes += _on_limited_power(solution)
     notes += _on_shallow_sources(solution)
     notes += _on_exitance(solution)
@@ -111,12 +111,12 @@ def _on_power(solution: Solution) -> Iterator[Note]:
         )
 
 
-def _on_fluence(solution: Solution, *, dips: bool) -> Iterator[Note]:
+def _on_fluence(solution: Solution, *, may_be_negative: bool) -> Iterator[Note]:
     lowest, highest = float(solution.fluence.min()), float(solution.fluence.max())
     if lowest < -NEGLIGIBLE_DIP * highest:
         cause = (
             "beside where a thin beam enters, as the diffusion equation itself has it; read it a mean free path away."
-            if dips
+            if may_be_negative
             else "where tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
         )
         share = lowest / highest

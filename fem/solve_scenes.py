@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
+from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
@@ -116,11 +116,11 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        kept = KeptFits() if mesh is None else fits_of(mesh)
         if isinstance(body, TetMesh):
-            subtract = without_fit(subtract)
-        sources = [
-            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
+            subtract = replace_fitted(subtract)
+        split = [
+            split_lights(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
@@ -128,20 +128,20 @@ def solve_each(
         tolerances = Tolerances(tolerance, detector_tolerance, placed)
     if detector_tolerance is not None:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    problem = Problem(checked, sources, mass, limit, watch)
+    problem = Problem(checked, split, mass, limit, watch)
     given, reading = mesh is not None, len(detectors) > 0
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    keep_with(steps[0].solution.mesh, kept)
+    keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
             readings = read_all(detectors, step.solution)
-        notes = notes_on(step.solution, sources[number], tolerance, where)
+        notes = notes_on(step.solution, split[number], tolerance, where)
         notes += notes_on_readings(readings, detector_tolerance, where)
         notes += checked.warnings(number, step.solution, given=given)
         solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))

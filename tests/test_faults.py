@@ -306,7 +306,7 @@ def test_interrupted_at_any_stage(
         monkeypatch.setattr(picture, "RENDERER", INTERRUPTS)
     else:
         where = {
-            "reading": "tetlux.cases.batch.load_cases",
+            "reading": "tetlux.cases.batch.requests.load_cases",
             "solving": "tetlux.fem.error.by_operator.estimate_error",
             "writing": "tetlux.cases.run.write_mesh",
             "publishing": "tetlux.cases.run.publish",

@@ -12,8 +12,8 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.known.fitted import MOST_SOURCES
 from tetlux.fem.known.fitted_patch import FittedPatch, _unchanged, fitted_patch
-from tetlux.fem.known.kept import KeptPlaces
-from tetlux.fem.known.split import sources_of
+from tetlux.fem.known.kept_fits import KeptFits
+from tetlux.fem.known.split import split_lights
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing import Surface, TetMesh, box, read_surface, refine, sphere, tetrahedralize, torus
@@ -102,7 +102,7 @@ def test_what_charges_violate_is_integrated_as_finely_as_facets(ball: Surface, b
     assert small.sum() > 20
     points = np.bincount(patch.facets, minlength=len(middles))
     assert (points[small] > 0).mean() > 0.9
-    assert patch.violation.points.areas.sum() == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
+    assert patch.residual.points.areas.sum() == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
 
 
 @pytest.mark.parametrize(("sigma_a", "depth"), [(0.0, 5.0), (0.0, 0.3), (1e-6, 10.0), (1e-4, 1.0)])
@@ -132,7 +132,7 @@ def test_readings_are_smooth_in_the_medium_on_a_mesh_that_was_solved_on(ball: Su
 
 
 def test_places_serve_for_lights_about_as_deep() -> None:
-    kept, places = KeptPlaces(), object()
+    kept, places = KeptFits(), object()
     kept.keep("beam", 1.0, places)  # type: ignore[arg-type]
     assert kept.find("beam", 1.3) == (True, places)
     assert kept.find("beam", 0.5) == (False, None)
@@ -217,7 +217,7 @@ def test_the_surface_shows_how_fine_charges_are(ball: Surface) -> None:
 def test_feet_on_facets_that_stay_are_those_found_anew() -> None:
     body, source = box((10.0, 10.0, 10.0)), [PointSource((0.0, 0.0, 4.0))]
     mesh = tetrahedralize(body)
-    (light,) = sources_of(source, Body(body, (TISSUE,)), "fitted").fitted.values()
+    (light,) = split_lights(source, Body(body, (TISSUE,)), "fitted").fitted.values()
     before = fitted_patch(mesh, light)
     some = np.arange(len(mesh.tetrahedra)) % 5 == 0
     finer = refine(mesh, some, body)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import batch, run
+from tetlux.cases import run
+from tetlux.cases.batch import requests as batch
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases

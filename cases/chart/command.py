@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tetlux.cases.batch import load_all
+from tetlux.cases.batch.requests import load_all
 from tetlux.cases.chart.benchmark import prepare_benchmark, prepare_readings_benchmark
 from tetlux.cases.chart.files import chart_files, write_chart
 from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, READING_METHODS

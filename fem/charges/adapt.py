@@ -10,13 +10,13 @@ from tetlux.fem.charges.check import ErrorEstimates, estimate_errors
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import LeastSquaresFactors, factorise
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.places import (
+from tetlux.fem.charges.placement import (
     EQUATION_REFINEMENT,
     HEIGHT_ROUGH,
     HEIGHT_SMOOTH,
-    Places,
+    ChargePlacement,
     distance_from,
-    places_for,
+    place_charges,
 )
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -87,7 +87,7 @@ class FittedCharges:
     field : ChargeField
         The sources, then the fitted charges; a column of strengths for each light.
     lights : LightSources
-    places : Places
+    placement : ChargePlacement
     factors : LeastSquaresFactors
         Of the matrix of the weighted equations; they serve other lights with the same charges.
     errors : ErrorEstimates
@@ -98,7 +98,7 @@ class FittedCharges:
 
     field: ChargeField
     lights: LightSources
-    places: Places
+    placement: ChargePlacement
     factors: LeastSquaresFactors
     errors: ErrorEstimates
     residual: NumberArray
@@ -139,11 +139,11 @@ def fit_sequence(
     height = HEIGHT_ROUGH
     for step in range(steps + 1):
         count = round(most * (FEWEST_CHARGES / most) ** ((steps - step) / max(steps, 1)))
-        places = places_for(surface, spacing, distance, count, height)
-        fitted = fit_at_places(places, equation, lights)
+        placement = place_charges(surface, spacing, distance, count, height)
+        fitted = fit_placed_charges(placement, equation, lights)
         yield fitted
         height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(places.checked, np.abs(fitted.residual) * places.checked.spacing)
+        spacing = _refine_spacing(placement.checked, np.abs(fitted.residual) * placement.checked.spacing)
 
 
 def fit_for_remainder(
@@ -167,7 +167,7 @@ def fit_for_remainder(
     spacing = distance = distance_from(surface, lights.points)
     best, count, height = None, FEWEST_CHARGES, HEIGHT_ROUGH
     while True:
-        fitted = fit_at_places(places_for(surface, spacing, distance, count, height), equation, lights)
+        fitted = fit_placed_charges(place_charges(surface, spacing, distance, count, height), equation, lights)
         estimate = fitted.errors.estimate
         if best is None or estimate < best.errors.estimate:
             best = fitted
@@ -178,24 +178,24 @@ def fit_for_remainder(
             round(count * np.clip(excess ** (1.0 / ASSUMED_RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_CHARGES_WITH_FEM
         )
         height = HEIGHT_SMOOTH if estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)
+        spacing = _refine_spacing(fitted.placement.checked, np.abs(fitted.residual) * fitted.placement.checked.spacing)
 
 
-def fit_at_places(places: Places, equation: Equation, lights: LightSources) -> FittedCharges:
+def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: LightSources) -> FittedCharges:
     """Fit the strengths of charges at given positions."""
-    samples, checked = places.fitted, places.checked
-    weights = places.weights[:, None]
-    factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, places.charges))
+    samples, checked = placement.fitted, placement.checked
+    weights = placement.weights[:, None]
+    factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, placement.charges))
     right = (
         lights.boundary_source
         - equation.residual_of_each(samples.points, samples.normals, lights.points) @ lights.powers
     )
     strengths = factors.solve(weights * right)
-    field = ChargeField(equation, np.vstack([lights.points, places.charges]), np.vstack([lights.powers, strengths]))
+    field = ChargeField(equation, np.vstack([lights.points, placement.charges]), np.vstack([lights.powers, strengths]))
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation = (residual - lights.boundary_source).sum(axis=1)
     errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)
-    return FittedCharges(field, lights, places, factors, errors, violation)
+    return FittedCharges(field, lights, placement, factors, errors, violation)
 
 
 def _refine_spacing(samples: Samples, effects: FloatArray) -> Spacing:

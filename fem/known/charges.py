@@ -44,8 +44,8 @@ class Charges:
     field: VaryingMedium | None = None
 
     @property
-    def dips(self) -> bool:
-        """Whether a source is negative, as those of a first moment are: the fluence may be below zero beside it."""
+    def has_negative_source(self) -> bool:
+        """Whether a source is negative, as those of a first moment are: fluence beside it may be below zero."""
         return bool((self.strengths[: self.sources] < 0).any())
 
     def fluence(self, points: FloatArray) -> FloatArray:

@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_for_remainder
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_for_remainder, fit_placed_charges
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import EQUATION_REFINEMENT, Places
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
@@ -48,27 +48,27 @@ ACCURATE, AVERAGED = 0.3, 12
 
 
 @dataclass(frozen=True, eq=False)
-class Violation:
-    """What charges violate on the true surface.
+class BoundaryResidual:
+    """The residual of the boundary condition that charges leave on the true surface.
 
     Attributes
     ----------
     points : Samples
         The q points at which it is integrated; their `spacing` is that of charges, unit.
-    exitance, residual : (q,) ndarray
-        ``G/(2A)`` and ``D dG/dn + G/(2A)``, W/unit².
+    exitance, values : (q,) ndarray
+        ``G/(2A)`` and the residual ``D dG/dn + G/(2A)``, W/unit².
     missed : float
         What the sum of ``-D dG/dn`` over the points misses of its integral, W; 0 where that hardly matters.
     """
 
     points: Samples
     exitance: FloatArray
-    residual: FloatArray
+    values: FloatArray
     missed: float
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of the points."""
+        """The search tree of the points."""
         return cKDTree(self.points.points)
 
     __repr__ = one_line
@@ -81,30 +81,30 @@ class FittedLight:
     Attributes
     ----------
     charges : Charges
-    violation : Violation
-    places : Places
+    residual : BoundaryResidual
+    placement : ChargePlacement
         Where charges were put and fitted; for the same light in other coefficients.
     accurate : (q,) ndarray of bool
-        Whether the charges are accurate at each point of `violation`.
+        Whether the charges are accurate at each point of `residual`.
     surface : Surface
         What they were fitted to.
     """
 
     charges: Charges
-    violation: Violation
-    places: Places
+    residual: BoundaryResidual
+    placement: ChargePlacement
     accurate: BoolArray
     surface: Surface
 
     def accurate_at(self, points: FloatArray) -> BoolArray:
-        """Whether the charges are accurate at the point of `violation` nearest to each of some points (n, 3), (n,)."""
+        """Whether the charges are accurate at the point of `residual` nearest to each of some points (n, 3), (n,)."""
         if self.accurate.all():
             return np.ones(len(points), dtype=bool)
-        return np.asarray(self.accurate[self.violation.tree.query(points)[1]])
+        return np.asarray(self.accurate[self.residual.tree.query(points)[1]])
 
-    def violation_within(self, wanted: Spacing) -> Violation:
-        """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return violation_of(self.charges, self.places.fitted, self.surface, wanted)
+    def residual_within(self, wanted: Spacing) -> BoundaryResidual:
+        """The residual at points as far apart as wanted at most, where a mesh is finer than its own points."""
+        return residual_on_surface(self.charges, self.placement.fitted, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -139,19 +139,19 @@ def fit_light(
         if fitted is None:
             return None
     else:
-        fitted = fit_at_places(like.places, equation, lights)
+        fitted = fit_placed_charges(like.placement, equation, lights)
     charges = _charges(fitted, surface, medium)
-    violation = violation_of(charges, fitted.places.fitted, surface)
-    accurate = like.accurate if like is not None else _accurate(violation, medium)
-    return FittedLight(charges, violation, fitted.places, accurate, surface)
+    residual = residual_on_surface(charges, fitted.placement.fitted, surface)
+    accurate = like.accurate if like is not None else _accurate(residual, medium)
+    return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
 
-def _accurate(violation: Violation, medium: Medium) -> BoolArray:
+def _accurate(residual: BoundaryResidual, medium: Medium) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
-    points = violation.points
-    nearest = violation.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
-    errors = exitance_error(equation_of(medium), violation.residual, points.spacing)
-    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(violation.exitance[nearest]).mean(axis=1)
+    points = residual.points
+    nearest = residual.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
+    errors = exitance_error(equation_of(medium), residual.values, points.spacing)
+    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(residual.exitance[nearest]).mean(axis=1)
     return np.asarray(error <= ACCURATE * exitance)
 
 
@@ -172,13 +172,15 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     """Sources and charges as one sum."""
     field, sources = fitted.field, fitted.lights.points
     depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
-    heights = np.asarray(cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0])
+    heights = np.asarray(cKDTree(fitted.placement.fitted.points).query(fitted.placement.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Violation:
-    """What charges violate on the true surface, at points that follow from samples where they were fitted."""
+def residual_on_surface(
+    charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None
+) -> BoundaryResidual:
+    """The residual of charges on the true surface, at points that follow from the samples where they were fitted."""
     tree = cKDTree(samples.points)
 
     def spacing(queries: FloatArray) -> FloatArray:
@@ -189,7 +191,7 @@ def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: S
     fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
     exitance = equation.robin * fluence
     apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return Violation(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    return BoundaryResidual(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:

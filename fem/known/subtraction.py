@@ -38,9 +38,9 @@ class Subtraction:
     terms: PatchTerms
     mass: Lumping
 
-    def shrink_to(self, good: BoolArray) -> "Subtraction":
-        """The same on the tetrahedra whose four nodes are good, (n,), alone."""
-        patch = patch_of(self.patch.mesh, self.patch.charges, good, self.patch.at_nodes)
+    def shrink_to(self, accurate: BoolArray) -> "Subtraction":
+        """The same on the tetrahedra whose four nodes are accurate, (n,), alone."""
+        patch = patch_of(self.patch.mesh, self.patch.charges, accurate, self.patch.at_nodes)
         return replace(self, patch=patch, terms=patch_terms(patch, self.mass))
 
     def fluence_of(self, solution: NumberArray) -> NumberArray:
@@ -52,10 +52,10 @@ class Subtraction:
 
 
 def subtract_on(
-    mesh: TetMesh, light: int, charges: Charges, mass: Lumping, good: BoolArray | None = None
+    mesh: TetMesh, light: int, charges: Charges, mass: Lumping, accurate: BoolArray | None = None
 ) -> Subtraction:
-    """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
-    patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
+    """Subtract charges of a light at accurate nodes (n,), or everywhere if these are not known."""
+    patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if accurate is None else accurate)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
 
 

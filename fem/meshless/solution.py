@@ -12,7 +12,7 @@ from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
 from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import EQUATION_REFINEMENT
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
@@ -259,7 +259,7 @@ def charge_solution(
         boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
         lights = LightSources(points, powers, boundary_source)
         fitted = fit_charges(surface, equation_of(medium), lights, tolerance=tolerance, most=most)
-        samples, interface = fitted.places.fitted, Interface(surface, 0, None)
+        samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         return ChargeSolution(
             surface, medium, (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         )
@@ -270,7 +270,7 @@ def charge_solution(
     light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
     fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
-    fitted_at = tuple(each.places.fitted for each in fit.places)
+    fitted_at = tuple(each.placement.fitted for each in fit.placements)
     return ChargeSolution(
         surface, medium, tuple(interfaces), fit.fields, fitted_at, sources, tuple(ledgers), fit.errors
     )

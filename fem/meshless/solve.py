@@ -9,7 +9,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST_CHARGES
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.split import check_list
+from tetlux.fem.known.split import check_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
@@ -82,7 +82,7 @@ def solve_with_charges(
     if not isinstance(medium, AnyMedium):
         raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
     check_tolerance(tolerance)
-    check_list(lights)
+    check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     watch = Stopwatch()
@@ -108,8 +108,12 @@ def solve_with_charges(
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     if not solution.error_estimate <= tolerance:
         warnings.append(
-            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
-            f"{solution.charges} charges; {_INSTEAD}"
+            Note(
+                "tolerance-missed",
+                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
+                f"with {solution.charges} charges; {_INSTEAD}",
+                value=solution.error_estimate,
+            )
         )
     warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))

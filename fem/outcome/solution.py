@@ -132,7 +132,7 @@ class Solution:
         Middles of boundary facets and their longest sides, and where charges were fitted, how far these are apart.
         """
         facets = self.mesh.points[self.mesh.boundary_faces]
-        fitted = [patch.violation.points for patch in self.patches if isinstance(patch, FittedPatch)]
+        fitted = [patch.residual.points for patch in self.patches if isinstance(patch, FittedPatch)]
         places = np.vstack([facets.mean(axis=1), *(each.points for each in fitted)])
         return places, np.concatenate([longest_sides(facets), *(each.spacing for each in fitted)])
 
@@ -241,11 +241,13 @@ class Solution:
         return found[0], found[1]
 
     def __repr__(self) -> str:
-        low, high = self.exitance.real.min(), self.exitance.real.max()
+        modulated = np.iscomplexobj(self.exitance)
+        exitance = np.abs(self.exitance) if modulated else self.exitance
+        exited = abs(self.power.exited) if modulated else self.power.exited
         facts = [
             count(len(self.mesh.points), "node"),
-            f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",
-            f"{self.power.exited:.4g} of {self.power.incident:.4g} W exited",
+            f"exitance {exitance.min():.3g} to {exitance.max():.3g} W/{self.mesh.unit}²",
+            f"{exited:.4g} of {self.power.incident:.4g} W exited",
         ]
         if np.isfinite(self.error_estimate):
             facts.append(f"estimated error {self.error_estimate:.2%}")

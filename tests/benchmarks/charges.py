@@ -26,8 +26,8 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import distance_from
-from tetlux.fem.charges.places import scaled as scaled_spacing
+from tetlux.fem.charges.placement import distance_from
+from tetlux.fem.charges.placement import scaled as scaled_spacing
 from tetlux.fem.charges.samples import cells_of, draw
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
@@ -164,7 +164,7 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
         started = time.process_time()
         fitted = scene.fit(charges)
         seconds.append(time.process_time() - started)
-    samples, errors = fitted.places.checked, fitted.errors
+    samples, errors = fitted.placement.checked, fitted.errors
     exitance = fitted.field.exitance(samples.points)[:, 0]
     right, bound = scene.truth_at(samples.points, truth)
     size = norm(samples.areas, right)
@@ -175,7 +175,7 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
     median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
     columns = [
         scene.name,
-        str(len(fitted.places.charges)),
+        str(len(fitted.placement.charges)),
         f"{min(seconds):.2f}",
         f"{error:.4%}",
         f"{errors.estimate:.4%}",

@@ -36,7 +36,7 @@ DEPTH_FACTOR = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
+class ChargePlacement:
     """Positions of charges, and the points of the surface at which they are fitted and checked.
 
     Attributes
@@ -86,9 +86,9 @@ def distance_from(surface: Surface, sources: FloatArray) -> Spacing:
     return distance
 
 
-def places_for(
+def place_charges(
     surface: Surface, spacing: Spacing, distance: Spacing, count: int, height: float = HEIGHT_ROUGH
-) -> Places:
+) -> ChargePlacement:
     """Positions of about `count` charges.
 
     Parameters
@@ -104,10 +104,10 @@ def places_for(
     """
     rng = np.random.default_rng(0)
     (cells,), scale = fitting_cells([surface], [spacing], count)
-    return places_at(surface, cells, scaled(spacing, scale), distance, rng, height)
+    return place_charges_in(surface, cells, scaled(spacing, scale), distance, rng, height)
 
 
-def places_at(
+def place_charges_in(
     surface: Surface,
     cells: Cells,
     spacing: Spacing,
@@ -115,14 +115,14 @@ def places_at(
     rng: np.random.Generator,
     height: float,
     exponent: float = DISTANCE_EXPONENT,
-) -> Places:
+) -> ChargePlacement:
     """Positions of charges a spacing apart, from cells of that spacing."""
     fitted, others = spread(
         surface, cells.scaled(1.0 / EQUATION_REFINEMENT).cut(scaled(spacing, 1.0 / EQUATION_REFINEMENT)), rng
     )
     feet = fitted[thin(fitted, EQUATION_REFINEMENT * LEAST_SEPARATION * fitted.spacing)]
     charges, clear = place_above_surface(surface, feet, EQUATION_REFINEMENT * feet.spacing, height)
-    return Places(charges[clear], feet, fitted, _weights(fitted, distance, exponent), _checked(others, fitted))
+    return ChargePlacement(charges[clear], feet, fitted, _weights(fitted, distance, exponent), _checked(others, fitted))
 
 
 def fitting_cells(surfaces: Sequence[Surface], spacings: Sequence[Spacing], count: float) -> tuple[list[Cells], float]:
