@@ -137,9 +137,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that measure the solver itself."""
     chart = commands.add_parser("chart", help="compare methods by error, seconds and unknowns")
-    chart.add_argument(
-        "cases", nargs="*", metavar="CASE", help="default: the shipped cases of the chart in README"
-    )
+    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: the shipped cases of the chart in README")
     chart.add_argument(
         "--out", type=Path, default=Path("chart"), metavar="DIR", help="folder of the chart; default: chart"
     )

@@ -21,7 +21,8 @@ def test_a_wide_box_is_a_slab() -> None:
 @pytest.mark.parametrize("sigma_a", [0.0, 1e-9])
 def test_all_power_leaves_where_nothing_absorbs(sigma_a: float) -> None:
     """Gauss points on the six faces; the source is near an edge."""
-    medium, size, source = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4), np.array([6.0, 5.0, 4.0]), (2.0, 0.5, 1.0)
+    medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
+    size, source = np.array([6.0, 5.0, 4.0]), (2.0, 0.5, 1.0)
     x, w = np.polynomial.legendre.leggauss(16)
     u, v = (each.ravel() for each in np.meshgrid(x, x))
     weights, total = np.outer(w, w).ravel(), 0.0

@@ -16,6 +16,7 @@ from tetlux.cases.write.publish import replace_files
 from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
+
 def chart_files(name: str) -> tuple[str, str, str]:
     """The files of a chart."""
     return f"{name}.csv", f"{name}.png", f"{name}.json"

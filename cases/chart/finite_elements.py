@@ -52,9 +52,7 @@ def _on_mesh(
 
         def solution_for(surface: Surface) -> Solution:
             mesh = mesh_for(benchmark, surface, value)
-            return solve(
-                surface, case.medium, case.lights, regions=benchmark.regions, mesh=mesh, subtract=subtract
-            )
+            return solve(surface, case.medium, case.lights, regions=benchmark.regions, mesh=mesh, subtract=subtract)
 
         return _time_solution(benchmark, solution_for)
 

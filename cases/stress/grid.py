@@ -139,7 +139,7 @@ PANELS = (
         "charges",
         "a point source, lengths in mean free paths; by charges alone, and by finite elements",
         Axis("", point_scenarios.CHARGE_BODIES, point_scenarios.FEW_CHARGE_BODIES),
-        Axis("", point_scenarios.CHARGE_LIGHTS, point_scenarios.FEW_CHARGE_LIGHTS),
+        Axis("", tuple(point_scenarios.CHARGE_LIGHTS), point_scenarios.FEW_CHARGE_LIGHTS),
         point_scenarios.charges_by_body_and_light,
         (CHARGES, DEFAULT),
     ),

@@ -57,10 +57,8 @@ def ball(medium: Medium, radius: float, depth: float) -> PointBody:
     return PointBody(shapes.sphere(radius), medium, (), (0.0, 0.0, r0), exitance)
 
 
-def layers(
-    medium: Medium, radius: float, depth: float, inner: tuple[tuple[float, float, float], ...]
-) -> PointBody:
-    """A ball of layers: radius, absorption and scattering of each, from the outside inward, as shares of the shell's."""
+def layers(medium: Medium, radius: float, depth: float, inner: tuple[tuple[float, float, float], ...]) -> PointBody:
+    """A ball of layers: radius, absorption and scattering of each, outside inward, as shares of the outermost one's."""
     assert medium.sigma_s_prime is not None
     media = [
         Medium(sigma_a=absorption * medium.sigma_a, sigma_s_prime=scattering * medium.sigma_s_prime, eta=INDEX)
@@ -124,4 +122,3 @@ def round_places(radius: float, angles: FloatArray) -> FloatArray:
     longitude = math.radians(137.5) * np.arange(len(angles))
     flat = np.sin(angles)
     return radius * np.column_stack([flat * np.cos(longitude), flat * np.sin(longitude), np.cos(angles)])
-

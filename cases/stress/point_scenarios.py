@@ -17,7 +17,14 @@ CHARGE_BODIES = (
     *("core of 30 σ_a", "core of .1 σ_s'", "four layers"),
 )
 FEW_CHARGE_BODIES = ("ball of 30", "thin plate of 1", "box, by an edge", "core of .1 σ_s'")
-CHARGE_LIGHTS = ("1 deep", "shallow, 0.2", "deep, 5", "1 deep, albedo 0.5", "1 deep, albedo 0.9999")
+# Depth and albedo.
+CHARGE_LIGHTS = {
+    "1 deep": (1.0, 0.99),
+    "shallow, 0.2": (0.2, 0.99),
+    "deep, 5": (5.0, 0.99),
+    "1 deep, albedo 0.5": (1.0, 0.5),
+    "1 deep, albedo 0.9999": (1.0, 0.9999),
+}
 FEW_CHARGE_LIGHTS = ("shallow, 0.2", "1 deep, albedo 0.5")
 READING_BODIES = ("ball", "plate", "rod", "box, by an edge", "core of 30 σ_a", "core of .1 σ_s'", "four layers")
 FEW_READING_BODIES = ("ball", "box, by an edge", "core of .1 σ_s'")
@@ -29,9 +36,7 @@ NEAR, FAR, BEHIND = np.array([0.3, 1.0, 2.0, 3.0]), np.array([9.0, 14.0, 19.0, 2
 
 def charges_by_body_and_light(body: str, light: str) -> Scenario:
     """A point source in a body; lengths in mean free paths."""
-    depth, albedo = (float(light.split(" ")[0]) if light[0].isdigit() else float(light.split(", ")[1])), 0.99
-    if "albedo" in light:
-        albedo = float(light.split("albedo ")[1])
+    depth, albedo = CHARGE_LIGHTS[light]
     made = _charge_body(body, albedo, depth)
     surface = made.surface
     samples = surface_samples(surface, np.array([made.source]), np.array([depth]))
@@ -51,7 +56,7 @@ def charges_by_body_and_light(body: str, light: str) -> Scenario:
 def _charge_body(body: str, albedo: float, depth: float) -> PointBody:
     medium = medium_of_albedo(albedo)
     if body.startswith("box"):
-        off = 5.0 - depth
+        off = 5.0 - min(depth, 4.0)
         return block(medium, 10.0, (off if "by" in body else 0.0, off if "corner" in body else 0.3, off))
     if "plate" in body:
         thickness = float(body.split("of ")[1])
@@ -98,7 +103,7 @@ def _reading_body(body: str, place: str) -> tuple[PointBody, FloatArray]:
 
 
 def _box_places(place: str) -> FloatArray:
-    """Near: along the edge at the source, on both of its faces; far: along other edges; behind: on the faces opposite."""
+    """Near: at the edge by the source, on both faces; far: along other edges; behind: on the faces opposite."""
     found = {
         "near": [(6.0, 0.5, 5.9), (5.9, 1.5, 6.0), (6.0, 2.5, 5.0), (4.0, 0.0, 6.0)],
         "far": [(-5.9, 0.0, 6.0), (6.0, 5.9, -5.0), (-4.0, 6.0, 5.9), (5.9, -6.0, -3.0)],

@@ -106,6 +106,6 @@ def _modes(medium: Medium, length: float, away: float) -> tuple[FloatArray, Floa
     wave = (order + 1.0) * math.pi / length
     for _ in range(NEWTON_STEPS):
         excess = wave * length - order * math.pi - 2.0 * np.arctan2(1.0, wave * zb)
-        wave = wave - excess / (length + 2.0 * zb / (1.0 + (wave * zb) ** 2))
-    phase = np.arctan2(1.0, wave * zb)
-    return wave, phase, 0.5 * length + 0.5 * np.sin(2.0 * phase) / wave
+        wave = np.asarray(wave - excess / (length + 2.0 * zb / (1.0 + (wave * zb) ** 2)))
+    phase = np.asarray(np.arctan2(1.0, wave * zb))
+    return wave, phase, np.asarray(0.5 * length + 0.5 * np.sin(2.0 * phase) / wave)

@@ -3,8 +3,8 @@
 Without arguments: random scenes of ten detectors each, `--scenes` of them from number `--first` on, at a detector
 tolerance of .01: see `tests.benchmarks.reading_scenes`; a source .3 to 10 mean free paths deep, detectors 1 to 40 away,
 reduced albedo .8 to .9999, index 1 to 1.5. A line says for each scene the median and largest true error, the largest
-bar, and how many readings are off by more than twice their bar or the tolerance. `--charges` solves by charges; `--each`
-prints every reading.
+bar, and how many readings are off by more than twice their bar or the tolerance. `--charges` solves by charges;
+`--each` prints every reading.
 
 `--fibres` reads ten points 5 to 50 mm from a beam on a ball of radius 80 mm to 1 %. `--cube` is the fluence in the
 middle of a dark ball in a cube. `--fits` fits absorption and scattering to ten noiseless readings of a ball.
@@ -59,7 +59,10 @@ def measure(scene: Scene, tolerance: float, *, charges: bool = False) -> tuple[F
     seconds = time.process_time() - started
     errors = np.array([reading.exitance for reading in solution.readings]) / scene.truth - 1.0
     bars = np.array([reading.relative_error for reading in solution.readings], dtype=float)
-    size = f"{solution.charges} charges" if isinstance(solution, ChargeSolution) else f"{len(solution.mesh.tetrahedra):,}"
+    if isinstance(solution, ChargeSolution):
+        size = f"{solution.charges} charges"
+    else:
+        size = f"{len(solution.mesh.tetrahedra):,}"
     return np.abs(errors), bars, seconds, size
 
 
