@@ -103,7 +103,7 @@ def _modes(medium: Medium, length: float, away: float) -> tuple[FloatArray, Floa
             field="points",
         )
     zb, order = medium.extrapolation_length, np.arange(2 + math.ceil(reach / away))
-    wave = (order + 1.0) * math.pi / length
+    wave: FloatArray = (order + 1.0) * math.pi / length
     for _ in range(NEWTON_STEPS):
         excess = wave * length - order * math.pi - 2.0 * np.arctan2(1.0, wave * zb)
         wave = np.asarray(wave - excess / (length + 2.0 * zb / (1.0 + (wave * zb) ** 2)))
