@@ -102,8 +102,8 @@ def _modes(medium: Medium, length: float, away: float) -> tuple[FloatArray, Floa
             f"a point is only {away:.1g} from the source, too close for the series of the box; use half_space for it.",
             field="points",
         )
-    zb, order = medium.extrapolation_length, np.arange(2 + math.ceil(reach / away))
-    wave: FloatArray = (order + 1.0) * math.pi / length
+    zb, order = medium.extrapolation_length, np.arange(2 + math.ceil(reach / away), dtype=np.float64)
+    wave = (order + 1.0) * math.pi / length
     for _ in range(NEWTON_STEPS):
         excess = wave * length - order * math.pi - 2.0 * np.arctan2(1.0, wave * zb)
         wave = np.asarray(wave - excess / (length + 2.0 * zb / (1.0 + (wave * zb) ** 2)))
