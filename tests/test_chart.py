@@ -452,7 +452,7 @@ def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
 def test_a_chart_of_readings_has_files_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(chart_module, "CHARGES", fake("charges", [0.1], [0.3]))
+    monkeypatch.setattr(chart_module, "CHARGES_FOR_READINGS", fake("charges", [0.1], [0.3]))
     monkeypatch.setattr(chart_module, "READING_METHODS", LITTLE[1:])
     assert main(["chart", "--readings", "fibres", "--out", str(tmp_path)]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == [f"chart-readings.{x}" for x in ("csv", "json", "png")]

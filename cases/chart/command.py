@@ -8,7 +8,7 @@ from tetlux.cases.batch.requests import load_all
 from tetlux.cases.chart.benchmark import prepare_benchmark, prepare_readings_benchmark
 from tetlux.cases.chart.files import chart_files, write_chart
 from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, READING_METHODS
-from tetlux.cases.chart.meshless import CHARGES, MESHLESS, MONTE_CARLO, has_monte_carlo
+from tetlux.cases.chart.meshless import CHARGES_FOR_READINGS, MESHLESS, MONTE_CARLO, has_monte_carlo
 from tetlux.cases.chart.methods import Method
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.runs import MeasuredBenchmark, measure_methods
@@ -89,7 +89,7 @@ def chart(
 
 def _methods(report: Callable[[str], None], *, readings: bool) -> list[Method]:
     """The methods that can run here; report those that cannot."""
-    methods = [CHARGES, *READING_METHODS] if readings else [*MESHLESS, *FINITE_ELEMENTS]
+    methods = [CHARGES_FOR_READINGS, *READING_METHODS] if readings else [*MESHLESS, *FINITE_ELEMENTS]
     for peer in PEERS:
         if peer.is_installed:
             methods += peer.methods

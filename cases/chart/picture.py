@@ -25,9 +25,14 @@ PANELS = ((1.1, 3.7), (5.9, 2.4), (9.05, 2.4), (11.7, 4.2))
 WIDEST = 150  # most characters in a line of notes
 # Columns of the key, by position: the quantity whose exponent is shown, and the heading.
 KEY_COLUMNS = {0.89: ("error", "p"), 1.0: ("seconds", "q")}
-SECONDS = "Seconds: from the surface in memory to the exitance at the surface, meshing included, with nothing cached. "
-ERROR = "Error: relative L2 over the surface (of a slab with a closed form, both faces away from the rim). "
-ERROR_OF_READINGS = "Error: of each detector's reading, relative; the median over the detectors. "
+OF_EXITANCE = (
+    "Seconds: from the surface in memory to the exitance at the surface, meshing included, with nothing cached. "
+    "Error: relative L2 over the surface (of a slab with a closed form, both faces away from the rim). "
+)
+OF_READINGS = (
+    "Seconds: from the surface in memory to the readings, meshing included, with nothing cached. "
+    "Error: of each detector's reading, relative; the median over the detectors. "
+)
 NOTE = (
     "NGSolve is given the exact shape, all others its triangles. "
     "p, q: error ~ unknowns^p, seconds ~ unknowns^q, by least squares over the runs shown."
@@ -103,7 +108,7 @@ def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
 def _notes(measured: Sequence[MeasuredBenchmark]) -> list[str]:
     """The lines of the notes below the picture."""
     read = any(entry.benchmark.detectors for entry in measured)
-    lines = textwrap.wrap(SECONDS + (ERROR_OF_READINGS if read else ERROR) + NOTE, WIDEST)
+    lines = textwrap.wrap((OF_READINGS if read else OF_EXITANCE) + NOTE, WIDEST)
     if any(run.method == MONTE_CARLO.name for entry in measured for run in entry.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
     if any(entry.benchmark.reference.error > 0 for entry in measured):
