@@ -161,7 +161,7 @@ def _in_words(limit: MeshLimit) -> str:
 
 
 def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
-    """Refuse tolerances that are not sensible or do not go with the detectors.
+    """Refuse tolerances out of range, without a detector, or none at all.
 
     Raises
     ------
