@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
+from tetlux.cases.write.content import content_of
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
@@ -21,6 +22,7 @@ from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.scenes import media_by_scene
+from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.arrays import FloatArray
@@ -43,6 +45,27 @@ COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
 ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+
+
+@dataclass(frozen=True)
+class FinishedCase:
+    """What a finished run has to say.
+
+    Attributes
+    ----------
+    folder : Path
+        Of its results.
+    summary : dict
+        The content of ``summary.json``.
+    warnings : list of str
+    readings : list of str
+        What its detectors read, in lines for people.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    warnings: list[str]
+    readings: list[str]
 
 
 def run_case(
@@ -92,16 +115,32 @@ def run_case(
     ...     sorted(path.name for path in folder.iterdir())
     ['compare.json', 'compare.png', 'summary.json']
     """
+    finished = finish_case(case, out, report, cache=cache)
+    for line in finished.readings:
+        report(line)
+    for warning in finished.warnings:
+        if note is None:
+            report(f"note: {warning}")
+        else:
+            note(warning)
+    return finished.folder
+
+
+def finish_case(
+    case: Case, out: Path, report: Report, *, cache: bool = True, start: SharedMesh | None = None
+) -> FinishedCase:
+    """Solve a case and write its results, as `run_case` does; `start` is the mesh that it begins with."""
     started, target = time.perf_counter(), out / case.name
     try:
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
-            solutions = _solve(case, report, cache=cache)
+            solutions = _solve(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
+                results = collect_results(case, solutions)
+                summary, warnings, readings = _write(results, folder, started, writing)
                 publish(folder, target, ALL_FILES)
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
@@ -110,17 +149,10 @@ def run_case(
         if not memory_ran_out(error):
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
-    for line in describe_readings(readings, case.surface.unit):
-        report(line)
-    for warning in warnings:
-        if note is None:
-            report(f"note: {warning}")
-        else:
-            note(warning)
-    return target
+    return FinishedCase(target, summary, warnings, describe_readings(readings, case.surface.unit))
 
 
-def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
+def _solve(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> Sequence[AnySolution]:
     """Solve each channel by the model of the case."""
     if case.spec.model == "charges":
         return _solve_with_charges(case, report)
@@ -132,6 +164,9 @@ def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
         tolerance=case.tolerance,
         detectors=[entry.detector for entry in case.detectors],
         detector_tolerance=case.detector_tolerance,
+        everywhere_tolerance=case.everywhere_tolerance,
+        volume_tolerance=case.volume_tolerance,
+        start=start,
         cache=cache,
         report=report,
     )
@@ -153,8 +188,10 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 
-def _write(results: Results, folder: Path, started: float, writing: float) -> tuple[list[str], list[dict[str, Any]]]:
-    """Write all files of a run into a folder, and return its warnings and readings."""
+def _write(
+    results: Results, folder: Path, started: float, writing: float
+) -> tuple[dict[str, Any], list[str], list[dict[str, Any]]]:
+    """Write all files of a run into a folder, and return its summary, warnings and readings."""
     case = results.case
     unit = case.surface.unit
     warnings = _warnings(results)
@@ -183,13 +220,13 @@ def _write(results: Results, folder: Path, started: float, writing: float) -> tu
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
-    figures = summarize(results, readings, warnings)
+    figures = summarize(results, readings, warnings) | {"content": content_of(case)}
     if compared is not None:
         figures["compare"] = compared.differences
     figures["seconds"] = _seconds(results, started, writing)
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
-    return warnings, readings
+    return figures, warnings, readings
 
 
 def _seconds(results: Results, started: float, writing: float) -> dict[str, float]:

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from tetlux.cases import run
-from tetlux.cases.batch import requests as batch
+from tetlux.cases.batch import grouping, workshop
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
@@ -125,24 +125,25 @@ def test_what_holds_for_a_sweep_is_said_once(
     (tmp_path / "ball.yaml").write_text(QUICK + "outputs: []\nsweep: {medium.sigma_a: [0.01, 0.02, 0.03, 0.04]}\n")
     (tmp_path / "alone.yaml").write_text(QUICK + "outputs: []\n")
 
-    def pretend(case: Case, out: Path, report: run.Report, *, cache: bool, note: run.Report) -> Path:
+    def pretend(case: Case, out: Path, *_: object, **__: object) -> run.FinishedCase:
         if "0.03" in case.name:
             raise RunError("no luck")
-        note("of every run")
-        if "0.02" in case.name:
-            note("of one run")
-        return out
+        return run.FinishedCase(out, {}, ["of every run", *(["of one run"] if "0.02" in case.name else [])], [])
 
-    monkeypatch.setattr(batch, "run_case", pretend)
-    assert main(["run", str(tmp_path / "ball.yaml"), str(tmp_path / "alone.yaml"), "--out", str(tmp_path / "o")]) == 1
+    monkeypatch.setattr(workshop, "finish_case", pretend)
+    monkeypatch.setattr(grouping, "FEWEST_TO_SHARE", 99)
+    here = ["--jobs", "1", "--out", str(tmp_path / "o")]
+    assert main(["run", str(tmp_path / "ball.yaml"), str(tmp_path / "alone.yaml"), *here]) == 1
     lines = capsys.readouterr().out.splitlines()
     notes = [line for line in lines if "of every run" in line or "of one run" in line]
     assert notes[0].startswith("note, in 3 of 4 runs (ball/")
     assert notes[1] == "note, in 1 of 4 runs (ball/medium.sigma_a=0.02): of one run"
     assert notes[2].endswith("s  note: of every run")
     assert len(notes) == 3
-    monkeypatch.setattr(batch, "run_case", lambda case, out, report, *, cache, note: note("of every run") or out)
-    assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "o")]) == 0
+    monkeypatch.setattr(
+        workshop, "finish_case", lambda case, out, *_, **__: run.FinishedCase(out, {}, ["of every run"], [])
+    )
+    assert main(["run", str(tmp_path / "ball.yaml"), *here]) == 0
     (said,) = [line for line in capsys.readouterr().out.splitlines() if "of every run" in line]
     assert said == "note, in all 4 runs: of every run"
 

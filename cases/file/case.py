@@ -68,6 +68,8 @@ class Case:
     detectors : tuple of NamedDetector
     detector_tolerance : float, optional
         Of what the detectors read.
+    everywhere_tolerance, volume_tolerance : float, optional
+        Of the exitance at almost every point of the surface, and of the fluence inside.
     camera : (3,) floats, optional
         Where the picture is taken from and radiance is computed, unit.
     up : (3,) floats
@@ -100,6 +102,8 @@ class Case:
     sweep_values: Mapping[str, Any]
     detectors: tuple[NamedDetector, ...] = ()
     detector_tolerance: float | None = None
+    everywhere_tolerance: float | None = None
+    volume_tolerance: float | None = None
     camera: Vector | None = None
     up: Vector = UPRIGHT
     toward: FloatArray | None = None

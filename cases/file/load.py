@@ -100,6 +100,8 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         mesh=body.mesh,
         tolerance=spec.tolerances.exitance,
         detector_tolerance=spec.tolerances.detectors,
+        everywhere_tolerance=spec.tolerances.everywhere,
+        volume_tolerance=spec.tolerances.volume,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         spec=spec,
         sweep_values=values,

@@ -20,6 +20,8 @@ from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 
+# Tolerances beside that of the exitance, by their name in a case.
+MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_tolerance")
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
@@ -56,7 +58,7 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
         "unit": case.surface.unit,
         "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
-        **({"detector_tolerance": case.detector_tolerance} if case.detector_tolerance else {}),
+        **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
@@ -111,8 +113,10 @@ def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
     if isinstance(solution, ChargeSolution):
         # The fluence has a pole at each source, so there is no largest value.
         return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
+    of_fields = {"everywhere_error": solution.everywhere_error, "volume_error": solution.volume_error}
     return {
         "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
+        **{name: value for name, value in of_fields.items() if math.isfinite(value)},
         **({"validity": _validity(solution.validity)} if solution.validity else {}),
     }
 
