@@ -17,8 +17,10 @@ from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.scenes import Scenes
+from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import MeshSolution
+from tetlux.fem.system import MeshSolution, System
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
@@ -26,6 +28,10 @@ from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
+# The share of scenes for which a shared mesh is left too coarse: they refine it for themselves.
+MOST_MISSING = 0.25
+# A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
+SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
 PROGRESS_AFTER_SECONDS = 8.0
 # How progress lines call errors of fields.
@@ -138,6 +144,10 @@ class Problem:
     limit : bool
         Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
     watch : Stopwatch
+    shared : SharedMesh, optional
+        The mesh to begin with, and what other problems have left on it.
+    others : sequence of Deposit
+        Lights of other problems that the first mesh is to be graded for too.
     """
 
     scenes: Scenes
@@ -145,6 +155,8 @@ class Problem:
     lumping: Lumping
     limit: bool
     watch: Stopwatch
+    shared: SharedMesh | None = None
+    others: Sequence[Deposit] = ()
 
     @property
     def media(self) -> list[tuple[AnyMedium, ...]]:
@@ -158,25 +170,41 @@ class Problem:
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
-        assembly = Assembly(mesh)
-        systems = {
-            media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
-            for media in dict.fromkeys(self.media)
-        }
+        each = dict.fromkeys(self.media)
+        if self.shared is not None and mesh is self.shared.mesh:
+            systems = {media: self._shared_system(self.shared, media) for media in each}
+        else:
+            assembly = Assembly(mesh)
+            systems = {
+                media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit) for media in each
+            }
         return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
+
+    def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
+        return shared.system(
+            (media, self.lumping, self.limit),
+            lambda: self.scenes.system_on(
+                shared.mesh, media, self.lumping, shared.assembly, limit=self.limit, expected=EXPECTED_LIGHTS
+            ),
+        )
 
 
 def first_mesh(
     problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
 ) -> TetMesh:
-    """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
+    """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
-        with _report_if_slow(report):
-            mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
+        if problem.shared is not None:
+            mesh = problem.shared.mesh
+        else:
+            with _report_if_slow(report):
+                mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        slack = 1.0 if problem.shared is None else SLACK
+        for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
             deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
-            source_points = places_to_resolve(deposits)
+            # The lights of others are taken to be of the same kind.
+            source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
@@ -194,7 +222,8 @@ def first_mesh(
                     tolerances.readings,
                     most_tetrahedra,
                 )
-    report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
+    begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
+    report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
 
@@ -259,3 +288,43 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
+
+
+def refine_for_most(
+    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
+) -> TetMesh:
+    """Refine a mesh until all but `MOST_MISSING` of the scenes are within the tolerances, each by itself.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The first one.
+    problem : Problem
+        Scenes that stand for many more.
+    tolerances : Tolerances
+    most_tetrahedra : int
+        Largest number of tetrahedra after refinement.
+    report : callable
+        Called with a line of text for each mesh.
+
+    Returns
+    -------
+    TetMesh
+    """
+    pending: dict[int, MeshSolution | None] = dict.fromkeys(range(len(problem.lights)))
+    allowed = MOST_MISSING * len(pending)
+    while True:
+        solve_on = problem.solver_on(mesh)
+        steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
+        with problem.watch.stage("solve"):
+            missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
+        if len(missing) <= allowed:
+            return mesh
+        with problem.watch.stage("mesh"):
+            splits = tolerances.assess(list(missing.values())).splits
+            inner = problem.scenes.inner
+            finer = refine_often(mesh, splits, problem.scenes.surface, inner, most_tetrahedra)
+        if not len(mesh.tetrahedra) < len(finer.tetrahedra) <= most_tetrahedra:
+            return mesh
+        mesh, pending = finer, dict(missing)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, refine_for_most, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
@@ -21,11 +21,15 @@ from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.fields import error_of_field, use_quadratic_elements
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
+from tetlux.fem.shared import SharedMesh
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+# The largest mesh that is shared: on finer ones solving takes longer than refining for each run.
+MOST_SHARED_TETRAHEDRA = 100_000
 
 Report = Callable[[str], None]
 
@@ -46,6 +50,7 @@ def solve_each(
     everywhere_tolerance: float | None = None,
     volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
+    start: SharedMesh | None = None,
     mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
@@ -75,6 +80,8 @@ def solve_each(
         Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
+    start : SharedMesh, optional
+        The mesh to begin with in place of the mesher's; see `share_mesh`.
     mass : {"lumped", "consistent"}
         Quadrature of the terms without derivatives.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
@@ -128,7 +135,7 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = KeptFits() if mesh is None else fits_of(mesh)
+        kept = _kept_for(mesh, start)
         if isinstance(body, TetMesh):
             subtract = replace_fitted(subtract)
         wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
@@ -140,14 +147,15 @@ def solve_each(
         tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    problem = Problem(checked, split, mass, limit, watch)
+    problem = Problem(checked, split, mass, limit, watch, start)
     given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    keep_fits(steps[0].solution.mesh, kept)
+    if start is None:
+        keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
@@ -160,6 +168,96 @@ def solve_each(
         solutions.append(replace(solution, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptFits:
+    """The places of charges to follow, and to add to."""
+    if start is not None:
+        return start.kept
+    return KeptFits() if mesh is None else fits_of(mesh)
+
+
+def share_mesh(
+    surface: Surface,
+    medium: AnyMedium | Sequence[AnyMedium],
+    scenes: Sequence[Sequence[Light]],
+    *,
+    pilots: int = 1,
+    regions: Sequence[Region] = (),
+    tolerance: float | None = 0.02,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
+    cache: bool = True,
+    report: Report = no_report,
+) -> SharedMesh:
+    """Mesh a body for many scenes, so that most of them need no finer mesh.
+
+    Parameters
+    ----------
+    surface : Surface
+    pilots : int
+        So many scenes, the first ones, are solved for and stand for the others. The mesh is graded for the lights of
+        all.
+    medium, scenes, regions, tolerance, detectors, detector_tolerance, cache, report
+        As in `solve_each`.
+
+    Returns
+    -------
+    SharedMesh
+        For `solve_each`, as `start`. It has at most `MOST_SHARED_TETRAHEDRA`: runs that need more refine it themselves.
+
+    Raises
+    ------
+    InputError, RunError
+        As in `solve_each`.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointSource
+    >>> from tetlux.fem.solve_scenes import share_mesh, solve_each
+    >>> from tetlux.meshing import sphere
+    >>> ball, few = sphere(10.0), [Medium(sigma_a=a, sigma_s_prime=1.0, eta=1.4) for a in (0.01, 0.03)]
+    >>> lights = [PointSource((0, 0, 5.0))]
+    >>> start = share_mesh(ball, few, [lights, lights], tolerance=0.05)
+    >>> (solution,) = solve_each(ball, Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4), [lights], start=start)
+    >>> solution.mesh is start.mesh
+    True
+    """
+    _check_tolerances(tolerance, detectors, detector_tolerance)
+    checked = build_scenes(surface, None, medium, regions, len(scenes))
+    split = [
+        split_lights(lights, body, "fitted", tolerance=tolerance or detector_tolerance or 0.02, kept=KeptFits())
+        for lights, body in zip(scenes[:pilots], checked.bodies, strict=False)
+    ]
+    others = [
+        light.deposit_in(body)
+        for lights, body in zip(scenes[pilots:], checked.bodies[pilots:], strict=True)
+        for light in lights
+    ]
+    checked = replace(checked, media=checked.media[:pilots], bodies=checked.bodies[:pilots])
+    dark = Dark(checked.surface, checked.bodies[0].outer)
+    tolerances = Tolerances(
+        tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors)
+    )
+    problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)
+    limit = limit_by_memory(MOST_SHARED_TETRAHEDRA, *problem.size, reading=len(detectors) > 0).tetrahedra
+    mesh = first_mesh(problem, tolerances, limit, report, cache=cache)
+    return SharedMesh(refine_for_most(mesh, problem, tolerances, limit, report))
+
+
+def choose_places(
+    surface: Surface,
+    medium: AnyMedium | Sequence[AnyMedium],
+    scenes: Sequence[Sequence[Light]],
+    start: SharedMesh,
+    *,
+    regions: Sequence[Region] = (),
+    tolerance: float = 0.02,
+) -> None:
+    """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
+    checked = build_scenes(surface, None, medium, regions, len(scenes))
+    for lights, body in zip(scenes, checked.bodies, strict=True):
+        split_lights(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
 
 
 def _in_words(limit: MeshLimit) -> str:

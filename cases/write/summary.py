@@ -17,6 +17,7 @@ from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
+from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Tolerances beside that of the exitance, by their name in a case.
@@ -24,18 +25,14 @@ MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_toleran
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
-def summarize(
-    results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
-) -> dict[str, Any]:
-    """Summarize a run as plain data.
+def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[str]) -> dict[str, Any]:
+    """Summarize a run as plain data, but for its seconds.
 
     Parameters
     ----------
     results : Results
     readings : list of dict
         Rows of the detectors.
-    seconds : dict of str to float
-        By stage.
     warnings : list of str
 
     Returns
@@ -67,9 +64,9 @@ def summarize(
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
-        "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
+        "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
     }
 
