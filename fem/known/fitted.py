@@ -158,7 +158,7 @@ def _accurate(residual: BoundaryResidual, medium: Medium) -> BoolArray:
 def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     """Whether the light is a few points well inside a simple body."""
     terms = deposit.terms
-    if surface.overlaps or len(surface.faces) > MOST_TRIANGLES:
+    if surface.overlaps:
         return False
     if not 0 < len(terms.points) <= MOST_SOURCES or len(terms.segments) > 0:
         return False
@@ -187,7 +187,8 @@ def residual_on_surface(
         own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points, equation = quadrature(surface, spacing), equation_of(charges.medium)
+    points = quadrature(surface, spacing, len(charges.positions))
+    equation = equation_of(charges.medium)
     fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
     exitance = equation.robin * fluence
     apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])

@@ -10,6 +10,7 @@ from tetlux.meshing.describe import count, size
 from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.curved import CurvedPatches
+from tetlux.meshing.surface.groups import TriangleGroups, cut_long_triangles, group_triangles
 from tetlux.meshing.surface.solids import Shape, lies_on
 from tetlux.meshing.surface.triangles import barycentric_on_triangles, signed_volume, triangle_areas
 
@@ -152,7 +153,24 @@ class Surface:
         """
         if self.crease_angle <= 0 or len(faces) == 0:
             return points, self.normals[faces]
-        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))
+        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))[:2]
+
+    def on_curve_with_stretch(self, faces: IntArray, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The same as `on_curve`, and the area of the smooth surface over that of the triangle there, (q,)."""
+        if self.crease_angle <= 0 or len(faces) == 0:
+            return points, self.normals[faces], np.ones(len(faces))
+        corners = self.points[self.faces[faces]]
+        curved, normals, areas = self._patches(faces, barycentric_on_triangles(points, corners))
+        flat = triangle_areas(self.points, self.faces[faces])[1]
+        return curved, normals, np.divide(areas, flat, out=np.ones(len(faces)), where=flat > 0)
+
+    @cached_property
+    def groups(self) -> TriangleGroups:
+        """Groups of neighbouring triangles."""
+        faces, corners = cut_long_triangles(self.points[self.faces])
+        stretch = self.on_curve_with_stretch(faces, corners.mean(axis=1))[2]
+        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return group_triangles(faces, corners, 0.5 * np.linalg.norm(sides, axis=1) * stretch)
 
     @cached_property
     def bulge(self) -> float:

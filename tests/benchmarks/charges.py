@@ -195,7 +195,7 @@ def fitted_rows(scene: Scene) -> Iterator[str]:
     light, mesh = PointSource(tuple(scene.source[0].tolist())), tetrahedralize(scene.surface)
     distance = distance_from(scene.surface, scene.source)
     spacing = scaled_spacing(distance, 0.2)
-    samples = draw(scene.surface, cells_of(scene.surface, spacing).cut(spacing), np.random.default_rng(3))
+    samples = draw(cells_of(scene.surface, spacing), np.random.default_rng(3))
     if scene.radius is None:
         while len(mesh.points) < FINE:
             mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), scene.surface)
