@@ -42,10 +42,10 @@ NOISE_FACTOR = 2.0
 # Number of nearest points over which the residual and the spacing are averaged.
 AVERAGED_NEIGHBOURS = 12
 # Number of nearest old points from which the spacing at a new point is interpolated.
-INTERPOLATED_NEIGHBOURS = 6
+INTERPOLATED_NEIGHBOURS = 3
 # Where finite elements solve for the remainder, fitting ends when the estimated error of the charges alone is this
 # share of the tolerance.
-FIT_TOLERANCE_SHARE = 0.6
+FIT_TOLERANCE_SHARE = 1.0
 # Where finite elements solve for the remainder, fitting ends at this number of charges, which takes .2 s.
 MOST_CHARGES_WITH_FEM = 600
 # The estimate is assumed to fall with this power of the number of charges, which gives the number of the next fit.

@@ -26,7 +26,7 @@ EQUATION_REFINEMENT = 2.0
 # Charges in each square of their spacing (measured: .89 to .95, less those that are left out).
 CHARGES_PER_SQUARE = 0.92
 # Longest side of the cells by which charges are counted, in spacings.
-COUNTING_CELL = 1.5
+COUNTING_CELL = 2.5
 # Equations are weighted by this power of the distance from the light, so that faint light far away counts too. By 300
 # charges, relative L2 error, and median relative error where the exitance is below 1 % of its maximum, both in %, for 0
 # / .75 / 1.5: torus .011, .17 / .012, .25 / .017, .24; hare .25, 2.2 / .26, 2.5 / 2.3, 5.6; spot 1.1, 8.3 / 1.2, 4.6 /
@@ -126,7 +126,7 @@ def place_charges_at(
 def spacing_scale(surfaces: Sequence[Surface], spacings: Sequence[Spacing], count: float) -> float:
     """The factor of the spacings for which surfaces together hold about `count` charges."""
     scale = 1.0
-    for _ in range(3):
+    for _ in range(2):
         # The spacing is better known by cells of about its own size.
         cells = [cells_of(*each, COUNTING_CELL * scale) for each in zip(surfaces, spacings, strict=True)]
         scale = float(np.sqrt(CHARGES_PER_SQUARE * sum(each.sample_count for each in cells) / count))

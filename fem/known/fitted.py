@@ -34,9 +34,8 @@ from tetlux.meshing.surface.surface import Surface
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Surfaces of more triangles than this are not fitted. On a scan of 100,000 a fit takes 4 s, and all of the half-space's
-# solution .5 s; on one of 20,000 .9 and .6 s, with half of its error.
-MOST_TRIANGLES = 40_000
+# Points nearer than this share of the body's diagonal are the same.
+SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
 # The power that flows out is corrected where less than this share of all is absorbed.
@@ -104,7 +103,7 @@ class FittedLight:
 
     def residual_within(self, wanted: Spacing) -> BoundaryResidual:
         """The residual at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return residual_on_surface(self.charges, self.placement.fitted, self.surface, wanted)
+        return residual_on_surface(self.charges, self.placement.fitted, self.surface, wanted, self.residual)
 
     __repr__ = one_line
 
@@ -178,9 +177,24 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
 
 
 def residual_on_surface(
-    charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None
+    charges: Charges,
+    samples: Samples,
+    surface: Surface,
+    wanted: Spacing | None = None,
+    known: BoundaryResidual | None = None,
 ) -> BoundaryResidual:
-    """The residual of charges on the true surface, at points that follow from the samples where they were fitted."""
+    """The residual of charges on the true surface, at points that follow from the samples where they were fitted.
+
+    Parameters
+    ----------
+    charges : Charges
+    samples : Samples
+    surface : Surface
+    wanted : callable, optional
+        Longest distance between points.
+    known : BoundaryResidual, optional
+        Of the same charges, at points some of which may be the same.
+    """
     tree = cKDTree(samples.points)
 
     def spacing(queries: FloatArray) -> FloatArray:
@@ -188,11 +202,20 @@ def residual_on_surface(
         return own if wanted is None else np.minimum(own, wanted(queries))
 
     points = quadrature(surface, spacing, len(charges.positions))
-    equation = equation_of(charges.medium)
-    fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
-    exitance = equation.robin * fluence
     apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return BoundaryResidual(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    exitance, values = np.empty(len(points)), np.empty(len(points))
+    new = np.arange(len(points))
+    if known is not None:
+        distance, nearest = known.tree.query(points.points)
+        same = distance <= SAME * surface.diagonal
+        exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
+        new = new[~same]
+    equation = equation_of(charges.medium)
+    fluence, flux = equation.traces(points.points[new], points.normals[new], charges.positions, charges.strengths)
+    exitance[new] = equation.robin * fluence
+    values[new] = flux + exitance[new]
+    outflow = float(points.areas @ (exitance - values))
+    return BoundaryResidual(apart, exitance, values, _missed(charges, points, outflow))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:
