@@ -43,7 +43,5 @@ def _points_of_pieces(surface: Surface, cells: Cells, some: IntArray) -> tuple[F
     at_sides = np.einsum("pi,mij->mpj", MIDDLES, corners[coarse]).reshape(-1, 3)
     flat = np.vstack([corners[~coarse].mean(axis=1), at_sides])
     shares = np.where(np.arange(len(own)) < (~coarse).sum(), 1.0, 1.0 / 3.0)
-    sides = cells.corners[own][:, 1:] - cells.corners[own][:, :1]
-    points, normals, stretch = surface.on_curve_with_stretch(cells.faces[own], flat)
-    areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) * stretch * shares
-    return points, normals, areas, cells.spacing[own]
+    points, normals = surface.on_curve(cells.faces[own], flat)
+    return points, normals, shares * cells.areas[own], cells.spacing[own]

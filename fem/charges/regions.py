@@ -117,9 +117,7 @@ def place_at_interfaces(
     scale = spacing_scale(surfaces, spacings, share * count)
     found = []
     for interface, spacing in zip(interfaces, spacings, strict=True):
-        placement = place_charges_at(
-            interface.surface, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT
-        )
+        placement = place_charges_at(interface.surface, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT)
         charges_inside = np.zeros((0, 3))
         if interface.outside is not None:
             turned = replace(interface.surface, faces=interface.surface.faces[:, ::-1])

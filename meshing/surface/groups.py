@@ -82,16 +82,36 @@ def cut_long_triangles(corners: FloatArray) -> tuple[IntArray, FloatArray]:
     longest, areas = longest_sides(corners), _areas(corners)
     widths = LONGEST_PIECE * 2.0 * areas / np.where(longest > 0, longest, 1.0)
     shortest, most = float(longest.max()) * SHORTEST_PIECE, MOST_ADDED_SHARE * len(corners) + MOST_ADDED
-    while (longest / np.maximum(widths, shortest))[longest > widths].sum() > most:
+    while 2.0 * (longest / np.maximum(widths, shortest))[longest > widths].sum() > most:
         shortest *= 2.0
     limits = np.maximum(widths, shortest)
     faces, done = np.arange(len(corners)), []
     while True:
-        long = longest_sides(corners) > limits[faces]
+        sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+        long, narrow = sides.max(axis=1) > limits[faces], sides.min(axis=1) <= limits[faces]
         done.append((faces[~long], corners[~long]))
-        if not long.any():
+        done.append(_slice(faces[long & narrow], corners[long & narrow], limits))
+        rest = long & ~narrow
+        if not rest.any():
             return np.concatenate([some for some, _ in done]), np.concatenate([some for _, some in done])
-        faces, corners = np.repeat(faces[long], 2), bisect(corners[long])
+        faces, corners = np.repeat(faces[rest], 2), bisect(corners[rest])
+
+
+def _slice(faces: IntArray, corners: FloatArray, limits: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Cut triangles with one short side each, (f, 3, 3), across, into slices as long as the limits of their faces."""
+    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    # The tip is opposite the shortest side, which ends at the corner after its first.
+    turn = (sides.argmin(axis=1)[:, None] + 2 + np.arange(3)) % 3
+    tip, left, right = np.take_along_axis(corners, turn[:, :, None], axis=1).transpose(1, 0, 2)
+    count = np.ceil(sides.max(axis=1) / limits[faces]).astype(np.int64)
+    own = np.repeat(np.arange(len(count)), count)
+    index = np.arange(len(own)) - np.repeat(np.cumsum(count) - count, count)
+    near, far = (index / count[own])[:, None], ((index + 1) / count[own])[:, None]
+    tips, lefts, rights = tip[own], left[own] - tip[own], right[own] - tip[own]
+    outer = np.stack([tips + near * lefts, tips + far * lefts, tips + far * rights], axis=1)
+    inner = np.stack([tips + near * lefts, tips + far * rights, tips + near * rights], axis=1)
+    double = index > 0
+    return np.concatenate([faces[own], faces[own[double]]]), np.concatenate([outer, inner[double]])
 
 
 def group_triangles(faces: IntArray, corners: FloatArray, areas: FloatArray) -> TriangleGroups:
