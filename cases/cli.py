@@ -109,7 +109,7 @@ def _parser() -> argparse.ArgumentParser:
         "cases",
         nargs="+",
         metavar="CASE",
-        help="a YAML case file, or the name of a shipped one (see tetlux list)",
+        help="a YAML case file, a pattern such as '*.yaml', or the name of a shipped case (see tetlux list)",
     )
     run.add_argument(
         "--out", type=Path, default=Path("results"), metavar="DIR", help="folder of all results; default: results"
@@ -118,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
-    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, or the name of a shipped one")
+    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
     check.set_defaults(command=_check)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")

@@ -52,7 +52,10 @@ class Scenes:
     def system_on(
         self, mesh: TetMesh, media: tuple[AnyMedium, ...], lumping: Lumping, assembly: Assembly, *, limit: bool
     ) -> System:
-        """Assemble the system of one set of media on a mesh."""
+        """Prepare the system of one set of media on a mesh.
+
+        `solve` and `solve_each` make all their systems here, of steady diffusion: another model enters as `model_of`.
+        """
         expected = self.media.count(media)
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
@@ -24,24 +25,30 @@ from tetlux.meshing.tets.mesh import TetMesh
 __all__ = ["solve", "solve_each"]
 
 
+class Options(TypedDict, total=False):
+    """Arguments of `solve` by finite elements that have a default, for the types of what it returns."""
+
+    regions: Sequence[Region]
+    tolerance: float | None
+    detectors: Sequence[Detector]
+    detector_tolerance: float | None
+    mesh: TetMesh | None
+    mass: Lumping
+    subtract: Subtract
+    limit: bool
+    most_tetrahedra: int
+    cache: bool
+    report: Report
+
+
 @overload
 def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of channels, see the next overload
     body: Surface | TetMesh,
     medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
     *,
-    regions: Sequence[Region] = ...,
-    tolerance: float | None = ...,
-    detectors: Sequence[Detector] = ...,
-    detector_tolerance: float | None = ...,
-    mesh: TetMesh | None = ...,
-    mass: Lumping = ...,
-    subtract: Subtract = ...,
-    limit: bool = ...,
-    most_tetrahedra: int = ...,
-    cache: bool = ...,
-    report: Report = ...,
     model: Literal["full"] = ...,
+    **options: Unpack[Options],
 ) -> Solution: ...
 
 
@@ -51,18 +58,8 @@ def solve(
     medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
     lights: Sequence[Light],
     *,
-    regions: Sequence[Region] = ...,
-    tolerance: float | None = ...,
-    detectors: Sequence[Detector] = ...,
-    detector_tolerance: float | None = ...,
-    mesh: TetMesh | None = ...,
-    mass: Lumping = ...,
-    subtract: Subtract = ...,
-    limit: bool = ...,
-    most_tetrahedra: int = ...,
-    cache: bool = ...,
-    report: Report = ...,
     model: Literal["full"] = ...,
+    **options: Unpack[Options],
 ) -> list[Solution]: ...
 
 
@@ -85,7 +82,7 @@ def solve(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
+    tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
 from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
@@ -36,7 +37,7 @@ def solve_each(
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
+    tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     mesh: TetMesh | None = None,
@@ -109,6 +110,8 @@ def solve_each(
     """
     _check_tolerances(tolerance, detectors, detector_tolerance)
     check_scenes(scenes)
+    if not most_tetrahedra >= 1:
+        raise InputError(f"most_tetrahedra is {most_tetrahedra}; give a number of at least 1.")
     if isinstance(body, TetMesh):
         if mesh is not None:
             raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
@@ -120,7 +123,9 @@ def solve_each(
         if isinstance(body, TetMesh):
             subtract = replace_fitted(subtract)
         split = [
-            split_lights(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
+            split_lights(
+                lights, each, subtract, tolerance=tolerance or detector_tolerance or DEFAULT_TOLERANCE, kept=kept
+            )
             for lights, each in zip(scenes, checked.bodies, strict=True)
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)

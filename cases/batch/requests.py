@@ -1,5 +1,6 @@
 """Runs of several case files, one after the other: all files are checked before the first is run."""
 
+import glob
 import sys
 import time
 from collections import Counter
@@ -10,8 +11,9 @@ import numpy as np
 
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
+from tetlux.cases.file.reader import FilesRead
 from tetlux.cases.run import Report, run_case
-from tetlux.cases.shipped import find_case_file
+from tetlux.cases.shipped import find_case_files
 from tetlux.cases.write.publish import check_writable
 from tetlux.meshing.errors import InputError, TetluxError
 
@@ -25,7 +27,7 @@ def load_all(requests: Sequence[str]) -> list[Case]:
     Parameters
     ----------
     requests : sequence of str
-        Case files, or names of those that ship.
+        Case files, patterns of them, or names of those that ship.
 
     Returns
     -------
@@ -36,7 +38,9 @@ def load_all(requests: Sequence[str]) -> list[Case]:
     InputError
         If a case file is wrong, or two cases would write into one folder.
     """
-    cases = [case for request in requests for case in load_cases(find_case_file(request))]
+    files = FilesRead()
+    paths = [path for request in requests for path in find_case_files(request)]
+    cases = [case for path in paths for case in load_cases(path, files)]
     sources: dict[str, Path] = {}
     for case in cases:
         if case.name in sources:
@@ -55,7 +59,7 @@ def check_all(requests: Sequence[str]) -> int:
     Parameters
     ----------
     requests : sequence of str
-        Case files, or names of those that ship.
+        Case files, patterns of them, or names of those that ship.
 
     Returns
     -------
@@ -63,22 +67,32 @@ def check_all(requests: Sequence[str]) -> int:
         0 if all are valid, else 2.
     """
     wrong = 0
+    files = FilesRead()
     for request in requests:
         try:
-            cases = load_cases(find_case_file(request))
+            for path in find_case_files(request):
+                cases = load_cases(path, files)
+                print(f"{path if glob.has_magic(request) else request}: ok: {_describe(cases)}")
+                for note in _notes_of(cases[0]):
+                    print(f"  {note}")
         except InputError as error:
             print(f"tetlux: {error}", file=sys.stderr)
             wrong += 1
-            continue
-        first, surface = cases[0], cases[0].surface
-        runs = "" if len(cases) == 1 else f"{len(cases)} runs, "
-        if len(first.channels) > 1:
-            runs += f"channels {', '.join(first.channel_names)}; "
-        size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
-        print(f"{request}: ok: {runs}{_size(first)}, {size} {surface.unit}")
-        for note in (*_describe_mesh(first), *first.repairs, *surface.warnings, *first.region_warnings):
-            print(f"  {note}")
     return 2 if wrong else 0
+
+
+def _describe(cases: Sequence[Case]) -> str:
+    """The runs of a case file, and the channels and size of the first."""
+    first, surface = cases[0], cases[0].surface
+    runs = "" if len(cases) == 1 else f"{len(cases)} runs, "
+    if len(first.channels) > 1:
+        runs += f"channels {', '.join(first.channel_names)}; "
+    size = " x ".join(f"{length:.4g}" for length in np.ptp(surface.points, axis=0))
+    return f"{runs}{_size(first)}, {size} {surface.unit}"
+
+
+def _notes_of(case: Case) -> tuple[str, ...]:
+    return (*_describe_mesh(case), *case.repairs, *case.surface.warnings, *case.region_warnings)
 
 
 def _size(case: Case) -> str:

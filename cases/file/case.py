@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tetlux.cases.compare.comparison import Comparison
 from tetlux.cases.file.detectors import NamedDetector
@@ -79,8 +80,8 @@ class Case:
         Closed forms to compare the run with.
     spec : CaseSpec
         The validated case file of this run.
-    sweep_values : mapping of str to float or str
-        The values of this run of a sweep, by dotted key; empty without a sweep.
+    sweep_values : mapping
+        The values of this run of a sweep, plain data by dotted key; empty without a sweep.
     """
 
     name: str
@@ -92,7 +93,7 @@ class Case:
     tolerance: float | None
     outputs: tuple[str, ...]
     spec: CaseSpec
-    sweep_values: Mapping[str, float | str]
+    sweep_values: Mapping[str, Any]
     detectors: tuple[NamedDetector, ...] = ()
     detector_tolerance: float | None = None
     camera: Vector | None = None

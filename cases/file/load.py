@@ -2,18 +2,21 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from tetlux.cases.compare.comparison import Comparison, comparison_for
+from tetlux.cases.file.base import read_with_base
 from tetlux.cases.file.body import CaseBody, read_body
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
 from tetlux.cases.file.channels import ALL, channel_names, check_unique_names
 from tetlux.cases.file.detectors import NamedDetector, build_detector
-from tetlux.cases.file.document import Document, Key, read_document
+from tetlux.cases.file.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
-from tetlux.cases.file.reader import Reader
+from tetlux.cases.file.reader import FilesRead, Reader
+from tetlux.cases.file.run_names import LONGEST_NAME
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep import LONGEST_NAME, expand_sweep
+from tetlux.cases.file.sweep import expand_sweep
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
 from tetlux.fem.inputs import unit_vector
@@ -25,7 +28,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 
 
-def load_cases(path: Path) -> list[Case]:
+def load_cases(path: Path, files: FilesRead | None = None) -> list[Case]:
     """Read a case file and check all that can be checked before meshing.
 
     That is keys and values, surfaces, the size of the body in mean free paths, and that lights meet the body.
@@ -33,6 +36,8 @@ def load_cases(path: Path) -> list[Case]:
     Parameters
     ----------
     path : Path
+    files : FilesRead, optional
+        What other case files have read already; what this one reads is added to it.
 
     Returns
     -------
@@ -51,12 +56,12 @@ def load_cases(path: Path) -> list[Case]:
     >>> case.name, case.channel_names, case.surface.unit
     ('sphere', ('all',), 'mm')
     """
-    document = read_document(path)
+    document = read_with_base(path)
     spec = validate(document, document.data)
-    reader = Reader(path.parent)
+    reader = Reader(path.parent, files or FilesRead())
     cases = []
     for run in expand_sweep(document, spec):
-        of_run = document if run.label is None else Document(path, run.data, {**document.lines, **run.lines}, run.label)
+        of_run = document if run.label is None else Document(path, run.data, run.places, run.label)
         spec_of_run = spec if run.label is None else validate(of_run, run.data)
         name = spec_of_run.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
@@ -66,9 +71,7 @@ def load_cases(path: Path) -> list[Case]:
     return cases
 
 
-def _build_case(
-    document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]
-) -> Case:
+def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, Any]) -> Case:
     reader.seconds = 0.0
     channels = channel_names(document, spec)
     body = read_body(document, spec, len(channels), reader)

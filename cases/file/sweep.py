@@ -1,16 +1,11 @@
-"""Sweeps: one case file expanded into the runs of its grid."""
+"""Sweeps: one case file expanded into its runs."""
 
-import copy
-import itertools
-import math
 from typing import Any, NamedTuple
 
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.document import Document, Key, Place
 from tetlux.cases.file.schema.case import CaseSpec
-
-MOST_RUNS = 20_000
-# The longest name of a folder that file systems allow, bytes.
-LONGEST_NAME = 255
+from tetlux.cases.file.sweep_keys import check_key, split_key, with_value
+from tetlux.cases.file.sweep_points import sweep_points
 
 
 class SweepRun(NamedTuple):
@@ -20,76 +15,61 @@ class SweepRun(NamedTuple):
     ----------
     label : str or None
         The name of its folder; None without a sweep.
-    values : dict of str to float or str
-        The swept values, by dotted key.
+    values : dict
+        The swept values, plain data by dotted key.
     data : dict
         The data of the case file with these values, without the sweep.
-    lines : dict of Key to int
-        Lines of the swept keys in the case file.
+    places : dict of Key to Place
+        Places of the swept keys in the case file.
     """
 
     label: str | None
-    values: dict[str, float | str]
+    values: dict[str, Any]
     data: dict[str, Any]
-    lines: dict[Key, int]
+    places: dict[Key, Place]
 
 
 def expand_sweep(document: Document, spec: CaseSpec) -> list[SweepRun]:
-    """Make a run for each point of the sweep's grid; a single one without a sweep.
+    """Make a run for each point of the sweep; a single one without a sweep.
 
     Raises
     ------
     InputError
-        If the sweep repeats a value, makes too many runs, or names a key that the case does not have.
+        If the sweep is empty, repeats a value, makes too many runs, or names a key that the case does not have.
     """
-    if not spec.sweep:
+    if spec.sweep is None:
         return [SweepRun(None, {}, document.data, {})]
-    runs: list[SweepRun] = []
-    for key, choices in spec.sweep.items():
-        if len(set(map(repr, choices))) < len(choices):
-            raise document.error(("sweep", key), "a value is given twice; give each once.")
-    count = math.prod(len(choices) for choices in spec.sweep.values())
-    if count > MOST_RUNS:
-        raise document.error(("sweep",), f"this grid makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
-    labels: set[str] = set()
-    for point in itertools.product(*spec.sweep.values()):
-        values = dict(zip(spec.sweep, point, strict=True))
-        data = copy.deepcopy(document.data)
-        del data["sweep"]
-        lines: dict[Key, int] = {}
-        for key, value in values.items():
-            lines[_assign(document, data, key, value)] = document.line(("sweep", key)) or 1
-        label = _folder_name(values)
-        if len(label.encode()) > LONGEST_NAME:
-            raise document.error(
-                ("sweep",),
-                "the keys and values of a run make too long a folder name; sweep fewer keys.",
-            )
-        if label in labels:
-            raise document.error(("sweep",), f'two runs would be written to one folder, "{label}"; change a value.')
-        labels.add(label)
-        runs.append(SweepRun(label, values, data, lines))
+    points, names = sweep_points(document, spec.sweep)
+    if not points[0]:
+        return [SweepRun(None, {}, {key: value for key, value in document.data.items() if key != "sweep"}, {})]
+    given = _keys_given(spec)
+    for key, at in given.items():
+        check_key(document, at, key)
+    rest = {key: value for key, value in document.data.items() if key != "sweep"}
+    places = dict(document.places)
+    for key, at in given.items():
+        place = document.place(at)
+        for depth in range(1, len(split_key(key)) + 1):
+            part = split_key(key)[:depth]
+            if place and (part not in places or part == split_key(key)):
+                places[part] = place
+    # A section that is swept as a whole is set before its keys.
+    order = sorted(given, key=lambda key: len(split_key(key)))
+    runs = []
+    for name, point in zip(names, points, strict=True):
+        data = rest
+        for key in order:
+            data = with_value(document, given[key], data, key, point[key])
+        runs.append(SweepRun(name, point, data, places))
     return runs
 
 
-def _folder_name(values: dict[str, Any]) -> str:
-    """The name of the folder of a run: ``key=value,...`` without characters that file systems refuse."""
-    label = ",".join(f"{key}={value}" for key, value in values.items())
-    return "".join("_" if c in "/\\" or not c.isprintable() else c for c in label)
-
-
-def _assign(document: Document, data: dict[str, Any], key: str, value: object) -> Key:
-    """Set the value of a dotted key, with list items by number; all but the last part must exist already."""
-    parts: Key = tuple(int(p) if p.isdecimal() else p for p in key.split("."))
-    parent: Any = data
-    try:
-        for part in parts[:-1]:
-            # A number is an index of a list, or a label of a mesh, whose key may be text.
-            parent = parent[str(part) if isinstance(parent, dict) and part not in parent else part]
-        parent[parts[-1]] = value
-    except (KeyError, IndexError, TypeError) as error:
-        raise document.error(
-            ("sweep", key),
-            f'"{key}" is no key of this case; write it as in medium.sigma_a or lights.0.pencil.power.',
-        ) from error
-    return parts
+def _keys_given(spec: CaseSpec) -> dict[str, Key]:
+    """Where each swept key is given in the case file."""
+    assert spec.sweep is not None
+    sample = spec.sweep.sample.axes if spec.sweep.sample else {}
+    return {
+        **{key: ("sweep", key) for key in spec.sweep.axes},
+        **{key: ("sweep", "zip", key) for key in spec.sweep.zip},
+        **{key: ("sweep", "sample", key) for key in sample},
+    }

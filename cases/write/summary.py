@@ -17,6 +17,7 @@ from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
+from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
@@ -68,6 +69,7 @@ def summarize(
         "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
+        "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
     }
 

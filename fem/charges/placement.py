@@ -78,7 +78,7 @@ def distance_from(surface: Surface, sources: FloatArray) -> Spacing:
     """
     if len(sources) == 0:
         return lambda points: np.ones(len(points))
-    depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
+    depths = surface.distances(sources)
 
     def distance(points: FloatArray) -> FloatArray:
         square = np.square(points[:, None] - sources).sum(axis=2) - (1.0 - DEPTH_FACTOR**2) * depths**2

@@ -242,7 +242,7 @@ def _estimate_errors(fields: Sequence[ChargeField], placements: Sequence[Interfa
             step = (inside[0] - outside[0]).sum(axis=1)
             flux = (inside[1] - outside[1]).sum(axis=1) - step
             ripple = residual_wave_number(outer, INNER_RIPPLE_FACTOR * spacing)
-            depth = np.linalg.norm(body.interface.surface.project(samples.points)[0] - samples.points, axis=1)
+            depth = body.interface.surface.distances(samples.points)
             sheet = outer.robin / (2.0 * fields[interface.outside].equation.diffusion * ripple)
             errors = np.exp(-ripple * depth) * np.hypot(0.5 * np.abs(step), np.abs(flux) * sheet)
         total = float(np.hypot(total, norm(samples.areas, errors)))

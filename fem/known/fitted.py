@@ -163,14 +163,14 @@ def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
         return False
     if np.any(terms.irradiance) or np.any(terms.emission) or deposit.on_mesh is not None:
         return False
-    depths = np.linalg.norm(surface.project(terms.points)[0] - terms.points, axis=1)
+    depths = surface.distances(terms.points)
     return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(terms.points).all())
 
 
 def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:
     """Sources and charges as one sum."""
     field, sources = fitted.field, fitted.lights.points
-    depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
+    depths = surface.distances(sources)
     heights = np.asarray(cKDTree(fitted.placement.fitted.points).query(fitted.placement.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)

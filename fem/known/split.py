@@ -7,6 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight, fit_light
@@ -75,7 +76,7 @@ def split_lights(
     body: Body,
     subtract: Subtract,
     *,
-    tolerance: float = 0.02,
+    tolerance: float = DEFAULT_TOLERANCE,
     kept: KeptFits | None = None,
 ) -> SplitLights:
     """Split the lights of a scene into what is subtracted and what is left to finite elements.

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.ballistic.follow import follow
-from tetlux.fem.ballistic.interface import refract_in
+from tetlux.fem.ballistic.follow import refract_and_follow
 from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import check_positive, unit_vector
@@ -18,7 +17,6 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.hints import MeshHints
-from tetlux.fem.sources.ledger import Ledger
 from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
@@ -140,11 +138,8 @@ class CollimatedBeam:
             rays, normals = mesh.cache.get(key, lambda: self._incident_rays(mesh))
         else:
             rays, normals = self._incident_rays(mesh)
-        rays = replace(rays, powers=self.irradiance * rays.powers)
-        refracted, specular = refract_in(rays, normals, coefficients.outer.eta)
-        deposit = follow(mesh, coefficients, refracted)
-        outside = Ledger(incident=float(rays.powers.sum()), specular=specular)
-        return replace(deposit, ledger=Ledger.merge([outside, deposit.ledger]))
+        arriving = replace(rays, powers=self.irradiance * rays.powers)
+        return refract_and_follow(mesh, coefficients, arriving, normals)
 
     def _incident_rays(self, mesh: TetMesh) -> tuple[Rays, FloatArray]:
         """One ray for each illuminated facet of a mesh, with its power at an irradiance of 1, and the normals (r, 3).

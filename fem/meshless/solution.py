@@ -16,6 +16,7 @@ from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.power import Power
@@ -226,7 +227,7 @@ def charge_solution(
     ledgers: Sequence[LightLedger],
     *,
     inner: Sequence[tuple[Surface, Medium]] = (),
-    tolerance: float = 0.02,
+    tolerance: float = DEFAULT_TOLERANCE,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for point sources and diffuse light in a body of homogeneous regions.

@@ -9,6 +9,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST_CHARGES
 from tetlux.fem.error.tolerance import check_tolerance
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import check_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
@@ -41,7 +42,7 @@ def solve_with_charges(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float = 0.02,
+    tolerance: float = DEFAULT_TOLERANCE,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for lights in a body of homogeneous regions, without a mesh.
@@ -156,7 +157,7 @@ def check_simple(surface: Surface) -> None:
 def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -> None:
     """Refuse sources on the surfaces of regions, where fluence has a pole on both sides."""
     for number, surface in enumerate(inner, 1):
-        away = np.linalg.norm(surface.project(points)[0] - points, axis=1)
+        away = surface.distances(points)
         if (away < LEAST_DISTANCE_TO_INTERFACE * medium.mean_free_path).any():
             place = ", ".join(f"{x:.4g}" for x in points[away.argmin()])
             raise InputError(

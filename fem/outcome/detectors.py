@@ -142,7 +142,7 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         found = estimate_reading(solution, placed.measurement)
         exitance, error = found.value, found.relative
     else:
-        exitance = float(placed.measurement.weights @ solution.exitance_on(placed.measurement.points))
+        exitance = (placed.measurement.weights @ solution.exitance_on(placed.measurement.points)).item()
     if isinstance(solution, Solution) and solution.validity is not None:
         model = float(placed.measurement.weights @ (1.0 - solution.valid_on(placed.measurement.points)))
     power = None if placed.area is None else placed.share * exitance * placed.area

@@ -241,11 +241,13 @@ class Solution:
         return found[0], found[1]
 
     def __repr__(self) -> str:
-        low, high = self.exitance.real.min(), self.exitance.real.max()
+        modulated = np.iscomplexobj(self.exitance)
+        exitance = np.abs(self.exitance) if modulated else self.exitance
+        exited = abs(self.power.exited) if modulated else self.power.exited
         facts = [
             count(len(self.mesh.points), "node"),
-            f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",
-            f"{self.power.exited:.4g} of {self.power.incident:.4g} W exited",
+            f"exitance {exitance.min():.3g} to {exitance.max():.3g} W/{self.mesh.unit}²",
+            f"{exited:.4g} of {self.power.incident:.4g} W exited",
         ]
         if np.isfinite(self.error_estimate):
             facts.append(f"estimated error {self.error_estimate:.2%}")

@@ -207,6 +207,10 @@ class Surface:
         nearest, faces = self.closest(queries)
         return self.on_curve(faces, nearest)
 
+    def distances(self, queries: FloatArray) -> FloatArray:
+        """Distances of query points (q, 3) from their projections on the smooth surface, (q,), unit."""
+        return np.asarray(np.linalg.norm(self.project(queries)[0] - queries, axis=1))
+
     def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Whether each query point (q, 3) lies inside, (q,), by the winding number."""
         low, high = self.points.min(axis=0), self.points.max(axis=0)

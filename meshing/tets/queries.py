@@ -38,5 +38,5 @@ class BoundaryQueries:
         cached = self._distances.setdefault(surface, np.full(len(self._faces), np.nan))
         missing = faces[np.isnan(cached[faces])]
         middles = self._points[self._faces[missing]].mean(axis=1)
-        cached[missing] = np.linalg.norm(surface.project(middles)[0] - middles, axis=1)
+        cached[missing] = surface.distances(middles)
         return np.asarray(cached[faces])

@@ -7,7 +7,9 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Section, Vector3, shape_of
+from tetlux.cases.file.schema.sweep import SweepSpec
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
 
 class SphereSpec(Section):
@@ -123,17 +125,6 @@ Tolerance = Annotated[
 ]
 
 
-def _word_or_number(value: object) -> str:
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    return TAG + ("word" if isinstance(value, str) else "whole" if whole else "number")
-
-
-SweepValue = Annotated[
-    Annotated[str, Tag(TAG + "word")] | Annotated[int, Tag(TAG + "whole")] | Annotated[Number, Tag(TAG + "number")],
-    Discriminator(_word_or_number),
-]
-
-
 class CaseSpec(Section):
     """One scene."""
 
@@ -153,7 +144,8 @@ class CaseSpec(Section):
         "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
     )
     tolerance: Tolerance = Field(
-        0.02, description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors"
+        DEFAULT_TOLERANCE,
+        description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors",
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
@@ -165,8 +157,11 @@ class CaseSpec(Section):
         None,
         description="closed forms to compare with: robin, images, dipole for slabs; series for spheres and cylinders",
     )
-    sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
+    sweep: SweepSpec | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
+    )
+    base: str | None = Field(
+        None, description="another case file, relative to this one; its keys hold where this one has none"
     )
 
     @property
