@@ -34,7 +34,7 @@ from tetlux.meshing.surface.surface import Surface
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Points nearer than this share of the body's diagonal are the same.
+# Points nearer than this share of the body's diagonal are the same if their normals are as near.
 SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
@@ -207,7 +207,9 @@ def residual_on_surface(
     new = np.arange(len(points))
     if known is not None:
         distance, nearest = known.tree.query(points.points)
+        # Two triangles may have a point in common and not its normal.
         same = distance <= SAME * surface.diagonal
+        same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
         exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
         new = new[~same]
     equation = equation_of(charges.medium)

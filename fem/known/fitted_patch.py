@@ -172,8 +172,9 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> Pa
     mesh, charges, residual = patch.mesh, patch.charges, patch.residual
     areas = patch.areas
     if not patch.is_whole:
-        leaving = areas @ residual.exitance
-        through = areas @ (residual.values - residual.exitance)
+        # Sums over points miss power near the light, which is in the patch.
+        leaving = areas @ residual.exitance + residual.missed
+        through = areas @ (residual.values - residual.exitance) - residual.missed
         return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
     exited = float(areas @ residual.exitance) + residual.missed
     inflow = float(areas @ (residual.values - residual.exitance)) - residual.missed
