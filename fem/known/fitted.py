@@ -34,7 +34,7 @@ from tetlux.meshing.surface.surface import Surface
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Points nearer than this share of the body's diagonal are the same if their normals are as near.
+# Points that differ by less than this share of their coordinates are the same, if their normals are.
 SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
@@ -68,7 +68,7 @@ class BoundaryResidual:
     @cached_property
     def tree(self) -> cKDTree:
         """The search tree of the points."""
-        return cKDTree(self.points.points)
+        return self.points.tree
 
     __repr__ = one_line
 
@@ -101,9 +101,9 @@ class FittedLight:
             return np.ones(len(points), dtype=bool)
         return np.asarray(self.accurate[self.residual.tree.query(points)[1]])
 
-    def residual_within(self, wanted: Spacing) -> BoundaryResidual:
-        """The residual at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return residual_on_surface(self.charges, self.placement.fitted, self.surface, wanted, self.residual)
+    def points_within(self, wanted: Spacing) -> Samples:
+        """Points as far apart as wanted at most, where a mesh is finer than those of the residual."""
+        return _residual_points(self.placement, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -140,7 +140,10 @@ def fit_light(
     else:
         fitted = fit_placed_charges(like.placement, equation, lights)
     charges = _charges(fitted, surface, medium)
-    residual = residual_on_surface(charges, fitted.placement.fitted, surface)
+    if like is not None and like.surface is surface:
+        residual = residual_at(like.residual.points, charges)
+    else:
+        residual = residual_at(_residual_points(fitted.placement, surface), charges)
     accurate = like.accurate if like is not None else _accurate(residual, medium)
     return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
@@ -176,39 +179,28 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def residual_on_surface(
-    charges: Charges,
-    samples: Samples,
-    surface: Surface,
-    wanted: Spacing | None = None,
-    known: BoundaryResidual | None = None,
-) -> BoundaryResidual:
-    """The residual of charges on the true surface, at points that follow from the samples where they were fitted.
-
-    Parameters
-    ----------
-    charges : Charges
-    samples : Samples
-    surface : Surface
-    wanted : callable, optional
-        Longest distance between points.
-    known : BoundaryResidual, optional
-        Of the same charges, at points some of which may be the same.
-    """
-    tree = cKDTree(samples.points)
+def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spacing | None = None) -> Samples:
+    """Points at which a residual is integrated; they do not depend on the coefficients."""
+    samples = placement.fitted
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points = quadrature(surface, spacing, len(charges.positions))
-    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
+    points = quadrature(surface, spacing, len(placement.charges))
+    # Many runs may have these points on one mesh, which then finds them once.
+    points.points.setflags(write=False)
+    return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
+
+
+def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | None = None) -> BoundaryResidual:
+    """The residual of charges at points of the true surface, some of which may be those where it is known."""
     exitance, values = np.empty(len(points)), np.empty(len(points))
     new = np.arange(len(points))
     if known is not None:
         distance, nearest = known.tree.query(points.points)
+        same = distance <= SAME * float(np.abs(points.points).max())
         # Two triangles may have a point in common and not its normal.
-        same = distance <= SAME * surface.diagonal
         same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
         exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
         new = new[~same]
@@ -217,7 +209,7 @@ def residual_on_surface(
     exitance[new] = equation.robin * fluence
     values[new] = flux + exitance[new]
     outflow = float(points.areas @ (exitance - values))
-    return BoundaryResidual(apart, exitance, values, _missed(charges, points, outflow))
+    return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:

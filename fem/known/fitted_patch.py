@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.samples import Spacing
-from tetlux.fem.known.fitted import BoundaryResidual, FittedLight
+from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.models.boundary import boundary_condition_of
@@ -114,7 +115,7 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
     small = _are_small(mesh, light.residual)
     anew = bool((small & _are_small(mesh, residual)).sum() > MOST_SMALL * small.sum())
     if anew:
-        residual = light.residual_within(_spacing_of(mesh, small))
+        residual = residual_at(_finer_points(mesh, light, small), light.charges, light.residual)
     if coarse is None or anew:
         _, facets, weights = mesh.closest_boundary(residual.points.points)
     else:
@@ -139,6 +140,19 @@ def _spacing_of(mesh: TetMesh, small: BoolArray) -> Spacing:
     limits, tree = np.where(small, FINER * longest_sides(corners), np.inf), cKDTree(corners.mean(axis=1))
     near = min(BESIDE, len(limits))
     return lambda queries: limits[tree.query(queries, k=near)[1].reshape(len(queries), near)].min(axis=1)
+
+
+# Points by those of a residual that they take the place of: on one mesh they are the same for all coefficients.
+_FINER: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Samples, Samples]] = WeakKeyDictionary()
+
+
+def _finer_points(mesh: TetMesh, light: FittedLight, small: BoolArray) -> Samples:
+    """Points that are as close together as small boundary triangles need, of a mask (f,)."""
+    of_mesh = _FINER.setdefault(mesh, WeakKeyDictionary())
+    known = light.residual.points
+    if known not in of_mesh:
+        of_mesh[known] = light.points_within(_spacing_of(mesh, small))
+    return of_mesh[known]
 
 
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
