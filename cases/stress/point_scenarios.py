@@ -22,10 +22,10 @@ CHARGE_LIGHTS = {
     "1 deep": (1.0, 0.99),
     "shallow, 0.2": (0.2, 0.99),
     "deep, 5": (5.0, 0.99),
-    "1 deep, albedo 0.5": (1.0, 0.5),
-    "1 deep, albedo 0.9999": (1.0, 0.9999),
+    "albedo 0.5": (1.0, 0.5),
+    "albedo 0.9999": (1.0, 0.9999),
 }
-FEW_CHARGE_LIGHTS = ("shallow, 0.2", "1 deep, albedo 0.5")
+FEW_CHARGE_LIGHTS = ("shallow, 0.2", "albedo 0.5")
 READING_BODIES = ("ball", "plate", "rod", "box, by an edge", "core of 30 σ_a", "core of .1 σ_s'", "four layers")
 FEW_READING_BODIES = ("ball", "box, by an edge", "core of .1 σ_s'")
 PLACES = ("near", "far", "behind")
