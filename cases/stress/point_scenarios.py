@@ -22,14 +22,14 @@ CHARGE_LIGHTS = {
     "1 deep": (1.0, 0.99),
     "shallow, 0.2": (0.2, 0.99),
     "deep, 5": (5.0, 0.99),
-    "1 deep, albedo 0.5": (1.0, 0.5),
-    "1 deep, albedo 0.9999": (1.0, 0.9999),
+    "albedo 0.5": (1.0, 0.5),
+    "albedo 0.9999": (1.0, 0.9999),
 }
-FEW_CHARGE_LIGHTS = ("shallow, 0.2", "1 deep, albedo 0.5")
+FEW_CHARGE_LIGHTS = ("shallow, 0.2", "albedo 0.5")
 READING_BODIES = ("ball", "plate", "rod", "box, by an edge", "core of 30 σ_a", "core of .1 σ_s'", "four layers")
 FEW_READING_BODIES = ("ball", "box, by an edge", "core of .1 σ_s'")
 PLACES = ("near", "far", "behind")
-FEW_PLACES = ("near", "behind")
+FEW_PLACES = ("near", "far")
 # Detectors: distances from the entry along the surface, and angles from the point behind the body.
 NEAR, FAR, BEHIND = np.array([0.3, 1.0, 2.0, 3.0]), np.array([9.0, 14.0, 19.0, 25.0]), np.array([0.0, 0.3, 0.6, 1.0])
 
