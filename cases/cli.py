@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from tetlux.cases.start import mark_start
+
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
 
@@ -26,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
+    mark_start()
     try:
         _treat_signals_as_interrupts()
         return _main(arguments)
@@ -114,11 +117,21 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--out", type=Path, default=Path("results"), metavar="DIR", help="folder of all results; default: results"
     )
+    run.add_argument(
+        "--jobs", type=int, metavar="N", help="worker processes; default: the cores that this process may use"
+    )
+    run.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
+    )
+    run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
     check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
     check.set_defaults(command=_check)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
@@ -155,15 +168,26 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch.requests import load_all, run_all  # noqa: PLC0415
+    from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
+    from tetlux.cases.batch.lines import Lines  # noqa: PLC0415
+    from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
 
-    return run_all(load_all(options.cases), options.out, cache=not options.no_cache)
+    ended = run_batch(
+        load_all(options.cases),
+        options.out,
+        jobs=options.jobs,
+        resume=options.resume,
+        scheduler=options.scheduler,
+        cache=not options.no_cache,
+        listeners=[Lines()],
+    )
+    return 1 if ended.failed or ended.left else 0
 
 
 def _check(options: argparse.Namespace) -> int:
     from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
-    return check_all(options.cases)
+    return check_all(options.cases, plan=options.plan)
 
 
 def _list(_: argparse.Namespace) -> int:

@@ -7,16 +7,20 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
+from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
-from tetlux.fem.quadratic.error import ReadingError
+from tetlux.fem.quadratic.field_error import field_errors
+from tetlux.fem.quadratic.reading_error import ReadingError
+from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.scenes import Scenes
+from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import MeshSolution
+from tetlux.fem.system import MeshSolution, System
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
@@ -24,8 +28,14 @@ from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
+# The share of scenes for which a shared mesh is left too coarse: they refine it for themselves.
+MOST_MISSING = 0.25
+# A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
+SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
 PROGRESS_AFTER_SECONDS = 8.0
+# How progress lines call errors of fields.
+FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
@@ -44,11 +54,27 @@ class Tolerances:
         Wanted relative error of what each detector reads.
     placed : tuple of PlacedDetector
         The detectors.
+    everywhere, volume : float, optional
+        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside: see
+        `tetlux.fem.quadratic.field_error`.
     """
 
     exitance: float | None
     readings: float | None = None
     placed: tuple[PlacedDetector, ...] = ()
+    everywhere: float | None = None
+    volume: float | None = None
+
+    @property
+    def fields(self) -> dict[Where, float]:
+        """Those of the exitance everywhere and of the fluence inside that are given."""
+        given: dict[Where, float | None] = {"surface": self.everywhere, "inside": self.volume}
+        return {where: tolerance for where, tolerance in given.items() if tolerance is not None}
+
+    @property
+    def need_quadratic(self) -> bool:
+        """Whether quadratic elements are solved for on each mesh."""
+        return self.readings is not None or len(self.fields) > 0
 
     def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
         """Compare the errors of solutions on one mesh with the tolerances."""
@@ -64,14 +90,25 @@ class Tolerances:
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
+        for where, tolerance in self.fields.items():
+            bands = [band for step in steps for band in _bands(step, where)]
+            error = max((band.relative for band in bands), default=0.0)
+            largest_ratio = max(largest_ratio, error / tolerance)
+            summary += f", {FIELD_NAMES[where]} {error:.2%}"
+            splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
         return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
-        # All duals at once.
-        quadratic.operator.duals([placed.measurement for placed in self.placed])
-        return [estimate_reading(step.solution, placed.measurement) for placed in self.placed]
+        parts = quadratic.prepare([placed.measurement for placed in self.placed])
+        return [estimate_reading(step.solution, measurement) for some in parts for measurement in some]
+
+
+def _bands(step: MeshSolution, where: Where) -> list[ReadingError]:
+    quadratic = step.solution.quadratic
+    assert quadratic is not None
+    return field_errors(quadratic, where)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +144,10 @@ class Problem:
     limit : bool
         Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
     watch : Stopwatch
+    shared : SharedMesh, optional
+        The mesh to begin with, and what other problems have left on it.
+    others : sequence of Deposit
+        Lights of other problems that the first mesh is to be graded for too.
     """
 
     scenes: Scenes
@@ -114,6 +155,8 @@ class Problem:
     lumping: Lumping
     limit: bool
     watch: Stopwatch
+    shared: SharedMesh | None = None
+    others: Sequence[Deposit] = ()
 
     @property
     def media(self) -> list[tuple[AnyMedium, ...]]:
@@ -127,25 +170,41 @@ class Problem:
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
-        assembly = Assembly(mesh)
-        systems = {
-            media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
-            for media in dict.fromkeys(self.media)
-        }
+        each = dict.fromkeys(self.media)
+        if self.shared is not None and mesh is self.shared.mesh:
+            systems = {media: self._shared_system(self.shared, media) for media in each}
+        else:
+            assembly = Assembly(mesh)
+            systems = {
+                media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit) for media in each
+            }
         return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
+
+    def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
+        return shared.system(
+            (media, self.lumping, self.limit),
+            lambda: self.scenes.system_on(
+                shared.mesh, media, self.lumping, shared.assembly, limit=self.limit, expected=EXPECTED_LIGHTS
+            ),
+        )
 
 
 def first_mesh(
     problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
 ) -> TetMesh:
-    """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
+    """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
-        with _report_if_slow(report):
-            mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
+        if problem.shared is not None:
+            mesh = problem.shared.mesh
+        else:
+            with _report_if_slow(report):
+                mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        slack = 1.0 if problem.shared is None else SLACK
+        for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
             deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
-            source_points = places_to_resolve(deposits)
+            # The lights of others are taken to be of the same kind.
+            source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
@@ -163,7 +222,8 @@ def first_mesh(
                     tolerances.readings,
                     most_tetrahedra,
                 )
-    report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
+    begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
+    report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
 
@@ -228,3 +288,43 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
+
+
+def refine_for_most(
+    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
+) -> TetMesh:
+    """Refine a mesh until all but `MOST_MISSING` of the scenes are within the tolerances, each by itself.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+        The first one.
+    problem : Problem
+        Scenes that stand for many more.
+    tolerances : Tolerances
+    most_tetrahedra : int
+        Largest number of tetrahedra after refinement.
+    report : callable
+        Called with a line of text for each mesh.
+
+    Returns
+    -------
+    TetMesh
+    """
+    pending: dict[int, MeshSolution | None] = dict.fromkeys(range(len(problem.lights)))
+    allowed = MOST_MISSING * len(pending)
+    while True:
+        solve_on = problem.solver_on(mesh)
+        steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
+        with problem.watch.stage("solve"):
+            missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
+        if len(missing) <= allowed:
+            return mesh
+        with problem.watch.stage("mesh"):
+            splits = tolerances.assess(list(missing.values())).splits
+            inner = problem.scenes.inner
+            finer = refine_often(mesh, splits, problem.scenes.surface, inner, most_tetrahedra)
+        if not len(mesh.tetrahedra) < len(finer.tetrahedra) <= most_tetrahedra:
+            return mesh
+        mesh, pending = finer, dict(missing)

@@ -75,6 +75,23 @@ def notes_on_readings(readings: Sequence[Reading], tolerance: float | None, wher
     ]
 
 
+def notes_on_fields(solution: Solution, everywhere: float | None, volume: float | None, where: str) -> list[Note]:
+    """Notes on tolerances of exitance and fluence everywhere that were missed."""
+    found = (
+        ("everywhere", "of the exitance everywhere", everywhere, solution.everywhere_error),
+        ("volume", "of the fluence inside", volume, solution.volume_error),
+    )
+    return [
+        Note(
+            f"{name}-tolerance-missed",
+            f"the tolerance of {tolerance:g} {what} was not met: the estimated error is {error:.2g}, {where}.",
+            value=error,
+        )
+        for name, what, tolerance, error in found
+        if tolerance is not None and not error <= tolerance
+    ]
+
+
 def _on_tolerance(solution: Solution, tolerance: float, where: str) -> Iterator[Note]:
     if not solution.error_estimate <= tolerance:
         yield Note(

@@ -50,13 +50,20 @@ class Scenes:
     mesh_is_body: bool
 
     def system_on(
-        self, mesh: TetMesh, media: tuple[AnyMedium, ...], lumping: Lumping, assembly: Assembly, *, limit: bool
+        self,
+        mesh: TetMesh,
+        media: tuple[AnyMedium, ...],
+        lumping: Lumping,
+        assembly: Assembly,
+        *,
+        limit: bool,
+        expected: int = 0,
     ) -> System:
-        """Prepare the system of one set of media on a mesh.
+        """Prepare the system of one set of media on a mesh, for as many lights as its scenes have, or are expected.
 
         `solve` and `solve_each` make all their systems here, of steady diffusion: another model enters as `model_of`.
         """
-        expected = self.media.count(media)
+        expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
             return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit)

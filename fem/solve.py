@@ -32,6 +32,8 @@ class Options(TypedDict, total=False):
     tolerance: float | None
     detectors: Sequence[Detector]
     detector_tolerance: float | None
+    everywhere_tolerance: float | None
+    volume_tolerance: float | None
     mesh: TetMesh | None
     mass: Lumping
     subtract: Subtract
@@ -85,6 +87,8 @@ def solve(
     tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
+    everywhere_tolerance: float | None = None,
+    volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
@@ -117,6 +121,15 @@ def solve(
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
         Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+    everywhere_tolerance : float, optional
+        Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
+        of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
+        millionth. Not guaranteed for the rest, such as edges of shadows and corners. Without a tolerance it is one of
+        the L2 error too. The exitance and fluence of the solution then are those of quadratic elements.
+    volume_tolerance : float, optional
+        Wanted relative error of the fluence at almost every point inside: of some 95 % of the volume of each region
+        within each two decades of fluence, down to a millionth of the largest at a node. Not guaranteed within a mean
+        free path of sources that are not points.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
@@ -180,6 +193,8 @@ def solve(
             tolerance,
             {
                 "detector_tolerance": detector_tolerance is not None,
+                "everywhere_tolerance": everywhere_tolerance is not None,
+                "volume_tolerance": volume_tolerance is not None,
                 "mass": mass != "lumped",
                 "subtract": subtract != "fitted",
                 "limit": not limit,
@@ -200,6 +215,8 @@ def solve(
         tolerance=tolerance,
         detectors=detectors,
         detector_tolerance=detector_tolerance,
+        everywhere_tolerance=everywhere_tolerance,
+        volume_tolerance=volume_tolerance,
         mesh=mesh,
         mass=mass,
         subtract=subtract,

@@ -11,9 +11,10 @@ from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.error.by_operator import estimate_by_operator
 from tetlux.fem.error.estimate import Estimate
 from tetlux.fem.known.kept_fits import fits_of
+from tetlux.fem.known.kept_patches import keep_patch
 from tetlux.fem.known.patch import find_accurate_nodes, inherit_accurate_nodes
 from tetlux.fem.known.split import SplitLights, Subtract, replace_fitted, split_lights
-from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_on
+from tetlux.fem.known.subtraction import Subtraction, subtract_as_before, subtract_fitted, subtract_on
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
@@ -207,6 +208,8 @@ class System:
         )
         if coarser is None:
             results += self._shrink_patches(subtractions, accurate, fluences, watch)
+        for each in subtractions:
+            keep_patch(each.patch, "linear")
         owners = np.array([*split.owners, *split.fitted, *lit], dtype=np.int64)
         of_lights = []
         for light, load in enumerate(loads):
@@ -239,22 +242,19 @@ class System:
         return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
     def _subtractions(self, split: SplitLights, coarser: MeshSolution | None) -> list[Subtraction]:
-        """Subtract each patch of charges where it was accurate on the coarser mesh; everywhere if there was none."""
-        mesh = self.mesh
-        accurate: Sequence[BoolArray | None] = [None] * len(split.charges)
-        if coarser is not None:
-            coarse = coarser.solution.mesh.points
-            accurate = [inherit_accurate_nodes(each, coarse, mesh) for each in coarser.accurate_nodes]
-        return [
-            subtract_on(mesh, light, charges, self.mass, nodes)
-            for light, charges, nodes in zip(split.owners, split.charges, accurate, strict=True)
-        ]
+        """Subtract charges where they were accurate on the coarser mesh, or as before on this one, or everywhere."""
+        lights = zip(split.owners, split.charges, strict=True)
+        if coarser is None:
+            return [subtract_as_before(self.mesh, *light, self.mass) for light in lights]
+        coarse = coarser.solution.mesh.points
+        accurate = [inherit_accurate_nodes(each, coarse, self.mesh) for each in coarser.accurate_nodes]
+        return [subtract_on(self.mesh, *light, self.mass, nodes) for light, nodes in zip(lights, accurate, strict=True)]
 
     def _shrink_patches(
         self, subtractions: list[Subtraction], accurate: Sequence[BoolArray], fluences: NumberArray, watch: Stopwatch
     ) -> list[LinearResult]:
         """Shrink patches to their accurate nodes and solve for them again, in place."""
-        shrinking = [i for i in range(len(subtractions)) if not accurate[i].all()]
+        shrinking = [i for i, each in enumerate(subtractions) if not each.is_kept and not accurate[i].all()]
         if not shrinking:
             return []
         with watch.stage("assemble"):

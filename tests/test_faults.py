@@ -21,7 +21,6 @@ from tests.elsewhere import start_elsewhere
 from tetlux.cases import run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
-from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import ALL_FILES
 from tetlux.cases.write.publish import claim_folder
 from tetlux.meshing import RunError, sphere, tetrahedralize
@@ -302,13 +301,12 @@ def test_interrupted_at_any_stage(
 
     if stage == "meshing":
         monkeypatch.setattr(child_mesher, "MESHER", INTERRUPTS)
-    elif stage == "drawing":
-        monkeypatch.setattr(picture, "RENDERER", INTERRUPTS)
     else:
         where = {
             "reading": "tetlux.cases.batch.requests.load_cases",
             "solving": "tetlux.fem.error.by_operator.estimate_error",
             "writing": "tetlux.cases.run.write_mesh",
+            "drawing": "tetlux.cases.picture.draw.draw_frame",
             "publishing": "tetlux.cases.run.publish",
         }[stage]
         monkeypatch.setattr(where, interrupted)

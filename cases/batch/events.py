@@ -90,7 +90,7 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class StageEnded:
-    """A stage of a run has ended, or of the mesh of a group. Sent by runs in the process of the batch only.
+    """A stage of a run has ended, or of the mesh of a group.
 
     Attributes
     ----------
@@ -153,6 +153,8 @@ class RunFailed:
     worker : str
     sweep : mapping
         The swept values of the run, by key.
+    ends_batch : bool
+        Whether no other run could do better: the disk is full.
     """
 
     run: int
@@ -161,6 +163,7 @@ class RunFailed:
     seconds: float
     worker: str = ""
     sweep: Mapping[str, Any] = field(default_factory=dict)
+    ends_batch: bool = False
 
 
 @dataclass(frozen=True)

@@ -77,6 +77,9 @@ class Plan:
     surfaces : tuple of PlannedSurface
     meshes : tuple of PlannedMesh
     tasks : tuple of PlannedTask
+    leaders : tuple of int
+        For each run the one of the same lights and of similar media that places of charges are chosen for: so what a
+        run finds does not depend on which runs were solved before.
     right_hand_sides : int
         Lights of all channels of all runs.
     """
@@ -85,6 +88,7 @@ class Plan:
     surfaces: tuple[PlannedSurface, ...]
     meshes: tuple[PlannedMesh, ...]
     tasks: tuple[PlannedTask, ...]
+    leaders: tuple[int, ...]
     right_hand_sides: int
 
     @property

@@ -1,7 +1,6 @@
 """`Reader`: reads the files that cases name, each once for all runs."""
 
 import os
-import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -44,33 +43,26 @@ class Reader:
     folder : Path
         The folder of the case file, to which file names are relative.
     files : FilesRead
-    seconds : float
-        Time spent on reading and checking surfaces and meshes since this was last set to 0.
     """
 
     folder: Path
     files: FilesRead = field(default_factory=FilesRead)
-    seconds: float = 0.0
 
     def surface(self, spec: SurfaceSpec, unit: str) -> Surface:
         """Read a surface file, or make a built-in shape."""
-        started = time.perf_counter()
         # Built-in shapes are the same for case files in all folders.
         label = (self._label() if spec.file else "", unit, spec.model_dump_json())
         if label not in self.files.surfaces:
             surface = _surface(spec, unit, self.folder)
             self.files.surfaces[label] = replace(surface, crease_angle=spec.crease_angle)
-        self.seconds += time.perf_counter() - started
         return self.files.surfaces[label]
 
     def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
         """Read a volume mesh."""
-        started = time.perf_counter()
         label = (self._label(), spec.file, spec.scale, spec.array, unit)
         if label not in self.files.meshes:
             path = self.folder / spec.file
             self.files.meshes[label] = read_mesh(path, unit=unit, scale=spec.scale, labels=spec.array)
-        self.seconds += time.perf_counter() - started
         return self.files.meshes[label]
 
     def field(self, spec: FieldSpec) -> Field:

@@ -8,6 +8,7 @@ plate, whose normals point away from each other, do not thin each other.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -49,6 +50,11 @@ class Samples:
     normals: FloatArray
     areas: FloatArray
     spacing: FloatArray
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the points."""
+        return cKDTree(self.points)
 
     def __getitem__(self, some: BoolArray | IntArray) -> "Samples":
         return Samples(self.points[some], self.normals[some], self.areas[some], self.spacing[some])

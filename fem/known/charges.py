@@ -33,6 +33,8 @@ class Charges:
         The region that the sources lie in, if the body has several media.
     field : VaryingMedium, optional
         The medium of that region if it varies; `medium` is what it is at the sources.
+    name : str
+        Of their light, by which their patch is kept with a mesh: see `tetlux.fem.known.kept_patches`.
     """
 
     positions: FloatArray
@@ -42,6 +44,7 @@ class Charges:
     medium: Medium
     region: int | None = None
     field: VaryingMedium | None = None
+    name: str = ""
 
     @property
     def has_negative_source(self) -> bool:

@@ -69,7 +69,7 @@ class BoundaryResidual:
     @cached_property
     def tree(self) -> cKDTree:
         """The search tree of the points."""
-        return cKDTree(self.points.points)
+        return self.points.tree
 
     __repr__ = one_line
 
@@ -102,9 +102,9 @@ class FittedLight:
             return np.ones(len(points), dtype=bool)
         return np.asarray(self.accurate[self.residual.tree.query(points)[1]])
 
-    def residual_within(self, wanted: Spacing) -> BoundaryResidual:
-        """The residual at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return residual_on_surface(self.charges, self.placement.fitted, self.surface, wanted)
+    def points_within(self, wanted: Spacing) -> Samples:
+        """Points as far apart as wanted at most, where a mesh is finer than those of the residual."""
+        return _residual_points(self.placement.fitted, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -141,7 +141,10 @@ def fit_light(
     else:
         fitted = fit_placed_charges(like.placement, equation, lights)
     charges = _charges(fitted, surface, medium)
-    residual = residual_on_surface(charges, fitted.placement.fitted, surface)
+    if like is not None and like.surface is surface:
+        residual = residual_at(like.residual.points, charges)
+    else:
+        residual = residual_on_surface(charges, fitted.placement.fitted, surface)
     accurate = like.accurate if like is not None else _accurate(residual, medium)
     return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
@@ -177,21 +180,30 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def residual_on_surface(
-    charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None
-) -> BoundaryResidual:
+def residual_on_surface(charges: Charges, samples: Samples, surface: Surface) -> BoundaryResidual:
     """The residual of charges on the true surface, at points that follow from the samples where they were fitted."""
-    tree = cKDTree(samples.points)
+    return residual_at(_residual_points(samples, surface), charges)
+
+
+def _residual_points(samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Samples:
+    """Points at which a residual is integrated; they do not depend on the coefficients."""
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points, equation = quadrature(surface, spacing), equation_of(charges.medium)
+    points = quadrature(surface, spacing)
+    # Many runs may have these points on one mesh, which then finds them once.
+    points.points.setflags(write=False)
+    return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
+
+
+def residual_at(points: Samples, charges: Charges) -> BoundaryResidual:
+    """The residual of charges at points of the true surface."""
+    equation = equation_of(charges.medium)
     fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
     exitance = equation.robin * fluence
-    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return BoundaryResidual(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    return BoundaryResidual(points, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:

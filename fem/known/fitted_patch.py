@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.known.fitted import BoundaryResidual, FittedLight
+from tetlux.fem.charges.samples import Samples
+from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.models.boundary import boundary_condition_of
@@ -107,12 +109,26 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
     sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
     nearest = apart[light.residual.tree.query(corners.mean(axis=1))[1]]
     if (sides < FINE * nearest).any():
-        limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
-        residual = light.residual_within(lambda queries: limits[tree.query(queries)[1]])
+        limits = np.where(sides < FINE * nearest, sides, np.inf)
+        residual = residual_at(_finer_points(mesh, light, limits), light.charges)
         _, facets, weights = mesh.closest_boundary(residual.points.points)
     cells: BoolArray = np.asarray(light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1))
     patch = FittedPatch(mesh, light.charges, cells, at_nodes, residual, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
+
+
+# Points by those of a residual that they take the place of: on one mesh they are the same for all coefficients.
+_FINER: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Samples, Samples]] = WeakKeyDictionary()
+
+
+def _finer_points(mesh: TetMesh, light: FittedLight, limits: FloatArray) -> Samples:
+    """Points no farther apart than the limit of the nearest boundary triangle, (f,)."""
+    of_mesh = _FINER.setdefault(mesh, WeakKeyDictionary())
+    known = light.residual.points
+    if known not in of_mesh:
+        tree = cKDTree(mesh.points[mesh.boundary_faces].mean(axis=1))
+        of_mesh[known] = light.points_within(lambda queries: limits[tree.query(queries)[1]])
+    return of_mesh[known]
 
 
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:

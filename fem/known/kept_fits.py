@@ -39,6 +39,10 @@ class KeptFits:
         """Remember a choice."""
         self.choices.setdefault(light, []).append((depth, fit))
 
+    def copy(self) -> "KeptFits":
+        """The same choices, to which others can be added."""
+        return KeptFits({light: list(choices) for light, choices in self.choices.items()})
+
     __repr__ = one_line
 
 

@@ -89,7 +89,7 @@ def patch_of(mesh: TetMesh, charges: Charges, accurate: BoolArray, at_nodes: Flo
     if charges.field is not None:
         cells[cells] = _has_medium(mesh.points[mesh.tetrahedra[cells]], charges.medium, charges.field)
     patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
-    return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
+    return patch if is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
 
 
 def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> BoolArray:
@@ -104,7 +104,7 @@ def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> Bo
     return np.asarray(same.reshape(-1, 4).all(axis=1))
 
 
-def _is_sound(patch: Patch) -> bool:
+def is_sound(patch: Patch) -> bool:
     """Whether the integrals over the faces of a patch can be trusted, so that Gauss's theorem holds.
 
     The sources must lie inside the patch, the images outside it, and neither too close to its faces. The ledger does

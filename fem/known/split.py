@@ -78,6 +78,7 @@ def split_lights(
     *,
     tolerance: float = DEFAULT_TOLERANCE,
     kept: KeptFits | None = None,
+    scene: int = 0,
 ) -> SplitLights:
     """Split the lights of a scene into what is subtracted and what is left to finite elements.
 
@@ -91,6 +92,8 @@ def split_lights(
         Relative L2 error of the exitance, of what is fitted and the mesh together.
     kept : KeptFits, optional
         Fits of earlier solutions, which are followed; new ones are added.
+    scene : int
+        The number of the scene, by which patches are kept.
 
     Raises
     ------
@@ -125,7 +128,7 @@ def split_lights(
         else:
             known, rest, found = _charges_in_several(deposit, body, images=images, most=left)
         left -= sum(len(some.positions) for some in found)
-        charges += found
+        charges += [replace(each, name=f"{scene}: {number}.{k} {light!r}") for k, each in enumerate(found)]
         owners += [number] * len(found)
         deposits.append(known)
         remaining.append(rest)

@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight
 from tetlux.fem.known.fitted_patch import FittedPatch, fitted_patch, fitted_terms
+from tetlux.fem.known.kept_patches import kept_patch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Lumping
@@ -31,12 +32,15 @@ class Subtraction:
         What that adds to the load vector and to the ledger.
     mass : {"lumped", "consistent"}
         As in the system matrix.
+    is_kept : bool
+        Whether the patch is that of an earlier solution on the mesh.
     """
 
     light: int
     patch: Patch
     terms: PatchTerms
     mass: Lumping
+    is_kept: bool = False
 
     def shrink_to(self, accurate: BoolArray) -> "Subtraction":
         """The same on the tetrahedra whose four nodes are accurate, (n,), alone."""
@@ -57,6 +61,14 @@ def subtract_on(
     """Subtract charges of a light at accurate nodes (n,), or everywhere if these are not known."""
     patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if accurate is None else accurate)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
+
+
+def subtract_as_before(mesh: TetMesh, light: int, charges: Charges, mass: Lumping) -> Subtraction:
+    """Subtract charges of a light where they were subtracted on the mesh before; everywhere if they were not."""
+    patch = kept_patch(mesh, charges, charges.fluence(mesh.points), "linear")
+    if patch is None:
+        return subtract_on(mesh, light, charges, mass)
+    return Subtraction(light, patch, patch_terms(patch, mass), mass, is_kept=True)
 
 
 def subtract_fitted(

@@ -38,6 +38,11 @@ class ResolvedField(ExitanceField, Protocol):
         """Points of the surface (n, 3), and how much space the exitance needs to change there, (n,), unit."""
         ...
 
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative L2 error of the exitance; nan if it is unknown."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class Dark:

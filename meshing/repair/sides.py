@@ -8,7 +8,8 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.repair.orient import flips_of
 from tetlux.meshing.repair.topology import Edges, compact, components, distinct_rows
-from tetlux.meshing.search.proximity import ClosestPoint, winding_number
+from tetlux.meshing.search.closest import ClosestPoint
+from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 # A sheet is the other side of a finer one if its vertices lie within the first share of the diagonal of it (text of six

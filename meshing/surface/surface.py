@@ -7,7 +7,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import count, size
-from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
+from tetlux.meshing.search.closest import ClosestPoint
+from tetlux.meshing.search.proximity import cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.solids import Shape, lies_on

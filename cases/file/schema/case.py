@@ -115,6 +115,10 @@ class ToleranceSpec(Section):
 
     exitance: Relative | None = Field(None, description="wanted relative L2 error of the exitance")
     detectors: Relative | None = Field(None, description="wanted relative error of what each detector reads")
+    everywhere: Relative | None = Field(
+        None, description="wanted relative error of the exitance at almost every point of the surface"
+    )
+    volume: Relative | None = Field(None, description="wanted relative error of the fluence almost everywhere inside")
 
 
 Tolerance = Annotated[
@@ -145,7 +149,7 @@ class CaseSpec(Section):
     )
     tolerance: Tolerance = Field(
         DEFAULT_TOLERANCE,
-        description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors",
+        description="wanted relative L2 error of the exitance, or exitance, detectors, everywhere, volume",
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
@@ -169,22 +173,25 @@ class CaseSpec(Section):
         """Those of each quantity."""
         if isinstance(self.tolerance, ToleranceSpec):
             return self.tolerance
-        return ToleranceSpec(exitance=self.tolerance, detectors=None)
+        return ToleranceSpec(exitance=self.tolerance, detectors=None, everywhere=None, volume=None)
 
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
-        found = self.tolerances
-        if found.exitance is None and (found.detectors is None or self.model == "charges"):
-            needed = "of the exitance" if self.model == "charges" else "of exitance or detectors"
+        given = {name: value for name, value in self.tolerances if value is not None}
+        if not given or (self.model == "charges" and "exitance" not in given):
+            needed = "of the exitance" if self.model == "charges" else "of exitance, detectors, everywhere or volume"
             raise PydanticCustomError(
                 "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
             )
-        if found.detectors is not None and not self.detectors:
+        if "detectors" in given and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
-        if found.detectors is not None and self.model == "charges":
-            raise PydanticCustomError(
-                "tolerance", 'a tolerance for detectors is for finite elements, not for model "charges"; leave it out'
-            )
+        for name in given:
+            if name != "exitance" and self.model == "charges":
+                raise PydanticCustomError(
+                    "tolerance",
+                    'tolerance.{name} is for finite elements, not for model "charges"; leave it out',
+                    {"name": name},
+                )
         return self
 
     @model_validator(mode="before")
