@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tetlux.cases.file.channels import check_unique_names
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import BODY
 from tetlux.cases.file.media import read_media
 from tetlux.cases.file.reader import Reader
