@@ -151,11 +151,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that measure the solver itself."""
     chart = commands.add_parser("chart", help="compare methods by error, seconds and unknowns")
-    chart.add_argument(
-        "cases", nargs="*", metavar="CASE", help="default: the shipped cases slab, sphere, torus and hare"
-    )
+    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: the shipped cases of the chart in README")
     chart.add_argument(
         "--out", type=Path, default=Path("chart"), metavar="DIR", help="folder of the chart; default: chart"
+    )
+    chart.add_argument(
+        "--readings", action="store_true", help="compare what detectors read, not the exitance over the surface"
     )
     chart.add_argument("--quick", action="store_true", help="run a few coarse resolutions of each method only")
     chart.set_defaults(command=_chart)
@@ -214,9 +215,9 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart.command import DEFAULT_CASES, chart  # noqa: PLC0415
+    from tetlux.cases.chart.command import chart  # noqa: PLC0415
 
-    return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
+    return chart(options.cases, options.out, readings=options.readings, quick=options.quick)
 
 
 def _stress(options: argparse.Namespace) -> int:

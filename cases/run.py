@@ -35,7 +35,7 @@ FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.p
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
-# Drawn where there are so many detectors.
+# The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"

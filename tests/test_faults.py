@@ -466,16 +466,17 @@ def test_a_mesher_that_dies_fails_its_case_only(
 
 
 def test_a_chart_is_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in chart.FILES:
+    names = chart.chart_files("chart")
+    for name in names:
         (tmp_path / name).write_text("old")
     monkeypatch.setattr(chart, "draw_chart", lambda _, path: path.write_text("new"))
     monkeypatch.setattr(chart, "as_data", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        chart.write_chart([], tmp_path)
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(chart.FILES, "old")
+        chart.write_chart([], tmp_path, "chart")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(names, "old")
     monkeypatch.setattr(chart, "as_data", lambda _: {})
-    chart.write_chart([], tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(chart.FILES)
+    chart.write_chart([], tmp_path, "chart")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert (tmp_path / "chart.json").read_text() == "{}\n"
 
 

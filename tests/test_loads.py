@@ -213,7 +213,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
     segments = beams(starts, ends)
     load = segment_load(mesh, coefficients_of(FORWARD), segments)
-    monkeypatch.setattr(cell_tree, "PAIRS_AT_ONCE", portion)
+    monkeypatch.setattr(box_tree, "PAIRS_AT_ONCE", portion)
     assert segment_load(mesh, coefficients_of(FORWARD), segments) == pytest.approx(load, abs=1e-14)
     tree = mesh.tree
     parts = list(tree.cut(segments.starts, segments.directions, segments.lengths))

@@ -141,6 +141,8 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
         ("{sweep: [1]}", "sweep.sweep: unknown key;"),
         ("{base: [a.yaml]}", "sweep.base: unknown key;"),
         ("{medium.eta: []}", "sweep.medium.eta: give at least one, but found []."),
+        ("{zip: {}}", "sweep.zip: give at least one, but found {}."),
+        ("{medium: [{eta: 1}]}", "medium.sigma_a: in the run medium=eta-"),
         ("{medium.eta: 3}", "sweep.medium.eta: give a list of values, or a range as in {start: 1, stop: 100, num: 5,"),
         ("{medium.eta: {start: 1, stop: 2, num: 0}}", "sweep.medium.eta.num: expected a number greater than or equal"),
         ("{medium.eta: {start: 1, stop: 2, num: 1}}", "sweep.medium.eta.num: expected a number greater than or equal"),

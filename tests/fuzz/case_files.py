@@ -400,8 +400,8 @@ def traps() -> Iterator[tuple[str, bytes]]:
             "{sweep: [1]}",
         ),
     ):
-        kept = b"".join(part for part in right.splitlines(keepends=True) if not part.startswith(b"sweep"))
-        yield f"sweep {odd[:40]}", kept + b"sweep: " + odd.encode() + b"\n"
+        alone = yaml.safe_dump({key: value for key, value in RIGHT[0].items() if key not in ("sweep", "compare")})
+        yield f"sweep {odd[:40]}", alone.encode() + b"sweep: " + odd.encode() + b"\n"
     for name in (
         *(
             "..",

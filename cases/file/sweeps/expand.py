@@ -46,7 +46,11 @@ def expand_sweep(document: Document, spec: CaseSpec) -> list[SweepRun]:
     for key, at in given.items():
         check_key(document, at, key)
     rest = {key: value for key, value in document.data.items() if key != "sweep"}
-    places = dict(document.places)
+    swept = [split_key(key) for key in given]
+    # What is within a section that is swept as a whole stands elsewhere.
+    places = {
+        key: place for key, place in document.places.items() if not any(key[: len(whole)] == whole for whole in swept)
+    }
     for key, at in given.items():
         place = document.place(at)
         for depth in range(1, len(split_key(key)) + 1):
