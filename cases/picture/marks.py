@@ -115,9 +115,10 @@ def _draw_outline(
         return
     from contourpy import contour_generator  # noqa: PLC0415
 
-    canvas.shade((coverage > 0.5).astype(float), *corner.astype(int).tolist(), PAPER, TINT)
+    left, top = corner.astype(int).tolist()
+    canvas.shade((coverage > 0.5).astype(float), left, top, PAPER, TINT)
     # Closed where the panel ends, too.
-    rings = [ring - 0.5 + corner for ring in contour_generator(z=np.pad(coverage, 1)).lines(0.5)]
+    rings = [np.asarray(ring) - 0.5 + corner for ring in contour_generator(z=np.pad(coverage, 1)).lines(0.5)]
     canvas.lines(rings, 4.7, PAPER, opacity=0.75)
     canvas.lines([dash for ring in rings for dash in cut_dashes(ring)], 2.1, INK)
     rows, columns = np.nonzero(coverage > 0.5)

@@ -6,11 +6,13 @@ import numpy as np
 
 from tetlux.cases.picture.rasterizer import gradients, visible_triangles
 from tetlux.cases.picture.stage import ARROW_OPACITY, FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage
-from tetlux.cases.picture.view import PANEL, Camera
+from tetlux.cases.picture.view import PANEL, Camera, caster_of
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # Triangles whose means differ by less have one colour: of the map's positions, or of red, green and blue.
 ONE_COLOUR = 0.02
+# Rays through a pixel on the outline, along each side: more than samples, since there the contrast is largest.
+RAYS = 4
 # Samples of the panel.
 SIZE = (OVERSAMPLING * PANEL[0], OVERSAMPLING * PANEL[1])
 
@@ -19,7 +21,8 @@ def draw_stage(stage: Stage) -> Image:
     """Draw the body and the arrows into the panel, (h, w, 3).
 
     A pixel in which triangles of about one colour are visible has the colour of its middle, others have the mean of
-    their samples. Arrows are translucent where the body is behind them.
+    their samples; along the outline, rays say how much of a pixel the body covers. Arrows are translucent where the
+    body is behind them.
     """
     placed, arrows = (place_samples(stage.camera, corners) for corners in (stage.corners, stage.arrows))
     body = visible_triangles(placed, SIZE, closed=True)
@@ -27,22 +30,54 @@ def draw_stage(stage: Stage) -> Image:
     paint = _paint_of_body(stage, placed)
     image = np.empty((owner.shape[1], 3))
     image[:] = stage.background
-    plain = paint.is_even(owner)
+    lit: BoolArray = np.zeros(len(image), dtype=bool)
     if len(arrows):
         arrow = _by_pixel(visible_triangles(arrows, SIZE, closed=False, before=body.nearness).owner)
-        plain &= (arrow < 0).all(axis=0)
+        lit = np.asarray((arrow >= 0).any(axis=0))
+    plain = paint.is_even(owner) & ~lit
     pixels = np.flatnonzero(plain & (owner[0] >= 0))
     row, column = np.divmod(pixels, PANEL[0])
     middle = 0.5 * OVERSAMPLING
     image[pixels] = paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle)
-    mixed = np.flatnonzero(~plain)
-    colours = _paint_samples(paint, owner[:, mixed], mixed, np.tile(stage.background, (owner.shape[0], len(mixed), 1)))
-    if len(arrows):
-        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow[:, mixed], mixed, colours)
-        share = np.where(owner[:, mixed] >= 0, ARROW_OPACITY, 1.0)[:, :, None]
-        colours = colours + share * (over - colours)
-    image[mixed] = colours.mean(axis=0)
+    mixed = np.flatnonzero(~plain & ~lit)
+    image[mixed] = _paint_mixed(stage, paint, owner[:, mixed], mixed)
+    if lit.any():
+        pixels = np.flatnonzero(lit)
+        under = _paint_samples(paint, owner[:, pixels], pixels, _ground(stage, len(pixels)))
+        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow[:, pixels], pixels, under)
+        share = np.where(owner[:, pixels] >= 0, ARROW_OPACITY, 1.0)[:, :, None]
+        image[pixels] = (under + share * (over - under)).mean(axis=0)
     return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(PANEL[1], PANEL[0], 3)
+
+
+def _ground(stage: Stage, pixels: int) -> FloatArray:
+    """The background at the samples of pixels, (samples of a pixel, pixels, 3)."""
+    return np.tile(stage.background, (OVERSAMPLING**2, pixels, 1))
+
+
+def _paint_mixed(stage: Stage, paint: "_Paint", owner: IntArray, pixels: IntArray) -> FloatArray:
+    """Colours (n, 3) of pixels (n,) that show several triangles, or the body and the background."""
+    colours = _paint_samples(paint, owner, pixels, _ground(stage, len(pixels)))
+    mean: FloatArray = colours.mean(axis=0)
+    inside = owner >= 0
+    outline = np.flatnonzero(inside.any(axis=0) & ~inside.all(axis=0))
+    drawn = np.einsum("sp,spc->pc", inside[:, outline] / inside[:, outline].sum(axis=0), colours[:, outline])
+    share = _coverage(stage, pixels[outline])[:, None]
+    mean[outline] = share * drawn + (1.0 - share) * np.asarray(stage.background)
+    return mean
+
+
+def _coverage(stage: Stage, pixels: IntArray) -> FloatArray:
+    """The share of each pixel (n,) of the panel that the body covers, by rays through it."""
+    camera, n = stage.camera, RAYS
+    row, column = np.divmod(pixels, PANEL[0])
+    down, right = ((np.indices((n, n)).reshape(2, -1) + 0.5) / n)[:, None]
+    across = (column[:, None] + right).ravel() - 0.5 * PANEL[0]
+    above = 0.5 * PANEL[1] - (row[:, None] + down).ravel()
+    eye = camera.center + np.linalg.norm(np.ptp(stage.corners, axis=(0, 1))) * camera.toward
+    places = eye + camera.pixel * (across[:, None] * camera.right + above[:, None] * camera.up)
+    _, hit = caster_of(stage.corners).first(places, np.broadcast_to(-camera.toward, places.shape))
+    return np.asarray((hit >= 0).reshape(-1, n * n).mean(axis=1))
 
 
 def place_samples(camera: Camera, corners: FloatArray) -> FloatArray:
@@ -71,7 +106,7 @@ class _Paint:
 
     def is_even(self, owner: IntArray) -> BoolArray:
         """Whether the samples (s, n) of pixels belong to one triangle, to triangles of one colour, or to none, (n,)."""
-        even = (owner == owner[0]).all(axis=0)
+        even: BoolArray = np.asarray((owner == owner[0]).all(axis=0))
         several = np.flatnonzero(~even & (owner >= 0).all(axis=0))
         # The eye's cosine does not change a colour.
         for mean in np.delete(self.means, 1, axis=0):
