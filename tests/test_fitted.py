@@ -10,7 +10,7 @@ from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, System, VaryingMedium, solve, solve_each
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.known.fitted import MOST_SOURCES
+from tetlux.fem.known.fitted import MOST_SOURCES, residual_at
 from tetlux.fem.known.fitted_patch import FittedPatch, _unchanged, fitted_patch
 from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.known.split import split_lights
@@ -228,3 +228,31 @@ def test_feet_on_facets_that_stay_are_those_found_anew() -> None:
     assert (off < 1e-9).mean() > 0.98
     assert off.max() < 0.05
     assert ours.at_nodes == pytest.approx(anew.at_nodes)
+
+
+def test_a_residual_that_is_known_at_some_points_is_that_computed_anew(ball: Surface) -> None:
+    (light,) = split_lights([PointSource((0.0, 0.0, 9.0))], Body(ball, (TISSUE,)), "fitted").fitted.values()
+    points = light.points_within(lambda places: np.where(places[:, 2] > 0.0, np.inf, 1.5))
+    taken, anew = (residual_at(points, light.charges, known) for known in (light.residual, None))
+    distance = light.residual.tree.query(points.points)[0]
+    assert 0.1 < (distance < 1e-9).mean() < 0.9
+    assert taken.values == pytest.approx(anew.values, rel=1e-6, abs=1e-12)
+    assert taken.exitance == pytest.approx(anew.exitance, rel=1e-9)
+    # Those of another light are not.
+    other = replace(light.residual, values=2.0 * light.residual.values)
+    assert np.abs(residual_at(points, light.charges, other).values / anew.values - 1.0).max() == pytest.approx(1.0)
+
+
+def test_facets_are_split_at_once_until_they_are_as_short_as_charges_are_apart(ball: Surface) -> None:
+    (light,) = split_lights([PointSource((0.0, 0.0, 9.0))], Body(ball, (TISSUE,)), "fitted").fitted.values()
+    mesh = tetrahedralize(ball)
+    patch = fitted_patch(mesh, light)
+    splits = patch.splits_to_see()
+    corners = mesh.points[mesh.boundary_faces]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    lit = np.argmin(np.linalg.norm(corners.mean(axis=1) - np.array([0.0, 0.0, RADIUS]), axis=1))
+    # Charges are .2 apart above the light.
+    assert sides[lit] > 0.6
+    assert splits[lit] >= 2
+    far = corners[:, :, 2].max(axis=1) < -0.5 * RADIUS
+    assert splits[far].max() == 0
