@@ -126,6 +126,7 @@ def _parser() -> argparse.ArgumentParser:
         help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
     )
     run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
+    run.add_argument("--quiet", action="store_true", help="print nothing but what failed")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
@@ -150,11 +151,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that measure the solver itself."""
     chart = commands.add_parser("chart", help="compare methods by error, seconds and unknowns")
-    chart.add_argument(
-        "cases", nargs="*", metavar="CASE", help="default: the shipped cases slab, sphere, torus and hare"
-    )
+    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: the shipped cases of the chart in README")
     chart.add_argument(
         "--out", type=Path, default=Path("chart"), metavar="DIR", help="folder of the chart; default: chart"
+    )
+    chart.add_argument(
+        "--readings", action="store_true", help="compare what detectors read, not the exitance over the surface"
     )
     chart.add_argument("--quick", action="store_true", help="run a few coarse resolutions of each method only")
     chart.set_defaults(command=_chart)
@@ -168,19 +170,26 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
+    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
-    from tetlux.cases.batch.lines import Lines  # noqa: PLC0415
     from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
+    from tetlux.cases.results.batch_tables import BatchTables  # noqa: PLC0415
+    from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
-    ended = run_batch(
-        load_all(options.cases),
-        options.out,
-        jobs=options.jobs,
-        resume=options.resume,
-        scheduler=options.scheduler,
-        cache=not options.no_cache,
-        listeners=[Lines()],
-    )
+    cases = load_all(options.cases)
+    try:
+        ended = run_batch(
+            cases,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            scheduler=options.scheduler,
+            cache=not options.no_cache,
+            listeners=[choose_display(len(cases), quiet=options.quiet), RunLogs(), BatchTables()],
+        )
+    except RunError as error:
+        return _report(str(error), 1)
     return 1 if ended.failed or ended.left else 0
 
 
@@ -206,9 +215,9 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart.command import DEFAULT_CASES, chart  # noqa: PLC0415
+    from tetlux.cases.chart.command import chart  # noqa: PLC0415
 
-    return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
+    return chart(options.cases, options.out, readings=options.readings, quick=options.quick)
 
 
 def _stress(options: argparse.Namespace) -> int:

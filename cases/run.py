@@ -2,8 +2,8 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +12,15 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
+from tetlux.cases.solve import solve_case
 from tetlux.cases.write.content import content_of
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
+from tetlux.cases.write.results import Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
-from tetlux.fem.media.region import Region
-from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
-from tetlux.fem.solve import solve
-from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
@@ -39,7 +35,7 @@ FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.p
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
-# Drawn where there are so many detectors.
+# The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
@@ -134,13 +130,12 @@ def finish_case(
     try:
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
-            solutions = _solve(case, report, cache=cache, start=start)
+            solutions = solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                results = collect_results(case, solutions)
-                summary, warnings, readings = _write(results, folder, started, writing)
+                summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
                 publish(folder, target, ALL_FILES)
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
@@ -150,42 +145,6 @@ def finish_case(
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
     return FinishedCase(target, summary, warnings, describe_readings(readings, case.surface.unit))
-
-
-def _solve(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> Sequence[AnySolution]:
-    """Solve each channel by the model of the case."""
-    if case.spec.model == "charges":
-        return _solve_with_charges(case, report)
-    return solve_each(
-        case.mesh or case.surface,
-        [channel.media for channel in case.channels],
-        [list(channel.lights.values()) for channel in case.channels],
-        regions=case.regions,
-        tolerance=case.tolerance,
-        detectors=[entry.detector for entry in case.detectors],
-        detector_tolerance=case.detector_tolerance,
-        everywhere_tolerance=case.everywhere_tolerance,
-        volume_tolerance=case.volume_tolerance,
-        start=start,
-        cache=cache,
-        report=report,
-    )
-
-
-def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
-    """Solve each channel by charges; the seconds of each solution are those of all channels together."""
-    solutions = []
-    assert case.tolerance is not None
-    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
-    for channel, (body, *inner) in zip(case.channels, media, strict=True):
-        regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
-        lights = list(channel.lights.values())
-        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
-        where = f"{channel.name}: " if len(case.channels) > 1 else ""
-        report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
-        solutions.append(solution)
-    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
-    return [replace(solution, seconds=seconds) for solution in solutions]
 
 
 def _write(

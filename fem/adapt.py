@@ -28,8 +28,6 @@ from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
-# The share of scenes for which a shared mesh is left too coarse: they refine it for themselves.
-MOST_MISSING = 0.25
 # A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
 SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
@@ -288,43 +286,3 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
-
-
-def refine_for_most(
-    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
-) -> TetMesh:
-    """Refine a mesh until all but `MOST_MISSING` of the scenes are within the tolerances, each by itself.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-        The first one.
-    problem : Problem
-        Scenes that stand for many more.
-    tolerances : Tolerances
-    most_tetrahedra : int
-        Largest number of tetrahedra after refinement.
-    report : callable
-        Called with a line of text for each mesh.
-
-    Returns
-    -------
-    TetMesh
-    """
-    pending: dict[int, MeshSolution | None] = dict.fromkeys(range(len(problem.lights)))
-    allowed = MOST_MISSING * len(pending)
-    while True:
-        solve_on = problem.solver_on(mesh)
-        steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
-        with problem.watch.stage("solve"):
-            missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
-        if len(missing) <= allowed:
-            return mesh
-        with problem.watch.stage("mesh"):
-            splits = tolerances.assess(list(missing.values())).splits
-            inner = problem.scenes.inner
-            finer = refine_often(mesh, splits, problem.scenes.surface, inner, most_tetrahedra)
-        if not len(mesh.tetrahedra) < len(finer.tetrahedra) <= most_tetrahedra:
-            return mesh
-        mesh, pending = finer, dict(missing)

@@ -1,4 +1,4 @@
-"""`Scenes`: one body and its checked media in every scene that is solved for, by regions or by labels of a mesh."""
+"""`Scenes`: one body with its checked media in each scene, by regions or by labels of a mesh."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -91,7 +91,7 @@ def build_scenes(
     regions: Sequence[Region],
     scenes: int,
 ) -> Scenes:
-    """Check a body and its media, and distribute the media over the scenes.
+    """Check a body and its media, and assign the media to the scenes.
 
     Raises
     ------

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, refine_for_most, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
+from tetlux.fem.known.kept_patches import forget_patches
 from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
@@ -27,9 +28,6 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
-
-# The largest mesh that is shared: on finer ones solving takes longer than refining for each run.
-MOST_SHARED_TETRAHEDRA = 100_000
 
 Report = Callable[[str], None]
 
@@ -81,7 +79,7 @@ def solve_each(
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     start : SharedMesh, optional
-        The mesh to begin with in place of the mesher's; see `share_mesh`.
+        The mesh to begin with in place of the mesher's; see `tetlux.fem.share.share_mesh`.
     mass : {"lumped", "consistent"}
         Quadrature of the terms without derivatives.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
@@ -122,7 +120,7 @@ def solve_each(
     >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
     (True, True)
     """
-    tolerances = _check_tolerances(
+    tolerances = check_tolerances(
         Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance), detectors
     )
     check_scenes(scenes)
@@ -154,8 +152,7 @@ def solve_each(
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    if start is None:
-        keep_fits(steps[0].solution.mesh, kept)
+    keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
@@ -173,91 +170,10 @@ def solve_each(
 def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptFits:
     """The places of charges to follow, and to add to."""
     if start is not None:
+        # What a run finds does not depend on the runs before it.
+        forget_patches(start.mesh)
         return start.kept
     return KeptFits() if mesh is None else fits_of(mesh)
-
-
-def share_mesh(
-    surface: Surface,
-    medium: AnyMedium | Sequence[AnyMedium],
-    scenes: Sequence[Sequence[Light]],
-    *,
-    pilots: int = 1,
-    regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
-    detectors: Sequence[Detector] = (),
-    detector_tolerance: float | None = None,
-    cache: bool = True,
-    report: Report = no_report,
-) -> SharedMesh:
-    """Mesh a body for many scenes, so that most of them need no finer mesh.
-
-    Parameters
-    ----------
-    surface : Surface
-    pilots : int
-        So many scenes, the first ones, are solved for and stand for the others. The mesh is graded for the lights of
-        all.
-    medium, scenes, regions, tolerance, detectors, detector_tolerance, cache, report
-        As in `solve_each`.
-
-    Returns
-    -------
-    SharedMesh
-        For `solve_each`, as `start`. It has at most `MOST_SHARED_TETRAHEDRA`: runs that need more refine it themselves.
-
-    Raises
-    ------
-    InputError, RunError
-        As in `solve_each`.
-
-    Examples
-    --------
-    >>> from tetlux.fem import Medium, PointSource
-    >>> from tetlux.fem.solve_scenes import share_mesh, solve_each
-    >>> from tetlux.meshing import sphere
-    >>> ball, few = sphere(10.0), [Medium(sigma_a=a, sigma_s_prime=1.0, eta=1.4) for a in (0.01, 0.03)]
-    >>> lights = [PointSource((0, 0, 5.0))]
-    >>> start = share_mesh(ball, few, [lights, lights], tolerance=0.05)
-    >>> (solution,) = solve_each(ball, Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4), [lights], start=start)
-    >>> solution.mesh is start.mesh
-    True
-    """
-    _check_tolerances(tolerance, detectors, detector_tolerance)
-    checked = build_scenes(surface, None, medium, regions, len(scenes))
-    split = [
-        split_lights(lights, body, "fitted", tolerance=tolerance or detector_tolerance or 0.02, kept=KeptFits())
-        for lights, body in zip(scenes[:pilots], checked.bodies, strict=False)
-    ]
-    others = [
-        light.deposit_in(body)
-        for lights, body in zip(scenes[pilots:], checked.bodies[pilots:], strict=True)
-        for light in lights
-    ]
-    checked = replace(checked, media=checked.media[:pilots], bodies=checked.bodies[:pilots])
-    dark = Dark(checked.surface, checked.bodies[0].outer)
-    tolerances = Tolerances(
-        tolerance, detector_tolerance, tuple(place_detector(detector, dark) for detector in detectors)
-    )
-    problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)
-    limit = limit_by_memory(MOST_SHARED_TETRAHEDRA, *problem.size, reading=len(detectors) > 0).tetrahedra
-    mesh = first_mesh(problem, tolerances, limit, report, cache=cache)
-    return SharedMesh(refine_for_most(mesh, problem, tolerances, limit, report))
-
-
-def choose_places(
-    surface: Surface,
-    medium: AnyMedium | Sequence[AnyMedium],
-    scenes: Sequence[Sequence[Light]],
-    start: SharedMesh,
-    *,
-    regions: Sequence[Region] = (),
-    tolerance: float = 0.02,
-) -> None:
-    """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
-    checked = build_scenes(surface, None, medium, regions, len(scenes))
-    for lights, body in zip(scenes, checked.bodies, strict=True):
-        split_lights(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
 
 
 def _in_words(limit: MeshLimit) -> str:
@@ -279,8 +195,8 @@ def _with_fields(solution: Solution, tolerances: Tolerances) -> Solution:
     )
 
 
-def _check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
-    """Refuse tolerances that are not sensible or do not go with the detectors.
+def check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
+    """Refuse tolerances out of range, without a detector, or none at all.
 
     A tolerance everywhere is one of the L2 error too.
 

@@ -106,14 +106,14 @@ def test_memory_that_runs_out_fails_its_case_only(
     out = tmp_path / "out"
     assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(out)]) == 1
     assert "tetlux: a failed: memory ran out; give a larger tolerance" in capsys.readouterr().err
-    assert [path.name for path in out.iterdir()] == ["b"]
+    assert sorted(path.name for path in out.iterdir() if path.is_dir()) == ["b", "logs"]
 
 
 def test_errors_that_are_no_lack_of_memory_are_not_hidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*_: object, **__: object) -> None:
         raise RuntimeError("a mistake in the programme")
 
-    monkeypatch.setattr(run, "solve_each", wrong)
+    monkeypatch.setattr("tetlux.cases.solve.solve_each", wrong)
     (tmp_path / "a.yaml").write_text(CASE)
     with pytest.raises(RuntimeError, match="a mistake in the programme"):
         main(["run", str(tmp_path / "a.yaml"), "--out", str(tmp_path / "out")])

@@ -188,7 +188,7 @@ def test_a_failing_case_does_not_stop_the_others(
             raise RunError("the mesher failed.")
         return solve_each(surface, *rest, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(run, "solve_each", failing)
+    monkeypatch.setattr("tetlux.cases.solve.solve_each", failing)
     (tmp_path / "a.yaml").write_text(QUICK.replace("sphere: {radius: 10}", "box: {size: [9, 9, 9]}"))
     (tmp_path / "b.yaml").write_text(QUICK + "outputs: [surface]\n")
     assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(tmp_path / "out")]) == 1

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.document import Document
+from tetlux.cases.file.documents.document import Document
 from tetlux.cases.file.load import load_cases
-from tetlux.cases.file.run_names import LONGEST_LABEL, RESERVED, folder_names, identity
 from tetlux.cases.file.schema.sweep import SweepSpec
-from tetlux.cases.file.sweep_points import sweep_points
+from tetlux.cases.file.sweeps.names import LONGEST_LABEL, RESERVED, folder_names, identity
+from tetlux.cases.file.sweeps.points import sweep_points
 from tetlux.cases.shipped import find_case_files
 from tetlux.fem import PencilBeam
 from tetlux.meshing import InputError
@@ -141,6 +141,8 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
         ("{sweep: [1]}", "sweep.sweep: unknown key;"),
         ("{base: [a.yaml]}", "sweep.base: unknown key;"),
         ("{medium.eta: []}", "sweep.medium.eta: give at least one, but found []."),
+        ("{zip: {}}", "sweep.zip: give at least one, but found {}."),
+        ("{medium: [{eta: 1}]}", "medium.sigma_a: in the run medium=eta-"),
         ("{medium.eta: 3}", "sweep.medium.eta: give a list of values, or a range as in {start: 1, stop: 100, num: 5,"),
         ("{medium.eta: {start: 1, stop: 2, num: 0}}", "sweep.medium.eta.num: expected a number greater than or equal"),
         ("{medium.eta: {start: 1, stop: 2, num: 1}}", "sweep.medium.eta.num: expected a number greater than or equal"),

@@ -126,7 +126,7 @@ def worker_count(jobs: int | None, runs: int) -> int:
 def _run_here(batch: Batch, track: "_Track") -> None:
     """Do all jobs in this process."""
     schedule = Schedule(batch)
-    workshop = Workshop("", track, lambda: track.must_stop)
+    workshop = Workshop("", track, lambda: track.must_stop, raises_faults=len(batch.cases) == 1)
     while not track.must_stop and (job := schedule.next_job()) is not None:
         if isinstance(job, MeshJob):
             schedule.take_mesh(workshop.adapt(job))

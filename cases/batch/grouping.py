@@ -98,7 +98,8 @@ def _can_share(case: Case) -> bool:
 def _wanted(case: Case) -> tuple[Hashable, ...]:
     """What a mesh is refined for, besides lights and media."""
     detectors = tuple(repr(entry.detector) for entry in case.detectors) if case.detector_tolerance else ()
-    return case.surface.unit, case.tolerance, case.detector_tolerance, detectors
+    tolerances = (case.tolerance, case.detector_tolerance, case.everywhere_tolerance, case.volume_tolerance)
+    return case.surface.unit, *tolerances, detectors
 
 
 def _pilots(runs: Sequence[int]) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from tetlux.cases.file.case import Case
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
-from tetlux.fem.solve_scenes import share_mesh
+from tetlux.fem.share import share_mesh
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -76,6 +76,8 @@ class MeshJob:
             tolerance=first.tolerance,
             detectors=[entry.detector for entry in first.detectors],
             detector_tolerance=first.detector_tolerance,
+            everywhere_tolerance=first.everywhere_tolerance,
+            volume_tolerance=first.volume_tolerance,
             cache=self.cache,
         )
         return MeshData.of(found.mesh)

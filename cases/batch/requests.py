@@ -114,5 +114,5 @@ def _describe_mesh(case: Case) -> list[str]:
     lines = []
     for label, volume in mesh.region_volumes.items():
         count = int((mesh.regions == label).sum())
-        lines.append(f"label {mesh.named([label])}: {count:,} tetrahedra, {volume:.4g} {mesh.unit}³")
+        lines.append(f"label {mesh.label_text([label])}: {count:,} tetrahedra, {volume:.4g} {mesh.unit}³")
     return [*lines, *mesh.warnings]

@@ -9,9 +9,10 @@ from tetlux.cases.batch.jobs import MeshData, MeshJob, MeshMade, MeshNotMade, Ru
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import FinishedCase, finish_case
 from tetlux.cases.write.publish import disk_is_full
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits
+from tetlux.fem.share import choose_places
 from tetlux.fem.shared import SharedMesh
-from tetlux.fem.solve_scenes import choose_places
 from tetlux.meshing.errors import TetluxError
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -33,9 +34,14 @@ class Workshop:
         Is called with each event.
     wants_to_stop : callable
         Is asked before each run whether to leave the rest.
+    raises_faults : bool
+        Whether an error that is a fault of tetlux is raised: where there are no other runs that it must not end.
     """
 
-    def __init__(self, name: str, emit: Emit, wants_to_stop: WantsToStop = lambda: False) -> None:
+    def __init__(
+        self, name: str, emit: Emit, wants_to_stop: WantsToStop = lambda: False, *, raises_faults: bool = False
+    ) -> None:
+        self._raises_faults = raises_faults
         self._name, self.emit, self._wants_to_stop = name, emit, wants_to_stop
         # The last mesh, which the next task mostly has too, and the places that leaders have on it.
         self._mesh: tuple[MeshData, TetMesh] | None = None
@@ -94,6 +100,8 @@ class Workshop:
         except TetluxError as error:
             self.emit(self._failure(run, str(error), started, ends_batch=disk_is_full(error)))
         except Exception as error:  # a fault of one run must not end the others
+            if self._raises_faults:
+                raise
             fault = f"a fault of tetlux ({type(error).__name__}: {error}); report it with the case file."
             self.emit(self._failure(run, " ".join(fault.split()), started))
         else:
@@ -126,5 +134,5 @@ def _choose_places(case: Case, start: SharedMesh) -> None:
         [list(channel.lights.values()) for channel in case.channels],
         start,
         regions=case.regions,
-        tolerance=case.tolerance or case.detector_tolerance or 0.02,
+        tolerance=case.tolerance or case.everywhere_tolerance or case.detector_tolerance or DEFAULT_TOLERANCE,
     )

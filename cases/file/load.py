@@ -6,18 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tetlux.cases.file.base import read_with_base
 from tetlux.cases.file.body import CaseBody, read_body
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
 from tetlux.cases.file.channels import ALL, channel_names, check_unique_names
 from tetlux.cases.file.detectors import NamedDetector, build_detector
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.base import read_with_base
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
 from tetlux.cases.file.reader import FilesRead, Reader
-from tetlux.cases.file.run_names import LONGEST_NAME
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep import expand_sweep
+from tetlux.cases.file.sweeps.expand import expand_sweep
+from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
 from tetlux.cases.start import take_start_seconds

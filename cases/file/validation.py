@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.parts import TAG
 from tetlux.cases.hints import did_you_mean

@@ -20,6 +20,7 @@ from tetlux.cases.results.rows import (
 )
 from tetlux.cases.results.table_file import TableFile, replace_file
 from tetlux.cases.write.publish import write_error
+from tetlux.meshing.errors import RunError
 
 RESULTS, PARQUET, READINGS, PAGE = "results.csv", "results.parquet", "readings.csv", "index.html"
 
@@ -78,14 +79,14 @@ class BatchTables:
         self._kept = kept, [row for row in readings.read() if row["run"] in runs]
         for table, rows in zip((results, readings), self._kept, strict=True):
             if table.path.exists():
-                with suppress(OSError):
+                with suppress(OSError, RunError):
                     table.replace(rows)
 
     def _add(self, run: int, results: list[Row], readings: list[Row]) -> None:
         # A run that is done again replaces its rows at the end.
         self._results[run], self._readings[run] = results, readings
         # What cannot be written now, as a file that a spreadsheet holds, is written at the end.
-        with suppress(OSError):
+        with suppress(OSError, RunError):
             results_file(self._out).append(results)
             readings_file(self._out).append(readings)
 

@@ -28,7 +28,7 @@ def write_page(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> None:
 
     Raises
     ------
-    OSError
+    OSError, RunError
         If it cannot be written.
     """
     shown = [name for name in columns if any(row.get(name) is not None for row in rows)]

@@ -29,7 +29,7 @@ def parquet_of(rows: Sequence[Row], columns: Sequence[str]) -> bytes | None:
     arrays, fields = [], []
     for name in columns:
         values = [row.get(name) for row in rows]
-        kind = _kind(values)
+        kind = _kind(values) or ("float64" if name in FIGURES and not any(values) else None)
         cells = values if kind else [None if value is None else cell(value) for value in values]
         arrays.append(pyarrow.array(cells, type=getattr(pyarrow, kind or "string")()))
         fields.append(pyarrow.field(name, arrays[-1].type, metadata={"unit": FIGURES.get(name, "")}))

@@ -76,7 +76,7 @@ def result_rows(summary: Mapping[str, Any]) -> list[Row]:
     """
     mesh = summary.get("mesh", {})
     rows = []
-    for channel in summary["channels"]:
+    for channel in summary.get("channels", ()):
         row: Row = {**_head(summary), "channel": channel["name"], "status": "finished"}
         row |= {"unit": summary["unit"], "model": summary["model"], "tolerance": summary.get("tolerance")}
         row |= channel["power"]
@@ -129,14 +129,16 @@ def swept_keys(columns: Iterable[str]) -> list[str]:
 
 
 def order_columns(columns: Iterable[str], head: Sequence[str], figures: Sequence[str]) -> list[str]:
-    """Put columns in order: what a row is about, swept keys, figures, readings, seconds, warnings."""
+    """Put columns in order: what a row is about, swept keys, figures, readings, seconds, warnings.
+
+    All of the first and of the figures are there, whether or not a row has them.
+    """
     found = list(dict.fromkeys([*head, *columns]))
     fixed = {*head, *figures, WARNINGS}
     readings = [name for name in found if name.startswith(READING)]
     seconds = [name for name in found if name.startswith(SECONDS)]
     swept = [name for name in found if name not in {*fixed, *readings, *seconds}]
-    known = [name for name in figures if name in found]
-    return [*head, *swept, *known, *readings, *seconds, *(name for name in found if name == WARNINGS)]
+    return [*head, *swept, *figures, *readings, *seconds, *(name for name in found if name == WARNINGS)]
 
 
 def cell(value: Any) -> str:

@@ -4,14 +4,19 @@ import csv
 import io
 import os
 import re
+import time
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from tetlux.cases.results.rows import HEAD, READING_HEAD, WARNINGS, Row, cell, order_columns
+from tetlux.cases.write.publish import claim_folder
+from tetlux.meshing.errors import RunError
 
 # Columns whose values are text even where they look like numbers.
 WORDS = frozenset({*HEAD, *READING_HEAD, WARNINGS})
+# What tables are locked by, which is no name of a case, and how long to wait for another process, seconds.
+LOCK, PATIENCE = ".tables", 10.0
 NUMBER = re.compile(r"-?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
@@ -51,7 +56,7 @@ class TableFile:
 
         Raises
         ------
-        OSError
+        OSError, RunError
             If the file cannot be written to.
         """
         if not rows:
@@ -68,7 +73,7 @@ class TableFile:
 
         Raises
         ------
-        OSError
+        OSError, RunError
             If the file cannot be written.
         """
         columns = order_columns((name for row in rows for name in row), self.head, self.figures)
@@ -102,16 +107,23 @@ def _lines(rows: Iterable[Row], columns: Sequence[str]) -> str:
 
 
 def replace_file(path: Path, content: str | bytes) -> None:
-    """Write a file under another name and put it in the place of the old one.
+    """Write a file elsewhere and put it in the place of the old one, one process after the other.
 
     Raises
     ------
-    OSError
+    OSError, RunError
         If it cannot be written.
     """
-    partial = path.with_name(f".{path.name}-{os.getpid()}.partial")
-    try:
-        partial.write_bytes(content.encode("utf-8", "replace") if isinstance(content, str) else content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    until = time.monotonic() + PATIENCE
+    while True:
+        try:
+            with claim_folder(path.parent, LOCK) as folder:
+                partial = folder / path.name
+                partial.write_bytes(content.encode("utf-8", "replace") if isinstance(content, str) else content)
+                partial.replace(path)
+                return
+        except RunError as error:
+            # Another batch is writing its tables into the same folder.
+            if not isinstance(error.__cause__, BlockingIOError) or time.monotonic() > until:
+                raise
+            time.sleep(0.02)

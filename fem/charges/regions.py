@@ -21,10 +21,10 @@ from tetlux.fem.charges.placement import (
     HEIGHT_SMOOTH,
     ChargePlacement,
     distance_from,
-    fitting_cells,
     place_above_surface,
-    place_charges_in,
+    place_charges_at,
     scaled,
+    spacing_scale,
 )
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
@@ -114,12 +114,10 @@ def place_at_interfaces(
     # An inner interface has charges on both sides.
     share = len(interfaces) / (len(interfaces) + inner)
     surfaces = [interface.surface for interface in interfaces]
-    all_cells, scale = fitting_cells(surfaces, spacings, share * count)
+    scale = spacing_scale(surfaces, spacings, share * count)
     found = []
-    for interface, cells, spacing in zip(interfaces, all_cells, spacings, strict=True):
-        placement = place_charges_in(
-            interface.surface, cells, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT
-        )
+    for interface, spacing in zip(interfaces, spacings, strict=True):
+        placement = place_charges_at(interface.surface, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT)
         charges_inside = np.zeros((0, 3))
         if interface.outside is not None:
             turned = replace(interface.surface, faces=interface.surface.faces[:, ::-1])

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
 from tetlux.fem.quadratic.reading_error import ReadingError
-from tetlux.meshing.arrays import BoolArray, IntArray
+from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 
 # Share of their error that splitting tetrahedra is assumed to remove.
@@ -45,26 +45,27 @@ def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
         raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
-def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray:
-    """Whether to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims."""
+def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
+    """How often to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims."""
     wanted = [
         aim
         for estimate in estimates
         for aim in (
-            (estimate.exitance_indicators, AIM_SHARE * tolerance),
-            (estimate.power_indicators, POWER_AIM_SHARE * tolerance),
+            (estimate.exitance_indicators, AIM_SHARE * tolerance, np.minimum(estimate.splits, MOST_SPLITS)),
+            (estimate.power_indicators, POWER_AIM_SHARE * tolerance, np.ones_like(estimate.splits)),
         )
     ]
-    marked = np.zeros(len(wanted[0][0]), dtype=bool)
-    for indicators, aim in wanted:
+    splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
+    for indicators, aim, often in wanted:
         error = float(indicators.sum())
         if error <= REFINE_ABOVE * aim:
             continue
         part = float(np.clip((1.0 - aim / error) / ERROR_REMOVED_SHARE, LEAST_SPLIT_SHARE, LARGEST_SPLIT_SHARE))
         order = np.argsort(-indicators)
         reached = np.cumsum(indicators[order])
-        marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
-    return marked
+        chosen = order[: int(np.searchsorted(reached, part * reached[-1])) + 1]
+        splits[chosen] = np.maximum(splits[chosen], often[chosen])
+    return splits
 
 
 def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:

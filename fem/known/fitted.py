@@ -34,9 +34,8 @@ from tetlux.meshing.surface.surface import Surface
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Surfaces of more triangles than this are not fitted. On a scan of 100,000 a fit takes 4 s, and all of the half-space's
-# solution .5 s; on one of 20,000 .9 and .6 s, with half of its error.
-MOST_TRIANGLES = 40_000
+# Points that differ by less than this share of their coordinates are the same, if their normals are.
+SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
 # The power that flows out is corrected where less than this share of all is absorbed.
@@ -104,7 +103,7 @@ class FittedLight:
 
     def points_within(self, wanted: Spacing) -> Samples:
         """Points as far apart as wanted at most, where a mesh is finer than those of the residual."""
-        return _residual_points(self.placement.fitted, self.surface, wanted)
+        return _residual_points(self.placement, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -144,7 +143,7 @@ def fit_light(
     if like is not None and like.surface is surface:
         residual = residual_at(like.residual.points, charges)
     else:
-        residual = residual_on_surface(charges, fitted.placement.fitted, surface)
+        residual = residual_at(_residual_points(fitted.placement, surface), charges)
     accurate = like.accurate if like is not None else _accurate(residual, medium)
     return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
@@ -161,7 +160,7 @@ def _accurate(residual: BoundaryResidual, medium: Medium) -> BoolArray:
 def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     """Whether the light is a few points well inside a simple body."""
     terms = deposit.terms
-    if surface.overlaps or len(surface.faces) > MOST_TRIANGLES:
+    if surface.overlaps:
         return False
     if not 0 < len(terms.points) <= MOST_SOURCES or len(terms.segments) > 0:
         return False
@@ -180,30 +179,37 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def residual_on_surface(charges: Charges, samples: Samples, surface: Surface) -> BoundaryResidual:
-    """The residual of charges on the true surface, at points that follow from the samples where they were fitted."""
-    return residual_at(_residual_points(samples, surface), charges)
-
-
-def _residual_points(samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Samples:
+def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spacing | None = None) -> Samples:
     """Points at which a residual is integrated; they do not depend on the coefficients."""
+    samples = placement.fitted
 
     def spacing(queries: FloatArray) -> FloatArray:
         own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points = quadrature(surface, spacing)
+    points = quadrature(surface, spacing, len(placement.charges))
     # Many runs may have these points on one mesh, which then finds them once.
     points.points.setflags(write=False)
     return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
 
 
-def residual_at(points: Samples, charges: Charges) -> BoundaryResidual:
-    """The residual of charges at points of the true surface."""
+def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | None = None) -> BoundaryResidual:
+    """The residual of charges at points of the true surface, some of which may be those where it is known."""
+    exitance, values = np.empty(len(points)), np.empty(len(points))
+    new = np.arange(len(points))
+    if known is not None:
+        distance, nearest = known.tree.query(points.points)
+        same = distance <= SAME * float(np.abs(points.points).max())
+        # Two triangles may have a point in common and not its normal.
+        same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
+        exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
+        new = new[~same]
     equation = equation_of(charges.medium)
-    fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
-    exitance = equation.robin * fluence
-    return BoundaryResidual(points, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    fluence, flux = equation.traces(points.points[new], points.normals[new], charges.positions, charges.strengths)
+    exitance[new] = equation.robin * fluence
+    values[new] = flux + exitance[new]
+    outflow = float(points.areas @ (exitance - values))
+    return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:

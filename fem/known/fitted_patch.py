@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.samples import Samples
+from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
@@ -23,6 +23,12 @@ from tetlux.meshing.tets.mesh import TetMesh
 SHORTER = 0.65
 # Facets shorter than this times the distance of the points at which the residual is integrated have more points.
 FINE = 0.7
+# The points are then so many times as far apart as the facets are long, so that these may be split once.
+FINER = 0.7
+# Points are chosen anew if this share of the small facets has too few.
+MOST_SMALL = 0.1
+# A part of the surface is as fine as the smallest of so many facets around its middle asks for.
+BESIDE = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +89,14 @@ class FittedPatch(Patch):
         square = self.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
 
+    def splits_to_see(self) -> IntArray:
+        """How often each boundary triangle has to be halved until it is as short as charges are apart, (f,)."""
+        sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
+        apart = np.full(len(sides), np.inf)
+        np.minimum.at(apart, self.facets, self.residual.points.spacing)
+        # Two halve its sides.
+        return np.ceil(2.0 * np.log2(np.maximum(sides / apart, 1.0))).astype(np.int64)
+
     def _at_nodes(self, values: FloatArray) -> FloatArray:
         """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
         corners = self.mesh.boundary_faces[self.facets]
@@ -91,43 +105,53 @@ class FittedPatch(Patch):
 
 def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
     """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
-    points = light.residual.points
     if coarse is None:
         at_nodes = light.charges.fluence(mesh.points)
     else:
         # Nodes of the coarse mesh come first.
         new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
         at_nodes = np.concatenate([coarse.at_nodes, new])
-    if coarse is None or coarse.residual is not light.residual:
-        _, facets, weights = mesh.closest_boundary(points.points)
+    residual = light.residual if coarse is None else coarse.residual
+    small = _are_small(mesh, light.residual)
+    anew = bool((small & _are_small(mesh, residual)).sum() > MOST_SMALL * small.sum())
+    if anew:
+        residual = residual_at(_finer_points(mesh, light, small), light.charges, light.residual)
+    if coarse is None or anew:
+        _, facets, weights = mesh.closest_boundary(residual.points.points)
     else:
         facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
         others = np.flatnonzero(facets < 0)
-        _, facets[others], weights[others] = mesh.closest_boundary(points.points[others])
-    residual = light.residual
-    corners = mesh.points[mesh.boundary_faces]
-    sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
-    nearest = apart[light.residual.tree.query(corners.mean(axis=1))[1]]
-    if (sides < FINE * nearest).any():
-        limits = np.where(sides < FINE * nearest, sides, np.inf)
-        residual = residual_at(_finer_points(mesh, light, limits), light.charges)
-        _, facets, weights = mesh.closest_boundary(residual.points.points)
+        _, facets[others], weights[others] = mesh.closest_boundary(residual.points.points[others])
     cells: BoolArray = np.asarray(light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1))
     patch = FittedPatch(mesh, light.charges, cells, at_nodes, residual, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
+
+
+def _are_small(mesh: TetMesh, residual: BoundaryResidual) -> BoolArray:
+    """Whether boundary triangles are smaller than the points of a residual are apart there, (f,)."""
+    corners = mesh.points[mesh.boundary_faces]
+    apart = np.sqrt(2.0 * residual.points.areas)[residual.tree.query(corners.mean(axis=1))[1]]
+    return np.asarray(longest_sides(corners) < FINE * apart)
+
+
+def _spacing_of(mesh: TetMesh, small: BoolArray) -> Spacing:
+    """The spacing of points that small boundary triangles need, of a mask (f,)."""
+    corners = mesh.points[mesh.boundary_faces]
+    limits, tree = np.where(small, FINER * longest_sides(corners), np.inf), cKDTree(corners.mean(axis=1))
+    near = min(BESIDE, len(limits))
+    return lambda queries: limits[tree.query(queries, k=near)[1].reshape(len(queries), near)].min(axis=1)
 
 
 # Points by those of a residual that they take the place of: on one mesh they are the same for all coefficients.
 _FINER: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Samples, Samples]] = WeakKeyDictionary()
 
 
-def _finer_points(mesh: TetMesh, light: FittedLight, limits: FloatArray) -> Samples:
-    """Points no farther apart than the limit of the nearest boundary triangle, (f,)."""
+def _finer_points(mesh: TetMesh, light: FittedLight, small: BoolArray) -> Samples:
+    """Points that are as close together as small boundary triangles need, of a mask (f,)."""
     of_mesh = _FINER.setdefault(mesh, WeakKeyDictionary())
     known = light.residual.points
     if known not in of_mesh:
-        tree = cKDTree(mesh.points[mesh.boundary_faces].mean(axis=1))
-        of_mesh[known] = light.points_within(lambda queries: limits[tree.query(queries)[1]])
+        of_mesh[known] = light.points_within(_spacing_of(mesh, small))
     return of_mesh[known]
 
 
@@ -162,8 +186,9 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> Pa
     mesh, charges, residual = patch.mesh, patch.charges, patch.residual
     areas = patch.areas
     if not patch.is_whole:
-        leaving = areas @ residual.exitance
-        through = areas @ (residual.values - residual.exitance)
+        # Sums over points miss power near the light, which is in the patch.
+        leaving = areas @ residual.exitance + residual.missed
+        through = areas @ (residual.values - residual.exitance) - residual.missed
         return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
     exited = float(areas @ residual.exitance) + residual.missed
     inflow = float(areas @ (residual.values - residual.exitance)) - residual.missed

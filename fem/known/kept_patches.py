@@ -74,5 +74,10 @@ def keep_or_choose(
     return found
 
 
+def forget_patches(mesh: TetMesh) -> None:
+    """Forget the patches that are kept with a mesh."""
+    _OF_MESHES.pop(mesh, None)
+
+
 def _key(charges: Charges, elements: Elements) -> _Key:
     return elements, charges.name, len(charges.positions)

@@ -18,6 +18,7 @@ from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.reading_error import LEAST_RELATIVE_ERROR, reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
@@ -115,6 +116,13 @@ class ChargeSolution:
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
+
+    def errors_on(self, queries: FloatArray) -> FloatArray:
+        """Estimated relative errors of the exitance at points (q, 3) on the surface, (q,)."""
+        source = float(boundary_condition_of(self.medium).inflow(sum(ledger.transmitted for ledger in self.ledgers)))
+        errors = reading_errors(self.surface, self._sums[0], self.samples[0], source, queries)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(errors / np.abs(self.exitance_on(queries)) + LEAST_RELATIVE_ERROR)
 
     def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""

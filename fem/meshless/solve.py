@@ -109,8 +109,12 @@ def solve_with_charges(
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     if not solution.error_estimate <= tolerance:
         warnings.append(
-            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
-            f"{solution.charges} charges; {_INSTEAD}"
+            Note(
+                "tolerance-missed",
+                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
+                f"with {solution.charges} charges; {_INSTEAD}",
+                value=solution.error_estimate,
+            )
         )
     warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))

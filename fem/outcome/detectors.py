@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.outcome.exitance_field import ExitanceField
+from tetlux.fem.outcome.exitance_field import ExitanceField, FieldWithErrors
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
@@ -137,11 +137,11 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
         radius; or if the surface is not flat enough for the disc, or ends under it.
     """
-    return _read(place_detector(detector, solution), solution)
+    return read_all([detector], solution)[0]
 
 
-def _read(placed: "PlacedDetector", solution: ExitanceField) -> Reading:
-    error = model = None
+def _read(placed: "PlacedDetector", solution: ExitanceField, error: float | None = None) -> Reading:
+    model = None
     if isinstance(solution, Solution) and is_quadratic(solution):
         found = estimate_reading(solution, placed.measurement)
         exitance, error = found.value, found.relative
@@ -183,6 +183,9 @@ def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingErr
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors; this is faster than reading one after another."""
     placed = [place_detector(detector, solution) for detector in detectors]
+    if isinstance(solution, FieldWithErrors) and placed:
+        errors = solution.errors_on(np.array([each.position for each in placed])).tolist()
+        return tuple(_read(each, solution, error) for each, error in zip(placed, errors, strict=True))
     if not (isinstance(solution, Solution) and is_quadratic(solution)):
         return tuple(_read(each, solution) for each in placed)
     assert solution.quadratic is not None

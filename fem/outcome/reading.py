@@ -22,8 +22,8 @@ class Reading:
     power : float, complex or None
         Exitance times area, and for a fibre the share of it within its aperture, W; None for a point.
     relative_error : float or None
-        Estimated numerical error of this reading, relative: see `tetlux.fem.quadratic.error`. None where it is not
-        estimated, as without a mesh.
+        Estimated numerical error of this reading, relative: see `tetlux.fem.quadratic.error`, and
+        `tetlux.fem.meshless.reading_error` without a mesh. None where it is not estimated.
     model_error : float or None
         Expected relative error of the diffusion approximation there, which no mesh reduces: see
         `tetlux.fem.validity.local`. None where it is not known, as of one of several lights.

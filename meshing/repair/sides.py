@@ -43,7 +43,7 @@ def drop_second_sides(points: FloatArray, faces: IntArray, repairs: list[str]) -
     count = int(sheet.max(initial=0)) + 1
     if not 2 <= count <= MOST_SHEETS:
         return points, faces
-    copied = _copied(faces)
+    copied = _find_copies(faces)
     parts = [np.flatnonzero(sheet == i) for i in range(count)]
     # Of sheets of equally many triangles the later one is dropped.
     parts.sort(key=lambda part: (len(part), -part[0]))
@@ -69,7 +69,7 @@ def drop_second_sides(points: FloatArray, faces: IntArray, repairs: list[str]) -
     return compact(points, faces[~dropped])
 
 
-def _copied(faces: IntArray) -> BoolArray:
+def _find_copies(faces: IntArray) -> BoolArray:
     """Whether each triangle is given more than once, in either orientation."""
     _, kind = distinct_rows(np.sort(faces, axis=1))
     return np.asarray(np.bincount(kind)[kind] > 1)

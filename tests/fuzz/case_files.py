@@ -355,7 +355,7 @@ def traps() -> Iterator[tuple[str, bytes]]:
         for key in (b"tolerance", b"name", b"unit", b"surface", b"camera", b"sweep"):
             kept = b"".join(part for part in right.splitlines(keepends=True) if not part.startswith(key))
             yield f"{key.decode()}: {tag[:40]}", kept + b"\n" + key + b": " + tag.encode() + b"\n"
-    for place in (
+    for named in (
         b"case.yaml",
         b"./case.yaml",
         b"../inputs/case.yaml",
@@ -366,7 +366,7 @@ def traps() -> Iterator[tuple[str, bytes]]:
         b"''",
         b"3",
     ):
-        yield f"base {place.decode()}", b"base: " + place + b"\n" + right
+        yield f"base {named.decode()}", b"base: " + named + b"\n" + right
     for odd in (
         *("{zip: {}}", "{zip: {medium.eta: [1.2, 1.4], medium.g: [1]}}", "{zip: 3}", "{zip: {zip: {medium.eta: [1]}}}"),
         *(
@@ -400,8 +400,8 @@ def traps() -> Iterator[tuple[str, bytes]]:
             "{sweep: [1]}",
         ),
     ):
-        kept = b"".join(part for part in right.splitlines(keepends=True) if not part.startswith(b"sweep"))
-        yield f"sweep {odd[:40]}", kept + b"sweep: " + odd.encode() + b"\n"
+        alone = yaml.safe_dump({key: value for key, value in RIGHT[0].items() if key not in ("sweep", "compare")})
+        yield f"sweep {odd[:40]}", alone.encode() + b"sweep: " + odd.encode() + b"\n"
     for name in (
         *(
             "..",

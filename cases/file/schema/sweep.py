@@ -23,7 +23,9 @@ class SampledRangeSpec(Section):
         if self.start == self.stop:
             raise PydanticCustomError("sweep", "this range is empty, since start and stop are equal; give a list")
         if self.scale == "log" and min(self.start, self.stop) <= 0:
-            raise PydanticCustomError("sweep", "a range of scale log has no 0 and no negative numbers")
+            raise PydanticCustomError(
+                "sweep", "a range of scale log has no 0 and no negative numbers; give positive ends"
+            )
         return self
 
 
@@ -94,7 +96,9 @@ class SweepSpec(ByKey):
     """Values by dotted key; several keys make a grid."""
 
     __pydantic_extra__: dict[str, Axis] = Field(init=False)
-    zip: dict[str, Axis] = Field({}, description="keys whose values go together: lists and ranges of one length")
+    zip: dict[str, Axis] = Field(
+        {}, min_length=1, description="keys whose values go together: lists and ranges of one length"
+    )
     sample: SampleSpec | None = Field(None, description="points drawn from ranges")
 
     @property

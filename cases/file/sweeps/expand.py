@@ -2,10 +2,10 @@
 
 from typing import Any, NamedTuple
 
-from tetlux.cases.file.document import Document, Key, Place
+from tetlux.cases.file.documents.document import Document, Key, Place
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep_keys import check_key, split_key, with_value
-from tetlux.cases.file.sweep_points import sweep_points
+from tetlux.cases.file.sweeps.keys import check_key, split_key, with_value
+from tetlux.cases.file.sweeps.points import sweep_points
 
 
 class SweepRun(NamedTuple):
@@ -46,7 +46,11 @@ def expand_sweep(document: Document, spec: CaseSpec) -> list[SweepRun]:
     for key, at in given.items():
         check_key(document, at, key)
     rest = {key: value for key, value in document.data.items() if key != "sweep"}
-    places = dict(document.places)
+    swept = [split_key(key) for key in given]
+    # What is within a section that is swept as a whole stands elsewhere.
+    places = {
+        key: place for key, place in document.places.items() if not any(key[: len(whole)] == whole for whole in swept)
+    }
     for key, at in given.items():
         place = document.place(at)
         for depth in range(1, len(split_key(key)) + 1):

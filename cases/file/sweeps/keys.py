@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.parts import Section
 from tetlux.cases.hints import nearest_word

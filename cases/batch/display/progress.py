@@ -15,6 +15,7 @@ from tetlux.cases.batch.events import (
     RunStarted,
     WorkerLost,
 )
+from tetlux.meshing.notes import Note
 
 # The rate is that of so many last runs.
 RECENT = 50
@@ -34,8 +35,10 @@ class Progress:
         Runs: all, and by outcome.
     working : dict
         What each worker does, and since when.
-    failures, notes : dict of str to list of str
-        Names of runs by the reason of their failure, and by warning.
+    failures : dict of str to list of str
+        Names of runs by the reason of their failure.
+    notes : dict of str to list of str
+        Names of runs by warning, of which those of one code count as one: that of the first run.
     """
 
     clock: Callable[[], float] = time.monotonic
@@ -46,6 +49,7 @@ class Progress:
     working: dict[str, tuple[str, float]] = field(default_factory=dict)
     failures: dict[str, list[str]] = field(default_factory=dict)
     notes: dict[str, list[str]] = field(default_factory=dict)
+    _first_notes: dict[str, str] = field(default_factory=dict)
     _started: float = 0.0
     _ends: deque[float] = field(default_factory=lambda: deque(maxlen=RECENT + 1))
 
@@ -76,8 +80,9 @@ class Progress:
             return
         else:
             self.finished += 1
-            for note in event.notes:
-                self.notes.setdefault(note, []).append(event.name)
+            for code, note in {_code(note): note for note in event.notes}.items():
+                first = self._first_notes.setdefault(code, note)
+                self.notes.setdefault(first, []).append(event.name)
         self._ends.append(self.clock())
 
     @property
@@ -113,6 +118,11 @@ class Progress:
         if self.seconds_left is not None and self.left:
             parts.append(f"{describe_seconds(self.seconds_left)} to go")
         return ", ".join(parts)
+
+
+def _code(note: str) -> str:
+    """What a warning has in common with those of other runs, whose figures may differ."""
+    return f"{note.region} {note.code}" if isinstance(note, Note) else note
 
 
 def describe_rate(rate: float) -> str:

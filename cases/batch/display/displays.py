@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from tetlux.cases.batch.display.lines import Lines
+from tetlux.cases.batch.display.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, Listener, WorkerLost
-from tetlux.cases.batch.lines import Lines
-from tetlux.cases.batch.progress import Progress, describe_rate, describe_seconds, list_by_sentence
 
 if TYPE_CHECKING:
     from rich.console import Console, Group
@@ -103,7 +103,7 @@ class PlainDisplay(Quiet):
         self._print(f"{self.progress.describe()}; {event.how} after {describe_seconds(event.seconds)}")
         notes = list_by_sentence(self.progress.notes)
         for line in notes[:MOST_NOTES]:
-            self._print(f"note, in {line}")
+            self._print(f"note, with figures of the first, in {line}")
         if len(notes) > MOST_NOTES:
             self._print(f"and {len(notes) - MOST_NOTES:,} more notes, in the summaries of the runs")
         self._list_failures()
@@ -144,7 +144,7 @@ class LiveDisplay(PlainDisplay):
         progress = self.progress
         done = progress.finished + progress.kept
         head = Table.grid(padding=(0, 2))
-        cells = [
+        cells: list[ProgressBar | Text] = [
             ProgressBar(total=max(progress.total, 1), completed=done + progress.failed, width=24),
             Text(f"{done:,}/{progress.total:,} done"),
             Text(f"{progress.failed:,} failed", style="red" if progress.failed else ""),

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.file.document import Document, Key, Place, read_document
+from tetlux.cases.file.documents.document import Document, Key, Place, read_document
 
 # Keys whose values are paths, relative to the case file.
 PATHS = ("file", "files")

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.file.document import Document, Key
-from tetlux.cases.file.run_names import folder_names, identity
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.schema.sweep import MOST_RUNS, RangeSpec, SampledRangeSpec, SampleSpec, SweepSpec
+from tetlux.cases.file.sweeps.names import folder_names, identity
 from tetlux.meshing.arrays import FloatArray
 
 Point = dict[str, Any]
@@ -47,13 +47,14 @@ def sweep_points(document: Document, sweep: SweepSpec) -> tuple[list[Point], lis
     count = math.prod(map(len, axes)) * size
     if count > MOST_RUNS:
         raise document.error(("sweep",), f"this sweep makes {count:,} runs; give at most {MOST_RUNS:,} at once.")
-    drawn = _draw(sweep.sample) if sweep.sample else [{}]
+    drawn: list[Point] = _draw(sweep.sample) if sweep.sample else [{}]
     width = len(str(size))
     points, labels = [], []
-    for *parts, (number, sample) in itertools.product(*axes, list(enumerate(drawn, 1))):
+    for parts in itertools.product(*axes):
         point = {key: value for part in parts for key, value in part.items()}
-        points.append(point | sample)
-        labels.append(point | ({"sample": f"{number:0{width}d}"} if sample else {}))
+        for number, sample in enumerate(drawn, 1):
+            points.append(point | sample)
+            labels.append(point | ({"sample": f"{number:0{width}d}"} if sample else {}))
     return points, folder_names(labels)
 
 
