@@ -9,6 +9,7 @@ import pytest
 
 from tests.conftest import TISSUE, block
 from tetlux.cases import run
+from tetlux.cases import solve as solve_module
 from tetlux.cases.cli import main
 from tetlux.fem import PointSource, memory, solve
 from tetlux.meshing import RunError, Surface
@@ -92,7 +93,8 @@ def test_refinement_stops_where_memory_ends(ball: Surface, monkeypatch: pytest.M
 def test_memory_that_runs_out_fails_its_case_only(
     error: Exception, stage: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    usual, calls = getattr(run, stage), []
+    module = solve_module if stage == "solve_each" else run
+    usual, calls = getattr(module, stage), []
 
     def first_fails(*arguments: object, **options: object) -> object:
         calls.append(0)
@@ -100,7 +102,7 @@ def test_memory_that_runs_out_fails_its_case_only(
             raise error
         return usual(*arguments, **options)
 
-    monkeypatch.setattr(run, stage, first_fails)
+    monkeypatch.setattr(module, stage, first_fails)
     for name in ("a", "b"):
         (tmp_path / f"{name}.yaml").write_text(CASE.replace("[]", "[volume]"))
     out = tmp_path / "out"

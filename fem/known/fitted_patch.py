@@ -95,7 +95,7 @@ class FittedPatch(Patch):
         apart = np.full(len(sides), np.inf)
         np.minimum.at(apart, self.facets, self.residual.points.spacing)
         # Two halve its sides.
-        return np.ceil(2.0 * np.log2(np.maximum(sides / apart, 1.0))).astype(np.int64)
+        return np.asarray(np.ceil(2.0 * np.log2(np.maximum(sides / apart, 1.0))), dtype=np.int64)
 
     def _at_nodes(self, values: FloatArray) -> FloatArray:
         """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
