@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tetlux.cases.batch import workshop
@@ -17,6 +18,7 @@ from tetlux.cases.batch.engine import run_batch, worker_count
 from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
 from tetlux.cases.batch.requests import load_all
 from tetlux.cases.file.case import Case
+from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.errors import InputError, RunError
@@ -70,7 +72,7 @@ def test_a_run_of_a_batch_finds_what_it_finds_alone(finished: Path) -> None:
         (alone,) = solve_each(case.surface, case.medium, [list(case.lights)], tolerance=0.01)
         (channel,) = summaries(finished / "out")[Path(case.name).name]["channels"]
         assert channel["power"]["exited"] == pytest.approx(alone.power.exited, rel=0.01)
-        assert channel["exitance"]["max"] == pytest.approx(alone.exitance_at([[0, 0, 10]])[0], rel=0.02)
+        assert channel["exitance"]["max"] == pytest.approx(alone.exitance_at(np.array([[0.0, 0.0, 10.0]]))[0], rel=0.02)
 
 
 def test_resume_keeps_what_is_finished_and_runs_what_has_changed(finished: Path, tmp_path: Path) -> None:
@@ -110,7 +112,7 @@ def test_content_is_that_of_files_and_not_their_names(tmp_path: Path) -> None:
 
 
 def test_one_failing_run_does_not_end_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    finish = workshop.finish_case
+    finish = finish_case
 
     def fail_twice(case: Case, *rest: Any, **options: Any) -> Any:
         if "0.012" in case.name:

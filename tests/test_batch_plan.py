@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from tetlux.cases.batch.grouping import OTHER_DEPTH, make_plan, spread
+from tetlux.cases.batch.grouping import make_plan, spread
 from tetlux.cases.batch.jobs import MeshData, MeshJob, MeshMade, MeshNotMade, SolveJob
 from tetlux.cases.batch.mesh_store import MeshStore
 from tetlux.cases.batch.requests import load_all
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
+from tetlux.fem.known.kept_fits import OTHER_DEPTH
 from tetlux.meshing import sphere
 from tetlux.meshing.mesher.api import tetrahedralize
 

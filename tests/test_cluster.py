@@ -37,9 +37,13 @@ def channels(out: Path) -> dict[str, Any]:
 
 
 def start(*arguments: str) -> "subprocess.Popen[bytes]":
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     one_thread = dict.fromkeys(("TETLUX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
-    return subprocess.Popen([sys.executable, "-m", *arguments], env={**os.environ, **one_thread}, **silent)
+    return subprocess.Popen(
+        [sys.executable, "-m", *arguments],
+        env={**os.environ, **one_thread},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
 
 
 @pytest.fixture(scope="module")

@@ -41,19 +41,19 @@ def play(display: Listener, clock: Clock, between: Callable[[], None] = lambda: 
     display(BatchStarted(names, Path("out"), 2, ("a.yaml",) * 1000))
     for number in range(5):
         display(RunFinished(number, names[number], Path("out"), {}, 0.0, kept=True))
-    display(MeshStarted(0, 1000, "worker 1"))
+    display(MeshStarted(0, 1000, "1"))
     clock.now += 2.0
-    display(MeshFinished(0, 5000, 2.0, "worker 1"))
+    display(MeshFinished(0, 5000, 2.0, "1"))
     for number in range(5, 45):
-        display(RunStarted(number, names[number], "worker 1"))
+        display(RunStarted(number, names[number], "1"))
         clock.now += 0.45
         if number % 10 == 9:
-            display(RunFailed(number, names[number], "the mesher failed.", 0.4, "worker 1"))
+            display(RunFailed(number, names[number], "the mesher failed.", 0.4, "1"))
         else:
             notes = (Note("thin", f"it is {number} mm thin."),) if number < 20 else ()
-            display(RunFinished(number, names[number], Path("out"), {}, 0.4, "worker 1", notes=notes))
-    display(WorkerLost("worker 2", "it was killed", (45,)))
-    display(RunStarted(45, names[45], "worker 2"))
+            display(RunFinished(number, names[number], Path("out"), {}, 0.4, "1", notes=notes))
+    display(WorkerLost("2", "it was killed", (45,)))
+    display(RunStarted(45, names[45], "2"))
     clock.now += 0.0
     between()
     display(BatchEnded(36, 4, 5, 955, 20.0, "interrupted"))
@@ -67,7 +67,7 @@ def test_progress_counts_runs_and_foresees_the_end() -> None:
     assert progress.seconds == pytest.approx(20.0)
     assert progress.rate == pytest.approx(2.0)
     assert progress.seconds_left == pytest.approx(955 / 2)
-    assert progress.working == {"worker 2": ("a/x=45", clock.now)}
+    assert progress.working == {"2": ("a/x=45", clock.now)}
     assert progress.describe() == (
         "41 of 1,000 runs done (5 kept), 4 failed, 955 left, 2 runs/s, 7 min 58 s to go"
     )  # fmt: skip
@@ -112,7 +112,7 @@ def test_plain_lines_come_every_few_seconds_and_failures_at_the_end(capsys: pyte
     shown = capsys.readouterr()
     text = "".join(printed) + shown.out
     assert text.startswith("1,000 runs in 2 worker processes, written to out\n")
-    assert "worker worker 2 is lost: it was killed; its runs are done again\n" in text
+    assert "worker 2 is lost: it was killed; its runs are done again\n" in text
     assert "\n41 of 1,000 runs done (5 kept), 4 failed, 955 left, 2 runs/s, 7 min 58 s to go\n" in text
     assert "to go; interrupted after 20 s\n" in shown.out
     assert (

@@ -1,6 +1,7 @@
 """A rasterizer with a depth buffer: which triangle is visible at each sample of a picture.
 
-It is in double precision and takes as long as VTK needs to start: 0.1 s for 10,000 triangles, 0.4 s for 100,000.
+It is in double precision, and takes 0.2 s of CPU for 10,000 triangles and 0.7 s for 80,000 on a busy machine, where VTK
+takes some 3 s in a process of its own.
 """
 
 from dataclasses import dataclass

@@ -2,6 +2,7 @@
 
 solution  `ChargeSolution`
 solve     makes one from a body, its media and lights
+reading_error  errors of what is read of one
 """
 
 from tetlux.fem.meshless.solution import ChargeSolution

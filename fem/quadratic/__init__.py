@@ -15,5 +15,7 @@ the boundary and of interfaces are bent onto the true surface, and with them the
     operator            the matrix with its solver, and the dual solutions of measurements
     solution            the fluence of lights, and measurements of it
     recovered_gradient  the difference between averaged and own gradients (Zienkiewicz & Zhu 1987)
+    reading_error       a reading, and the contribution of each tetrahedron to its error
     error               the error of a reading, by its dual solution
+    field_error         errors at almost every point of the surface and inside, by duals of random signs
 """

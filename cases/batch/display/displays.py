@@ -150,14 +150,16 @@ class LiveDisplay(PlainDisplay):
             Text(f"{progress.failed:,} failed", style="red" if progress.failed else ""),
             Text(f"{progress.left:,} left"),
             Text("" if progress.rate is None else describe_rate(progress.rate)),
-            Text("" if progress.seconds_left is None else f"{describe_seconds(progress.seconds_left)} to go"),
+            Text(f"{describe_seconds(progress.seconds_left)} to go" if progress.seconds_left else ""),
         ]
         head.add_row(*cells)
         workers = Table.grid(padding=(0, 2))
         now = progress.clock()
         for worker, (what, since) in sorted(dict(progress.working).items()):
-            workers.add_row(Text(worker or "working on"), Text(what, overflow="ellipsis", no_wrap=True),
-                            Text(describe_seconds(now - since)))  # fmt: skip
+            who = f"worker {worker}" if worker else "at work on"
+            workers.add_row(
+                Text(who), Text(what, overflow="ellipsis", no_wrap=True), Text(describe_seconds(now - since))
+            )
         return Group(head, workers)
 
 
