@@ -8,7 +8,14 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
-from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
+from tetlux.fem.grading import (
+    LONGEST_EDGE,
+    LONGEST_IF_FITTED,
+    grade_between,
+    grade_mesh,
+    layer_heights,
+    places_to_resolve,
+)
 from tetlux.fem.known.split import Sources
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
@@ -19,6 +26,7 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution
 from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
+from tetlux.meshing.tets.layers import LayeredMesh, add_layers
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
 
@@ -50,20 +58,20 @@ class Tolerances:
     readings: float | None = None
     placed: tuple[PlacedDetector, ...] = ()
 
-    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
-        """Compare the errors of solutions on one mesh with the tolerances."""
-        splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
+    def assess(self, steps: Sequence[MeshSolution], parents: IntArray) -> "Assessment":
+        """Compare the errors of solutions on one mesh with the tolerances; see `LayeredMesh` for `parents`."""
+        splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
             largest_ratio = error / self.exitance
-            splits += cells_to_split((step.estimate for step in steps), self.exitance)
+            splits += cells_to_split((step.estimate.sum_by(parents) for step in steps), self.exitance)
         if self.readings is not None:
             readings = [reading for step in steps for reading in self._read(step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
-            splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
+            np.maximum.at(splits, parents, splits_for_readings(readings, self.readings, len(parents)))
         return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
@@ -83,7 +91,7 @@ class Assessment:
     largest_error_ratio : float
         The largest ratio of an estimated error to its tolerance.
     splits : (m,) ndarray of int
-        How often to split each tetrahedron.
+        How often to split each tetrahedron of the mesh without layers.
     summary : str
         The errors, in a few words.
     """
@@ -124,6 +132,13 @@ class Problem:
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
         return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
+
+    def layers_on(self, mesh: TetMesh, tolerance: float) -> LayeredMesh:
+        """A mesh with layers of flat tetrahedra below lit parts of the surface."""
+        deposits = [deposit for sources in self.sources for deposit in sources.deposits]
+        if not any(len(deposit.hints.lit) for deposit in deposits):
+            return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
+        return add_layers(mesh, layer_heights(mesh, deposits, tolerance))
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
@@ -204,23 +219,27 @@ def solve_and_refine(
     # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
     bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
-    solve_on = problem.solver_on(mesh)
+    layered = _with_layers(mesh, problem, tolerances, most_tetrahedra)
+    solve_on = problem.solver_on(layered.mesh)
     steps = best_steps = {first: solve_on(first, None)}
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = tolerances.assess(list(steps.values()))
+            found = tolerances.assess(list(steps.values()), layered.parents)
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
-        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
+        report(f"solved on {len(layered.mesh.tetrahedra):,} tetrahedra: {found.summary}")
         fine_enough = not found.splits.any()
-        if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
+        if not fine_enough and len(layered.mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
                 scenes = problem.scenes
                 finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
-            if len(finer.tetrahedra) <= most_tetrahedra:
-                mesh, solve_on = finer, problem.solver_on(finer)
-                steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
+                finer_layered = _with_layers(finer, problem, tolerances, most_tetrahedra)
+            if len(finer_layered.mesh.tetrahedra) <= most_tetrahedra:
+                # A mesh with layers is no refinement of another one.
+                refines = layered.mesh is mesh and finer_layered.mesh is finer
+                mesh, layered, solve_on = finer, finer_layered, problem.solver_on(finer_layered.mesh)
+                steps = {scene: solve_on(scene, step if refines else None) for scene, step in steps.items()}
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
@@ -228,3 +247,11 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
+
+
+def _with_layers(mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int) -> LayeredMesh:
+    """The mesh with layers; without any if it is to be used as it is."""
+    tolerance = tolerances.exitance or tolerances.readings
+    if most_tetrahedra == 0 or tolerance is None:
+        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
+    return problem.layers_on(mesh, tolerance)

@@ -1,4 +1,4 @@
-"""The first mesh: fine enough near sources for its error to be estimated at all."""
+"""The first mesh: fine enough near sources for its error to be estimated at all; and layers below lit surfaces."""
 
 from collections.abc import Sequence
 
@@ -11,6 +11,7 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
@@ -29,6 +30,11 @@ LONGEST_EDGE = 1.0
 # Where charges are fitted the error needs no such edges, but values at nodes should show the light: 10 to 60 % more
 # nodes than the mesher's own.
 LONGEST_IF_FITTED = 1.5
+# Height of the first layer of tetrahedra below a lit surface at a tolerance of .02, in depths over which the light
+# fades to 1/e. The error is proportional to its square.
+FIRST_LAYER, AT_LAYER_TOLERANCE = 0.2, 0.02
+# A boundary node within this many times the spacing of the lit places, or within its longest edge, is lit.
+LIT_WITHIN = 2.0
 
 
 def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
@@ -102,6 +108,32 @@ def grade_mesh(
         if len(finer.tetrahedra) > most:
             return mesh
         mesh = finer
+
+
+def layer_heights(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> FloatArray:
+    """Height of the first layer below each boundary node, (b,), unit; inf where no light fades below the surface.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    deposits : sequence of Deposit
+    tolerance : float
+        Wanted error of the exitance.
+    """
+    heights = np.full(len(mesh.boundary_nodes), np.inf)
+    share = FIRST_LAYER * np.sqrt(tolerance / AT_LAYER_TOLERANCE)
+    reach = np.zeros(len(heights))
+    corners = mesh.boundary_triangles
+    np.maximum.at(reach, corners, longest_sides(mesh.boundary_points[corners])[:, None])
+    for hints in (deposit.hints for deposit in deposits):
+        if len(hints.lit) == 0:
+            continue
+        tree = cKDTree(hints.lit)
+        spacing = float(np.median(tree.query(hints.lit, k=[2])[0])) if len(hints.lit) > 1 else 0.0
+        distance, nearest = tree.query(mesh.boundary_points, workers=THREADS)
+        lit = distance <= np.maximum(reach, LIT_WITHIN * spacing)
+        heights[lit] = np.minimum(heights[lit], share * hints.depths[nearest[lit]])
+    return heights
 
 
 def grade_between(

@@ -7,6 +7,7 @@ import numpy as np
 from tetlux.fem.error.estimate import Estimate, estimate_error
 from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 
 
@@ -46,9 +47,23 @@ def estimate_by_operator(
                 emission,
                 inner,
                 operator.fitting,
+                _fixed_share([loads[light] for light in own], [of_lights[light] for light in own]),
             )
         )
     return Estimate(
         np.sum([each.exitance_indicators for each in estimates], axis=0),
         np.sum([each.power_indicators for each in estimates], axis=0),
     )
+
+
+def _fixed_share(loads: Sequence[Load], of_lights: Sequence[Solution]) -> float | FloatArray:
+    """The part of the light at each tetrahedron that does not come from beams, which start at the facets of a mesh."""
+    beams = [len(load.deposit.terms.segments) > 0 for load in loads]
+    if not any(beams):
+        return 1.0
+    if all(beams):
+        return 0.0
+    mesh = of_lights[0].mesh
+    whole = sum(np.abs(solution.fluence) for solution in of_lights)
+    fixed = sum(np.abs(solution.fluence) for solution, beam in zip(of_lights, beams, strict=True) if not beam)
+    return np.asarray(np.sum(fixed[mesh.tetrahedra], axis=1) / np.maximum(np.sum(whole[mesh.tetrahedra], axis=1), 1e-300))

@@ -34,7 +34,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
@@ -66,6 +66,12 @@ class Estimate:
         """Relative L2 error of the exitance over the surface."""
         return float(self.exitance_indicators.sum())
 
+    def sum_by(self, parents: IntArray) -> "Estimate":
+        """Add up the indicators of tetrahedra that have a common parent (m,)."""
+        return Estimate(
+            np.bincount(parents, self.exitance_indicators), np.bincount(parents, self.power_indicators)
+        )
+
     __repr__ = one_line
 
 
@@ -78,6 +84,7 @@ def estimate_error(
     emission: float | FloatArray = 0.0,
     inner: Sequence[Surface] = (),
     fitting: LayerFitting | None = None,
+    fixed_share: float | FloatArray = 1.0,
 ) -> Estimate:
     """Estimate the error of a solution, or of a part of one.
 
@@ -98,6 +105,9 @@ def estimate_error(
         Of the regions of the mesh.
     fitting : LayerFitting, optional
         Of the matrix.
+    fixed_share : float or (m,) ndarray
+        The part of the light in each tetrahedron whose sources stay where they are if a facet of the boundary moves;
+        beams start at the facets.
 
     Returns
     -------
@@ -131,7 +141,7 @@ def estimate_error(
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
         values = remainder, outward_flux, dual
         indicators += FACET_WEIGHT * boundary_facets(
-            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale * fixed_share
         )
         indicators += interface_layers(mesh, coefficients, smooth, at_corners)
         return indicators + FACET_WEIGHT * interface_facets(

@@ -1,0 +1,254 @@
+"""Layers of flat tetrahedra along the boundary, for what varies across the boundary far more than along it.
+
+The tetrahedra of a mesh are pressed inwards, and the space under each boundary triangle is filled with prisms, each cut
+into three tetrahedra. Every boundary node has a column of nodes under it, in distances that grow from the boundary
+inwards, until layers are as high as the triangles are wide.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import cg
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.thickness import thickness
+
+# Each layer is this many times as high as the one above it.
+GROWTH = 1.5
+# Layers end where they would be higher than this many edges of the boundary triangles around a node.
+HIGHEST = 0.7
+# All layers together are at most this share of the local thickness of the body, ...
+LARGEST_SHARE = 0.25
+# ... and their depth changes by at most this much over a unit of length along the boundary.
+STEEPEST = 0.4
+# Where layers of less than this many times the first layer's height have room, there is none.
+LEAST_DEPTH = 0.3
+# Displacements of nodes inside are shortened where a tetrahedron would keep less than this share of its volume, or get
+# a quality below the second value and below the third share of what it had.
+LEAST_VOLUME, LEAST_QUALITY, LEAST_QUALITY_SHARE = 0.1, 0.04, 0.3
+# Shortened displacements differ along an edge by at most this share of its length more than they did.
+SHORTENING = 0.3
+# Shortenings by half before displacements are given up, and after that.
+HALVINGS, MOST_SHORTENINGS = 20, 60
+# The displacements within the body are smooth, and need no accuracy.
+SMOOTHING = {"rtol": 1e-2, "maxiter": 100}
+
+
+@dataclass(frozen=True, eq=False)
+class LayeredMesh:
+    """A mesh with layers.
+
+    Attributes
+    ----------
+    mesh : TetMesh
+        The nodes and tetrahedra of the mesh without layers come first.
+    parents : (m,) ndarray of int
+        The tetrahedron of the mesh without layers that each is, or that each lies over.
+    """
+
+    mesh: TetMesh
+    parents: IntArray
+
+
+def add_layers(mesh: TetMesh, heights: FloatArray) -> LayeredMesh:
+    """Add layers along the boundary of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    heights : (b,) ndarray
+        Height of the first layer at each boundary node, unit; inf where none is wanted.
+
+    Returns
+    -------
+    LayeredMesh
+        With the same boundary triangles. Interfaces between regions stay where they are.
+    """
+    columns = _columns(mesh, heights)
+    if columns is None:
+        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
+    corners, faces = _fill(mesh, columns)
+    parents = np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[faces]])
+    layered = replace(
+        mesh,
+        points=np.concatenate([columns.moved, columns.points]),
+        tetrahedra=np.concatenate([mesh.tetrahedra, corners]),
+        regions=mesh.regions[parents] if mesh.regions.any() else np.broadcast_to(np.int64(0), len(parents)),
+    )
+    return LayeredMesh(layered, parents)
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Columns of nodes under the boundary nodes of a mesh.
+
+    Attributes
+    ----------
+    moved : (n, 3) ndarray
+        The nodes of the mesh, pressed inwards: those of the boundary are the deepest of their columns.
+    layers : (b,) ndarray of int
+        Number of layers in each column.
+    points : (c, 3) ndarray
+        The other nodes of the columns, from the boundary inwards.
+    """
+
+    moved: FloatArray
+    layers: IntArray
+    points: FloatArray
+
+    def node(self, mesh: TetMesh, column: IntArray, level: IntArray) -> IntArray:
+        """Numbers of the nodes at given levels of columns, 0 at the boundary."""
+        first = len(mesh.points) + np.cumsum(self.layers) - self.layers
+        return np.where(level == self.layers[column], mesh.boundary_nodes[column], first[column] + level)
+
+
+def _columns(mesh: TetMesh, heights: FloatArray) -> _Columns | None:
+    """The columns that have room; None if there are none."""
+    depths = _wanted_depths(mesh, heights)
+    if not depths.any():
+        return None
+    nodes, normals = mesh.boundary_nodes, _node_normals(mesh)
+    kept = np.zeros(len(mesh.points), dtype=bool)
+    kept[mesh.interfaces[0]] = True
+    depths[kept[nodes]] = 0.0
+    steps = np.zeros(mesh.points.shape)
+    steps[nodes] = -depths[:, None] * normals
+    kept[nodes] = True
+    steps = _shorten(mesh, _spread(mesh, steps, kept))
+    depths = np.linalg.norm(steps[nodes], axis=1)
+    some = depths > LEAST_DEPTH * heights
+    layers = np.zeros(len(nodes), dtype=np.int64)
+    exact = np.log1p((GROWTH - 1.0) * depths[some] / heights[some]) / np.log(GROWTH)
+    layers[some] = np.maximum(np.round(exact), 1)
+    steps[nodes[~some]] = 0.0
+    column = np.repeat(np.arange(len(nodes)), layers)
+    level = _ranks(layers)
+    shares = (GROWTH**level - 1.0) / (GROWTH ** layers[column] - 1.0)
+    points = mesh.points[nodes[column]] + shares[:, None] * steps[nodes[column]]
+    return _Columns(mesh.points + steps, layers, points)
+
+
+def _ranks(counts: IntArray) -> IntArray:
+    """0, 1, ... for each of several groups of given sizes."""
+    return np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _wanted_depths(mesh: TetMesh, heights: FloatArray) -> FloatArray:
+    """Depth of all layers together at each boundary node, (b,), unit; 0 where there are none."""
+    wanted = np.isfinite(heights)
+    depths = np.zeros(len(heights))
+    if not wanted.any():
+        return depths
+    corners = mesh.boundary_triangles
+    tail, head = np.concatenate([corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]).T
+    length = np.linalg.norm(mesh.boundary_points[tail] - mesh.boundary_points[head], axis=1)
+    width = np.bincount(tail, length) / np.bincount(tail)
+    highest = np.maximum(HIGHEST * width[wanted] / heights[wanted], 1.0)
+    layers = np.ceil(np.log(highest) / np.log(GROWTH))
+    depths[wanted] = heights[wanted] * (GROWTH**layers - 1.0) / (GROWTH - 1.0)
+    thin = np.full(len(heights), np.inf)
+    np.minimum.at(thin, corners, thickness(mesh)[:, None])
+    depths = np.minimum(depths, LARGEST_SHARE * thin)
+    return _flatten(depths, np.column_stack([tail, head]), STEEPEST * length)
+
+
+def _flatten(values: FloatArray, edges: IntArray, steps: FloatArray) -> FloatArray:
+    """Lower values at nodes (n,) until they differ by at most the steps (e,) along edges (e, 2)."""
+    values = values.copy()
+    while True:
+        before = values.copy()
+        for first, second in (edges.T, edges.T[::-1]):
+            np.minimum.at(values, first, before[second] + steps)
+        if np.array_equal(values, before):
+            return values
+
+
+def _node_normals(mesh: TetMesh) -> FloatArray:
+    """Outward unit normals at the boundary nodes, (b, 3): means over the triangles, weighted by their angles."""
+    corners = mesh.boundary_points[mesh.boundary_triangles]
+    total = np.zeros((len(mesh.boundary_nodes), 3))
+    for corner in range(3):
+        first, second = (corners[:, (corner + side) % 3] - corners[:, corner] for side in (1, 2))
+        angle = np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), np.einsum("ij,ij->i", first, second))
+        for axis in range(3):
+            weights = angle * mesh.surface.normals[:, axis]
+            total[:, axis] += np.bincount(mesh.boundary_triangles[:, corner], weights, minlength=len(total))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(total / np.where(length > 0, length, 1.0))
+
+
+def _spread(mesh: TetMesh, steps: FloatArray, fixed: BoolArray) -> FloatArray:
+    """Displacements of all nodes (n, 3): given ones where fixed (n,), elsewhere means of those around."""
+    first, second = mesh.edges.T
+    count, weights = len(mesh.points), mesh.edge_lengths**-2.0
+    ends = np.concatenate([first, second]), np.concatenate([second, first])
+    joined = coo_array((np.concatenate([weights, weights]), ends), shape=(count, count)).tocsr()
+    total = np.asarray(joined.sum(axis=1)).ravel()
+    free = np.flatnonzero(~fixed)
+    result = np.where(fixed[:, None], steps, 0.0)
+    if len(free) == 0:
+        return result
+    load = joined[free] @ result
+    matrix = (diags_array(total[free]) - joined[free][:, free]).tocsr()
+    precondition = diags_array(1.0 / total[free])
+    result[free] = np.column_stack([cg(matrix, axis, M=precondition, **SMOOTHING)[0] for axis in load.T])
+    return result
+
+
+def _shorten(mesh: TetMesh, steps: FloatArray) -> FloatArray:
+    """Shorten displacements (n, 3) where they would flatten tetrahedra, and less and less around these places."""
+    size = np.linalg.norm(steps, axis=1)
+    if not size.any():
+        return steps
+    larger = size[mesh.edges].max(axis=1)
+    slack = SHORTENING * mesh.edge_lengths / np.where(larger > 0, larger, 1.0)
+    lowest = np.minimum(LEAST_QUALITY, LEAST_QUALITY_SHARE * mesh.quality)
+    share = np.ones(len(steps))
+    for attempt in range(MOST_SHORTENINGS):
+        moved = mesh.points + share[:, None] * steps
+        flat = tetrahedron_volumes(moved, mesh.tetrahedra) < LEAST_VOLUME * mesh.volumes
+        sound = np.flatnonzero(~flat)
+        if len(sound) > 0:
+            flat[sound] = TetMesh(moved, mesh.tetrahedra[sound]).quality < lowest[sound]
+        if not flat.any():
+            return share[:, None] * steps
+        share[np.unique(mesh.tetrahedra[flat])] *= 0.5 if attempt < HALVINGS else 0.0
+        share = _flatten(share, mesh.edges, slack)
+    return np.zeros(steps.shape)
+
+
+def _fill(mesh: TetMesh, columns: _Columns) -> tuple[IntArray, IntArray]:
+    """Fill the columns under each boundary triangle: tetrahedra (c, 4), and the triangle that each lies under, (c,).
+
+    From the boundary inwards, one of the three nodes of the lowest triangle goes on to the next level of its column,
+    which cuts off one tetrahedron. Triangles agree on the order in which two columns go on, by level, and within a
+    level by number. That order is turned around at every second level: else all of a column's light would be
+    deposited too low, and all of another's too high.
+    """
+    triangles = mesh.boundary_triangles
+    counts = columns.layers[triangles]
+    steps = []
+    for corner in range(3):
+        face = np.repeat(np.arange(len(triangles)), counts[:, corner])
+        steps.append(np.column_stack([face, np.full(len(face), corner), _ranks(counts[:, corner]) + 1]))
+    face, corner, level = np.concatenate(steps).T
+    column = triangles[face, corner]
+    turn = np.where(level % 2 == 1, 1, -1)
+    order = np.lexsort((turn * _shuffled(len(columns.layers))[column], level, face))
+    face, corner, level, column = face[order], corner[order], level[order], column[order]
+    total = counts.sum(axis=1)
+    start = np.repeat(np.cumsum(total) - total, total)
+    lowest = []
+    for place in range(3):
+        made = np.concatenate([[0], np.cumsum(corner == place)])[:-1]
+        lowest.append(columns.node(mesh, triangles[face, place], made - made[start]))
+    # Boundary triangles are anticlockwise seen from outside, tetrahedra from within.
+    return np.column_stack([lowest[0], lowest[2], lowest[1], columns.node(mesh, column, level)]), face
+
+
+def _shuffled(count: int) -> IntArray:
+    """The numbers 0 to count - 1 in an order that has nothing to do with where nodes are; always the same."""
+    return np.random.default_rng(0).permutation(count)
