@@ -13,7 +13,7 @@ from tetlux.fem.grading import (
     LONGEST_IF_FITTED,
     grade_between,
     grade_mesh,
-    layer_heights,
+    layer_sizes,
     places_to_resolve,
 )
 from tetlux.fem.known.split import Sources
@@ -138,7 +138,7 @@ class Problem:
         deposits = [deposit for sources in self.sources for deposit in sources.deposits]
         if not any(len(deposit.hints.lit) for deposit in deposits):
             return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
-        return add_layers(mesh, layer_heights(mesh, deposits, tolerance))
+        return add_layers(mesh, *layer_sizes(mesh, deposits, tolerance))
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""

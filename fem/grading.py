@@ -33,6 +33,8 @@ LONGEST_IF_FITTED = 1.5
 # Height of the first layer of tetrahedra below a lit surface at a tolerance of .02, in depths over which the light
 # fades to 1/e. The error is proportional to its square.
 FIRST_LAYER, AT_LAYER_TOLERANCE = 0.2, 0.02
+# Depth of all layers together, at least, in depths over which the light fades to 1/e.
+LAYERS_REACH = 3.0
 # A boundary node within this many times the spacing of the lit places, or within its longest edge, is lit.
 LIT_WITHIN = 2.0
 
@@ -110,8 +112,10 @@ def grade_mesh(
         mesh = finer
 
 
-def layer_heights(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> FloatArray:
-    """Height of the first layer below each boundary node, (b,), unit; inf where no light fades below the surface.
+def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> tuple[FloatArray, FloatArray]:
+    """Height of the first layer below each boundary node, (b,), and least depth of all layers together, (b,), unit.
+
+    The height is inf, and the depth 0, where no light fades below the surface.
 
     Parameters
     ----------
@@ -120,7 +124,7 @@ def layer_heights(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) 
     tolerance : float
         Wanted error of the exitance.
     """
-    heights = np.full(len(mesh.boundary_nodes), np.inf)
+    heights, least_depths = np.full(len(mesh.boundary_nodes), np.inf), np.zeros(len(mesh.boundary_nodes))
     share = FIRST_LAYER * np.sqrt(tolerance / AT_LAYER_TOLERANCE)
     reach = np.zeros(len(heights))
     corners = mesh.boundary_triangles
@@ -133,7 +137,8 @@ def layer_heights(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) 
         distance, nearest = tree.query(mesh.boundary_points, workers=THREADS)
         lit = distance <= np.maximum(reach, LIT_WITHIN * spacing)
         heights[lit] = np.minimum(heights[lit], share * hints.depths[nearest[lit]])
-    return heights
+        least_depths[lit] = np.maximum(least_depths[lit], LAYERS_REACH * hints.depths[nearest[lit]])
+    return heights, least_depths
 
 
 def grade_between(

@@ -29,6 +29,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 DEPTH_SAMPLES = 64
 # Barycentric coordinates of the points of a facet at which light on the whole body is sampled: exact for quadratics.
 CORNER_RULE = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0
+# A facet whose normal differs from one at a corner by an angle of less than this cosine is at a crease.
+LEAST_BEND_COSINE = 0.9
 # Arrows of light on the whole body in pictures.
 ARROWS = 3
 
@@ -159,7 +161,7 @@ class CollimatedBeam:
         if self.spot is None:
             facets, places = np.repeat(facets, 3), 3 * np.repeat(facets, 3) + np.tile(np.arange(3), len(facets))
             points = (CORNER_RULE @ corners).reshape(-1, 3)
-            powers = np.repeat(-area_vectors(corners) @ direction / 3.0, 3)
+            powers = ((-area_vectors(corners) @ direction)[:, None] * _shares(mesh, facets[::3], direction)).ravel()
             reach = np.full(len(points), np.inf)
         else:
             whole = corners
@@ -189,6 +191,20 @@ class CollimatedBeam:
         if self.from_center:
             reach = (points - np.asarray(spot.center, dtype=float)) @ direction
         return points, -brightness * (area_vectors(corners) @ direction), reach
+
+
+def _shares(mesh: TetMesh, facets: IntArray, direction: FloatArray) -> FloatArray:
+    """Shares of the three points of `CORNER_RULE` in the power on facets (f,), (f, 3).
+
+    On a curved surface they differ, by the cosine of incidence between the normals at the corners.
+    """
+    at_corners = mesh.boundary_normals[mesh.boundary_triangles[facets]]
+    flat = mesh.surface.normals[facets]
+    smooth = np.einsum("fci,fi->fc", at_corners, flat).min(axis=1) > LEAST_BEND_COSINE
+    cosine = np.maximum(-CORNER_RULE @ (at_corners @ direction)[:, :, None], 0.0)[:, :, 0]
+    total = cosine.sum(axis=1, keepdims=True)
+    even = ~smooth[:, None] | (total <= 0)
+    return np.where(even, 1.0 / 3.0, cosine / np.where(even, 1.0, total))
 
 
 def _nearest_corner(corners: FloatArray, points: FloatArray) -> IntArray:

@@ -53,7 +53,7 @@ class LayeredMesh:
     parents: IntArray
 
 
-def add_layers(mesh: TetMesh, heights: FloatArray) -> LayeredMesh:
+def add_layers(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> LayeredMesh:
     """Add layers along the boundary of a mesh.
 
     Parameters
@@ -61,13 +61,15 @@ def add_layers(mesh: TetMesh, heights: FloatArray) -> LayeredMesh:
     mesh : TetMesh
     heights : (b,) ndarray
         Height of the first layer at each boundary node, unit; inf where none is wanted.
+    least_depths : (b,) ndarray
+        Depth that all layers together have to have, where the body is thick enough, unit.
 
     Returns
     -------
     LayeredMesh
         With the same boundary triangles. Interfaces between regions stay where they are.
     """
-    columns = _columns(mesh, heights)
+    columns = _columns(mesh, heights, least_depths)
     if columns is None:
         return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
     corners, faces = _fill(mesh, columns)
@@ -105,12 +107,13 @@ class _Columns:
         return np.where(level == self.layers[column], mesh.boundary_nodes[column], first[column] + level)
 
 
-def _columns(mesh: TetMesh, heights: FloatArray) -> _Columns | None:
+def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> _Columns | None:
     """The columns that have room; None if there are none."""
-    depths = _wanted_depths(mesh, heights)
+    growing = _growing_layers(mesh, heights)
+    depths = _wanted_depths(mesh, heights, growing, least_depths)
     if not depths.any():
         return None
-    nodes, normals = mesh.boundary_nodes, _node_normals(mesh)
+    nodes, normals = mesh.boundary_nodes, mesh.boundary_normals
     kept = np.zeros(len(mesh.points), dtype=bool)
     kept[mesh.interfaces[0]] = True
     depths[kept[nodes]] = 0.0
@@ -121,12 +124,10 @@ def _columns(mesh: TetMesh, heights: FloatArray) -> _Columns | None:
     depths = np.linalg.norm(steps[nodes], axis=1)
     some = depths > LEAST_DEPTH * heights
     layers = np.zeros(len(nodes), dtype=np.int64)
-    exact = np.log1p((GROWTH - 1.0) * depths[some] / heights[some]) / np.log(GROWTH)
-    layers[some] = np.maximum(np.round(exact), 1)
+    layers[some] = _number(depths[some] / heights[some], growing[some])
     steps[nodes[~some]] = 0.0
     column = np.repeat(np.arange(len(nodes)), layers)
-    level = _ranks(layers)
-    shares = (GROWTH**level - 1.0) / (GROWTH ** layers[column] - 1.0)
+    shares = _reached(_ranks(layers), growing[column]) / _reached(layers[column], growing[column])
     points = mesh.points[nodes[column]] + shares[:, None] * steps[nodes[column]]
     return _Columns(mesh.points + steps, layers, points)
 
@@ -136,23 +137,46 @@ def _ranks(counts: IntArray) -> IntArray:
     return np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _wanted_depths(mesh: TetMesh, heights: FloatArray) -> FloatArray:
+def _growing_layers(mesh: TetMesh, heights: FloatArray) -> FloatArray:
+    """How many layers grow in each column (b,), until they are as high as the triangles are wide."""
+    corners = mesh.boundary_triangles
+    length = np.linalg.norm(mesh.boundary_points[corners] - mesh.boundary_points[corners[:, [1, 2, 0]]], axis=2)
+    width = np.bincount(corners.ravel(), length.ravel()) / np.bincount(corners.ravel())
+    return np.asarray(np.ceil(np.log(np.maximum(HIGHEST * width / heights, 1.0)) / np.log(GROWTH)))
+
+
+def _reached(layers: FloatArray, growing: FloatArray) -> FloatArray:
+    """Depth of so many layers, the first of which grow, over the height of the first."""
+    grown = np.minimum(layers, growing)
+    highest = GROWTH ** np.maximum(growing - 1.0, 0.0)
+    return np.asarray((GROWTH**grown - 1.0) / (GROWTH - 1.0) + highest * (layers - grown))
+
+
+def _number(depths: FloatArray, growing: FloatArray) -> IntArray:
+    """How many layers reach a depth, over the height of the first, about; at least one."""
+    grown = np.minimum(np.log1p((GROWTH - 1.0) * depths) / np.log(GROWTH), growing)
+    highest = GROWTH ** np.maximum(growing - 1.0, 0.0)
+    rest = np.maximum(depths - _reached(grown, growing), 0.0) / highest
+    return np.maximum(np.round(grown + rest), 1).astype(np.int64)
+
+
+def _wanted_depths(
+    mesh: TetMesh, heights: FloatArray, growing: FloatArray, least_depths: FloatArray
+) -> FloatArray:
     """Depth of all layers together at each boundary node, (b,), unit; 0 where there are none."""
-    wanted = np.isfinite(heights)
     depths = np.zeros(len(heights))
+    wanted = np.isfinite(heights) & (growing > 0)
     if not wanted.any():
         return depths
-    corners = mesh.boundary_triangles
-    tail, head = np.concatenate([corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])]).T
-    length = np.linalg.norm(mesh.boundary_points[tail] - mesh.boundary_points[head], axis=1)
-    width = np.bincount(tail, length) / np.bincount(tail)
-    highest = np.maximum(HIGHEST * width[wanted] / heights[wanted], 1.0)
-    layers = np.ceil(np.log(highest) / np.log(GROWTH))
-    depths[wanted] = heights[wanted] * (GROWTH**layers - 1.0) / (GROWTH - 1.0)
+    reached = _reached(growing[wanted], growing[wanted]) * heights[wanted]
+    depths[wanted] = np.maximum(reached, least_depths[wanted])
     thin = np.full(len(heights), np.inf)
-    np.minimum.at(thin, corners, thickness(mesh)[:, None])
+    np.minimum.at(thin, mesh.boundary_triangles, thickness(mesh)[:, None])
     depths = np.minimum(depths, LARGEST_SHARE * thin)
-    return _flatten(depths, np.column_stack([tail, head]), STEEPEST * length)
+    corners = mesh.boundary_triangles
+    edges = np.concatenate([corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
+    length = np.linalg.norm(np.diff(mesh.boundary_points[edges], axis=1)[:, 0], axis=1)
+    return _flatten(depths, edges, STEEPEST * length)
 
 
 def _flatten(values: FloatArray, edges: IntArray, steps: FloatArray) -> FloatArray:
@@ -164,20 +188,6 @@ def _flatten(values: FloatArray, edges: IntArray, steps: FloatArray) -> FloatArr
             np.minimum.at(values, first, before[second] + steps)
         if np.array_equal(values, before):
             return values
-
-
-def _node_normals(mesh: TetMesh) -> FloatArray:
-    """Outward unit normals at the boundary nodes, (b, 3): means over the triangles, weighted by their angles."""
-    corners = mesh.boundary_points[mesh.boundary_triangles]
-    total = np.zeros((len(mesh.boundary_nodes), 3))
-    for corner in range(3):
-        first, second = (corners[:, (corner + side) % 3] - corners[:, corner] for side in (1, 2))
-        angle = np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), np.einsum("ij,ij->i", first, second))
-        for axis in range(3):
-            weights = angle * mesh.surface.normals[:, axis]
-            total[:, axis] += np.bincount(mesh.boundary_triangles[:, corner], weights, minlength=len(total))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.asarray(total / np.where(length > 0, length, 1.0))
 
 
 def _spread(mesh: TetMesh, steps: FloatArray, fixed: BoolArray) -> FloatArray:

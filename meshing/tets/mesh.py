@@ -12,7 +12,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import triangle_areas
+from tetlux.meshing.surface.triangles import corner_angles, triangle_areas
 from tetlux.meshing.tets import geometry, topology
 from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
@@ -177,6 +177,16 @@ class TetMesh:
     def boundary_node_areas(self) -> FloatArray:
         """A third of the area of the triangles at each boundary node, (b,), unit²: weights that sum to `area`."""
         return self.to_boundary_nodes(self.boundary_areas)
+
+    @cached_property
+    def boundary_normals(self) -> FloatArray:
+        """Outward unit normals at the boundary nodes, (b, 3): means over the triangles, weighted by their angles."""
+        angles = corner_angles(self.boundary_points[self.boundary_triangles])
+        weighted = angles[:, :, None] * self.surface.normals[:, None]
+        count = len(self.boundary_nodes)
+        total = np.column_stack([sum_by_index(self.boundary_triangles, weighted[..., i], count) for i in range(3)])
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return np.asarray(total / np.where(length > 0, length, 1.0))
 
     def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
         """Distribute integrals over boundary triangles (f,) to boundary nodes (b,), a third to each corner."""
