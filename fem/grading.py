@@ -37,6 +37,8 @@ FIRST_LAYER, AT_LAYER_TOLERANCE = 0.2, 0.02
 LAYERS_REACH = 3.0
 # A boundary node within this many times the spacing of the lit places, or within its longest edge, is lit.
 LIT_WITHIN = 2.0
+# How the height of the first layer grows with the distance from lit nodes.
+RISE = 0.15
 
 
 def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
@@ -115,7 +117,7 @@ def grade_mesh(
 def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> tuple[FloatArray, FloatArray]:
     """Height of the first layer below each boundary node, (b,), and least depth of all layers together, (b,), unit.
 
-    The height is inf, and the depth 0, where no light fades below the surface.
+    Around lit parts of the surface the height grows with the distance from them, until there is no room for layers.
 
     Parameters
     ----------
@@ -135,8 +137,9 @@ def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) ->
         tree = cKDTree(hints.lit)
         spacing = float(np.median(tree.query(hints.lit, k=[2])[0])) if len(hints.lit) > 1 else 0.0
         distance, nearest = tree.query(mesh.boundary_points, workers=THREADS)
-        lit = distance <= np.maximum(reach, LIT_WITHIN * spacing)
-        heights[lit] = np.minimum(heights[lit], share * hints.depths[nearest[lit]])
+        beyond = np.maximum(distance - np.maximum(reach, LIT_WITHIN * spacing), 0.0)
+        heights = np.minimum(heights, share * hints.depths[nearest] + RISE * beyond)
+        lit = beyond == 0.0
         least_depths[lit] = np.maximum(least_depths[lit], LAYERS_REACH * hints.depths[nearest[lit]])
     return heights, least_depths
 

@@ -48,10 +48,3 @@ def barycentric_on_triangles(points: FloatArray, triangles: FloatArray) -> Float
     second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
     third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
     return np.column_stack([1.0 - second - third, second, third])
-
-
-def corner_angles(corners: FloatArray) -> FloatArray:
-    """Angles of triangles (m, 3, 3) at their corners, (m, 3), radians."""
-    first, second = (np.roll(corners, -side, axis=1) - corners for side in (1, 2))
-    sine = np.linalg.norm(np.cross(first, second), axis=2)
-    return np.asarray(np.arctan2(sine, np.einsum("mci,mci->mc", first, second)))

@@ -12,7 +12,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import corner_angles, triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets import geometry, topology
 from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
@@ -180,11 +180,12 @@ class TetMesh:
 
     @cached_property
     def boundary_normals(self) -> FloatArray:
-        """Outward unit normals at the boundary nodes, (b, 3): means over the triangles, weighted by their angles."""
-        angles = corner_angles(self.boundary_points[self.boundary_triangles])
-        weighted = angles[:, :, None] * self.surface.normals[:, None]
-        count = len(self.boundary_nodes)
-        total = np.column_stack([sum_by_index(self.boundary_triangles, weighted[..., i], count) for i in range(3)])
+        """Outward unit normals at the boundary nodes, (b, 3): exact for nodes on a sphere (Max 1999)."""
+        corners = self.boundary_points[self.boundary_triangles]
+        first, second = (np.roll(corners, -side, axis=1) - corners for side in (1, 2))
+        sizes = np.einsum("fci,fci->fc", first, first) * np.einsum("fci,fci->fc", second, second)
+        parts, count = np.cross(first, second) / sizes[:, :, None], len(self.boundary_nodes)
+        total = np.column_stack([sum_by_index(self.boundary_triangles, parts[..., i], count) for i in range(3)])
         length = np.linalg.norm(total, axis=1, keepdims=True)
         return np.asarray(total / np.where(length > 0, length, 1.0))
 
