@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.fem.error.estimate import Estimate, estimate_error
 from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.solution import Solution, sum_solutions
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, divide_or_zero
 from tetlux.meshing.surface.surface import Surface
 
 
@@ -59,11 +59,14 @@ def estimate_by_operator(
 def _fixed_share(loads: Sequence[Load], of_lights: Sequence[Solution]) -> float | FloatArray:
     """The part of the light at each tetrahedron that does not come from beams, which start at the facets of a mesh."""
     beams = [len(load.deposit.terms.segments) > 0 for load in loads]
+    pairs = list(zip(of_lights, beams, strict=True))
     if not any(beams):
         return 1.0
     if all(beams):
         return 0.0
-    mesh = of_lights[0].mesh
-    whole = sum(np.abs(solution.fluence) for solution in of_lights)
-    fixed = sum(np.abs(solution.fluence) for solution, beam in zip(of_lights, beams, strict=True) if not beam)
-    return np.asarray(np.sum(fixed[mesh.tetrahedra], axis=1) / np.maximum(np.sum(whole[mesh.tetrahedra], axis=1), 1e-300))
+    corners = of_lights[0].mesh.tetrahedra
+    of_beams, others = (
+        sum(np.abs(solution.fluence)[corners].sum(axis=1) for solution, of_beam in pairs if of_beam == wanted)
+        for wanted in (True, False)
+    )
+    return np.asarray(divide_or_zero(others, of_beams + others))

@@ -7,8 +7,9 @@ the nodes (Zienkiewicz & Zhu 1987), for the fluence and for the dual z alike::
           + sigma_a ∫_K (lumping of phi_h z_h)  +  1/(2A) ∮ (lumping of phi_h z_h)
 
 Where power is deposited along the boundary, as by a broad beam, the exitance ripples from node to node with the height
-of tetrahedra over the boundary, which is that of regular ones with edges h. The ripple does not change the total exited power, and duals do not show it. It is proportional to the
-density q of the deposited power, and its square is integrated over the boundary::
+of tetrahedra over the boundary, which is that of regular ones with edges h. The ripple does not change the total exited
+power, and duals do not show it. It is proportional to the density q of the deposited power, and its square is
+integrated over the boundary::
 
     ripple² = RIPPLE_FACTOR² ∮ (h² q / (2A D))²
 """

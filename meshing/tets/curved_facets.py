@@ -1,4 +1,4 @@
-"""The curved surface that the facets of a mesh stand for, as smooth shading knows it: normals and points above facets."""
+"""The curved surface that the facets of a mesh stand for: normals and points above facets, as in smooth shading."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,8 +8,8 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Where the normal at a node and that of a facet enclose an angle of less than this cosine, the facet is at a crease and
-# flat there.
+# A node whose normal encloses an angle of less than this cosine with that of any of its facets is at a crease: the facets
+# around are flat there.
 LEAST_COSINE = 0.85
 
 
@@ -24,7 +24,9 @@ class CurvedFacets:
         """Normals at the corners of each facet, (f, 3, 3)."""
         at_corners = self.mesh.boundary_normals[self.mesh.boundary_triangles]
         flat = np.broadcast_to(self.mesh.surface.normals[:, None], at_corners.shape)
-        smooth = np.einsum("fci,fci->fc", at_corners, flat) > LEAST_COSINE
+        least = np.ones(len(self.mesh.boundary_nodes))
+        np.minimum.at(least, self.mesh.boundary_triangles, np.einsum("fci,fci->fc", at_corners, flat))
+        smooth = least[self.mesh.boundary_triangles] > LEAST_COSINE
         return np.where(smooth[:, :, None], at_corners, flat)
 
     def normals_at(self, facets: IntArray, weights: FloatArray) -> FloatArray:
