@@ -68,9 +68,7 @@ class Estimate:
 
     def sum_by(self, parents: IntArray) -> "Estimate":
         """Add up the indicators of tetrahedra that have a common parent (m,)."""
-        return Estimate(
-            np.bincount(parents, self.exitance_indicators), np.bincount(parents, self.power_indicators)
-        )
+        return Estimate(np.bincount(parents, self.exitance_indicators), np.bincount(parents, self.power_indicators))
 
     __repr__ = one_line
 

@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface.triangles import vertex_normals
 from tetlux.meshing.tets.mesh import TetMesh
 
-# A node whose normal encloses an angle of less than this cosine with that of any of its facets is at a crease: the facets
-# around are flat there.
+# A node is at a crease if its normal encloses an angle of less than this cosine with that of any of its facets; there
+# facets are flat.
 LEAST_COSINE = 0.85
 
 
@@ -22,11 +23,12 @@ class CurvedFacets:
     @cached_property
     def normals(self) -> FloatArray:
         """Normals at the corners of each facet, (f, 3, 3)."""
-        at_corners = self.mesh.boundary_normals[self.mesh.boundary_triangles]
+        corners = self.mesh.boundary_triangles
+        at_corners = vertex_normals(self.mesh.boundary_points, corners)[corners]
         flat = np.broadcast_to(self.mesh.surface.normals[:, None], at_corners.shape)
         least = np.ones(len(self.mesh.boundary_nodes))
-        np.minimum.at(least, self.mesh.boundary_triangles, np.einsum("fci,fci->fc", at_corners, flat))
-        smooth = least[self.mesh.boundary_triangles] > LEAST_COSINE
+        np.minimum.at(least, corners, np.einsum("fci,fci->fc", at_corners, flat))
+        smooth = least[corners] > LEAST_COSINE
         return np.where(smooth[:, :, None], at_corners, flat)
 
     def normals_at(self, facets: IntArray, weights: FloatArray) -> FloatArray:

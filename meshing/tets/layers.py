@@ -12,6 +12,7 @@ from scipy.sparse import coo_array, diags_array
 from scipy.sparse.linalg import cg
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.surface.triangles import vertex_normals
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.thickness import thickness
@@ -113,7 +114,7 @@ def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> _C
     depths = _wanted_depths(mesh, heights, growing, least_depths)
     if not depths.any():
         return None
-    nodes, normals = mesh.boundary_nodes, mesh.boundary_normals
+    nodes, normals = mesh.boundary_nodes, vertex_normals(mesh.boundary_points, mesh.boundary_triangles)
     kept = np.zeros(len(mesh.points), dtype=bool)
     kept[mesh.interfaces[0]] = True
     depths[kept[nodes]] = 0.0
@@ -160,9 +161,7 @@ def _number(depths: FloatArray, growing: FloatArray) -> IntArray:
     return np.maximum(np.round(grown + rest), 1).astype(np.int64)
 
 
-def _wanted_depths(
-    mesh: TetMesh, heights: FloatArray, growing: FloatArray, least_depths: FloatArray
-) -> FloatArray:
+def _wanted_depths(mesh: TetMesh, heights: FloatArray, growing: FloatArray, least_depths: FloatArray) -> FloatArray:
     """Depth of all layers together at each boundary node, (b,), unit; 0 where there are none."""
     depths = np.zeros(len(heights))
     wanted = np.isfinite(heights) & (growing > 0)

@@ -178,17 +178,6 @@ class TetMesh:
         """A third of the area of the triangles at each boundary node, (b,), unit²: weights that sum to `area`."""
         return self.to_boundary_nodes(self.boundary_areas)
 
-    @cached_property
-    def boundary_normals(self) -> FloatArray:
-        """Outward unit normals at the boundary nodes, (b, 3): exact for nodes on a sphere (Max 1999)."""
-        corners = self.boundary_points[self.boundary_triangles]
-        first, second = (np.roll(corners, -side, axis=1) - corners for side in (1, 2))
-        sizes = np.einsum("fci,fci->fc", first, first) * np.einsum("fci,fci->fc", second, second)
-        parts, count = np.cross(first, second) / sizes[:, :, None], len(self.boundary_nodes)
-        total = np.column_stack([sum_by_index(self.boundary_triangles, parts[..., i], count) for i in range(3)])
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.asarray(total / np.where(length > 0, length, 1.0))
-
     def to_boundary_nodes(self, shares: FloatArray) -> FloatArray:
         """Distribute integrals over boundary triangles (f,) to boundary nodes (b,), a third to each corner."""
         return sum_by_index(self.boundary_triangles, np.repeat(shares / 3.0, 3), len(self.boundary_nodes))
