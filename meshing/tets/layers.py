@@ -30,10 +30,15 @@ LEAST_DEPTH = 0.3
 # Displacements of nodes inside are shortened where a tetrahedron would keep less than this share of its volume, or get
 # a quality below the second value and below the third share of what it had.
 LEAST_VOLUME, LEAST_QUALITY, LEAST_QUALITY_SHARE = 0.1, 0.04, 0.3
+# A tetrahedron of a layer, or one that was pressed inwards, keeps at least this share of the volume that it would have
+# with columns at right angles to the boundary.
+LEAST_PART = 0.05
 # Shortened displacements differ along an edge by at most this share of its length more than they did.
 SHORTENING = 0.3
 # Shortenings by half before displacements are given up, and after that.
-HALVINGS, MOST_SHORTENINGS = 20, 60
+HALVINGS, MOST_SHORTENINGS = 6, 60
+# Where columns cross, they are made half as deep, and after half of so many times left out.
+MOST_FILLINGS = 12
 # The displacements within the body are smooth, and need no accuracy.
 SMOOTHING = {"rtol": 1e-2, "maxiter": 100}
 
@@ -70,18 +75,38 @@ def add_layers(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> 
     LayeredMesh
         With the same boundary triangles. Interfaces between regions stay where they are.
     """
-    columns = _columns(mesh, heights, least_depths)
-    if columns is None:
-        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
-    corners, faces = _fill(mesh, columns)
-    parents = np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[faces]])
-    layered = replace(
-        mesh,
-        points=np.concatenate([columns.moved, columns.points]),
-        tetrahedra=np.concatenate([mesh.tetrahedra, corners]),
-        regions=mesh.regions[parents] if mesh.regions.any() else np.broadcast_to(np.int64(0), len(parents)),
-    )
-    return LayeredMesh(layered, parents)
+    share = np.ones(len(heights))
+    for attempt in range(MOST_FILLINGS):
+        columns = _columns(mesh, heights, least_depths, share)
+        if columns is None:
+            break
+        layered = _fill(mesh, columns)
+        flat = tetrahedron_volumes(layered.points, layered.tetrahedra) < LEAST_PART * layered.expected
+        if not flat.any():
+            return _made(mesh, layered)
+        # Neighbouring columns cross where the surface is creased or strongly curved inwards.
+        owner = np.full(len(layered.points), -1)
+        owner[mesh.boundary_nodes] = np.arange(len(heights))
+        owner[len(mesh.points) :] = columns.owner
+        crossing = np.unique(owner[layered.tetrahedra[flat]])
+        share[crossing[crossing >= 0]] *= 0.5 if attempt < MOST_FILLINGS // 2 else 0.0
+    return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    """Points and tetrahedra of a mesh with layers, the parent of each, and about what volume each should have."""
+
+    points: FloatArray
+    tetrahedra: IntArray
+    parents: IntArray
+    expected: FloatArray
+
+
+def _made(mesh: TetMesh, filled: _Filled) -> LayeredMesh:
+    regions = mesh.regions[filled.parents] if mesh.regions.any() else np.zeros(len(filled.parents), dtype=np.int64)
+    layered = replace(mesh, points=filled.points, tetrahedra=filled.tetrahedra, regions=regions)
+    return LayeredMesh(layered, filled.parents)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +119,15 @@ class _Columns:
         The nodes of the mesh, pressed inwards: those of the boundary are the deepest of their columns.
     layers : (b,) ndarray of int
         Number of layers in each column.
+    owner : (c,) ndarray of int
+        The column of each of its other nodes.
     points : (c, 3) ndarray
-        The other nodes of the columns, from the boundary inwards.
+        These, from the boundary inwards.
     """
 
     moved: FloatArray
     layers: IntArray
+    owner: IntArray
     points: FloatArray
 
     def node(self, mesh: TetMesh, column: IntArray, level: IntArray) -> IntArray:
@@ -108,10 +136,12 @@ class _Columns:
         return np.where(level == self.layers[column], mesh.boundary_nodes[column], first[column] + level)
 
 
-def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> _Columns | None:
-    """The columns that have room; None if there are none."""
+def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray, share: FloatArray) -> _Columns | None:
+    """The columns that have room, a share (b,) of what they could have; None if there are none."""
     growing = _growing_layers(mesh, heights)
-    depths = _wanted_depths(mesh, heights, growing, least_depths)
+    depths = share * _wanted_depths(mesh, heights, growing, least_depths)
+    with np.errstate(invalid="ignore"):
+        depths[~(depths > LEAST_DEPTH * heights)] = 0.0
     if not depths.any():
         return None
     nodes, normals = mesh.boundary_nodes, vertex_normals(mesh.boundary_points, mesh.boundary_triangles)
@@ -123,14 +153,13 @@ def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray) -> _C
     kept[nodes] = True
     steps = _shorten(mesh, _spread(mesh, steps, kept))
     depths = np.linalg.norm(steps[nodes], axis=1)
-    some = depths > LEAST_DEPTH * heights
+    some = depths > 0
     layers = np.zeros(len(nodes), dtype=np.int64)
     layers[some] = _number(depths[some] / heights[some], growing[some])
-    steps[nodes[~some]] = 0.0
     column = np.repeat(np.arange(len(nodes)), layers)
     shares = _reached(_ranks(layers), growing[column]) / _reached(layers[column], growing[column])
     points = mesh.points[nodes[column]] + shares[:, None] * steps[nodes[column]]
-    return _Columns(mesh.points + steps, layers, points)
+    return _Columns(mesh.points + steps, layers, column, points)
 
 
 def _ranks(counts: IntArray) -> IntArray:
@@ -229,8 +258,8 @@ def _shorten(mesh: TetMesh, steps: FloatArray) -> FloatArray:
     return np.zeros(steps.shape)
 
 
-def _fill(mesh: TetMesh, columns: _Columns) -> tuple[IntArray, IntArray]:
-    """Fill the columns under each boundary triangle: tetrahedra (c, 4), and the triangle that each lies under, (c,).
+def _fill(mesh: TetMesh, columns: _Columns) -> _Filled:
+    """Fill the columns under each boundary triangle.
 
     From the boundary inwards, one of the three nodes of the lowest triangle goes on to the next level of its column,
     which cuts off one tetrahedron. Triangles agree on the order in which two columns go on, by level, and within a
@@ -255,7 +284,15 @@ def _fill(mesh: TetMesh, columns: _Columns) -> tuple[IntArray, IntArray]:
         made = np.concatenate([[0], np.cumsum(corner == place)])[:-1]
         lowest.append(columns.node(mesh, triangles[face, place], made - made[start]))
     # Boundary triangles are anticlockwise seen from outside, tetrahedra from within.
-    return np.column_stack([lowest[0], lowest[2], lowest[1], columns.node(mesh, column, level)]), face
+    corners = np.column_stack([lowest[0], lowest[2], lowest[1], columns.node(mesh, column, level)])
+    points = np.concatenate([columns.moved, columns.points])
+    rise = np.linalg.norm(points[corners[:, 3]] - points[columns.node(mesh, column, level - 1)], axis=1)
+    return _Filled(
+        points,
+        np.concatenate([mesh.tetrahedra, corners]),
+        np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[face]]),
+        np.concatenate([mesh.volumes, mesh.boundary_areas[face] * rise / 3.0]),
+    )
 
 
 def _shuffled(count: int) -> IntArray:
