@@ -25,8 +25,8 @@ from tetlux.fem.scenes import Scenes
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution
 from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.boundary.layers import LayeredMesh, add_layers
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
-from tetlux.meshing.tets.layers import LayeredMesh, add_layers
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
 

@@ -19,11 +19,11 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.ledger import Ledger
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
+from tetlux.meshing.boundary.curved_facets import CurvedFacets
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import barycentric_on_triangles
-from tetlux.meshing.tets.curved_facets import CurvedFacets
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Entries, at most, at which the penetration depth is computed.

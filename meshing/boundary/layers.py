@@ -8,10 +8,9 @@ inwards, until layers are as high as the triangles are wide.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array, diags_array
-from scipy.sparse.linalg import cg
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.boundary.press import level_off, shorten, spread
 from tetlux.meshing.surface.triangles import vertex_normals
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
@@ -27,20 +26,11 @@ LARGEST_SHARE = 0.25
 STEEPEST = 0.4
 # Where layers of less than this many times the first layer's height have room, there is none.
 LEAST_DEPTH = 0.3
-# Displacements of nodes inside are shortened where a tetrahedron would keep less than this share of its volume, or get
-# a quality below the second value and below the third share of what it had.
-LEAST_VOLUME, LEAST_QUALITY, LEAST_QUALITY_SHARE = 0.1, 0.04, 0.3
 # A tetrahedron of a layer, or one that was pressed inwards, keeps at least this share of the volume that it would have
 # with columns at right angles to the boundary.
 LEAST_PART = 0.05
-# Shortened displacements differ along an edge by at most this share of its length more than they did.
-SHORTENING = 0.3
-# Shortenings by half before displacements are given up, and after that.
-HALVINGS, MOST_SHORTENINGS = 6, 60
 # Where columns cross, they are made half as deep, and after half of so many times left out.
 MOST_FILLINGS = 12
-# The displacements within the body are smooth, and need no accuracy.
-SMOOTHING = {"rtol": 1e-2, "maxiter": 100}
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +141,7 @@ def _columns(mesh: TetMesh, heights: FloatArray, least_depths: FloatArray, share
     steps = np.zeros(mesh.points.shape)
     steps[nodes] = -depths[:, None] * normals
     kept[nodes] = True
-    steps = _shorten(mesh, _spread(mesh, steps, kept))
+    steps = shorten(mesh, spread(mesh, steps, kept))
     depths = np.linalg.norm(steps[nodes], axis=1)
     some = depths > 0
     layers = np.zeros(len(nodes), dtype=np.int64)
@@ -204,58 +194,7 @@ def _wanted_depths(mesh: TetMesh, heights: FloatArray, growing: FloatArray, leas
     corners = mesh.boundary_triangles
     edges = np.concatenate([corners[:, pair] for pair in ([0, 1], [1, 2], [2, 0])])
     length = np.linalg.norm(np.diff(mesh.boundary_points[edges], axis=1)[:, 0], axis=1)
-    return _flatten(depths, edges, STEEPEST * length)
-
-
-def _flatten(values: FloatArray, edges: IntArray, steps: FloatArray) -> FloatArray:
-    """Lower values at nodes (n,) until they differ by at most the steps (e,) along edges (e, 2)."""
-    values = values.copy()
-    while True:
-        before = values.copy()
-        for first, second in (edges.T, edges.T[::-1]):
-            np.minimum.at(values, first, before[second] + steps)
-        if np.array_equal(values, before):
-            return values
-
-
-def _spread(mesh: TetMesh, steps: FloatArray, fixed: BoolArray) -> FloatArray:
-    """Displacements of all nodes (n, 3): given ones where fixed (n,), elsewhere means of those around."""
-    first, second = mesh.edges.T
-    count, weights = len(mesh.points), mesh.edge_lengths**-2.0
-    ends = np.concatenate([first, second]), np.concatenate([second, first])
-    joined = coo_array((np.concatenate([weights, weights]), ends), shape=(count, count)).tocsr()
-    total = np.asarray(joined.sum(axis=1)).ravel()
-    free = np.flatnonzero(~fixed)
-    result = np.where(fixed[:, None], steps, 0.0)
-    if len(free) == 0:
-        return result
-    load = joined[free] @ result
-    matrix = (diags_array(total[free]) - joined[free][:, free]).tocsr()
-    precondition = diags_array(1.0 / total[free])
-    result[free] = np.column_stack([cg(matrix, axis, M=precondition, **SMOOTHING)[0] for axis in load.T])
-    return result
-
-
-def _shorten(mesh: TetMesh, steps: FloatArray) -> FloatArray:
-    """Shorten displacements (n, 3) where they would flatten tetrahedra, and less and less around these places."""
-    size = np.linalg.norm(steps, axis=1)
-    if not size.any():
-        return steps
-    larger = size[mesh.edges].max(axis=1)
-    slack = SHORTENING * mesh.edge_lengths / np.where(larger > 0, larger, 1.0)
-    lowest = np.minimum(LEAST_QUALITY, LEAST_QUALITY_SHARE * mesh.quality)
-    share = np.ones(len(steps))
-    for attempt in range(MOST_SHORTENINGS):
-        moved = mesh.points + share[:, None] * steps
-        flat = tetrahedron_volumes(moved, mesh.tetrahedra) < LEAST_VOLUME * mesh.volumes
-        sound = np.flatnonzero(~flat)
-        if len(sound) > 0:
-            flat[sound] = TetMesh(moved, mesh.tetrahedra[sound]).quality < lowest[sound]
-        if not flat.any():
-            return share[:, None] * steps
-        share[np.unique(mesh.tetrahedra[flat])] *= 0.5 if attempt < HALVINGS else 0.0
-        share = _flatten(share, mesh.edges, slack)
-    return np.zeros(steps.shape)
+    return level_off(depths, edges, STEEPEST * length)
 
 
 def _fill(mesh: TetMesh, columns: _Columns) -> _Filled:
