@@ -136,7 +136,8 @@ def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) ->
             continue
         tree = cKDTree(hints.lit)
         spacing = float(np.median(tree.query(hints.lit, k=[2])[0])) if len(hints.lit) > 1 else 0.0
-        distance, nearest = tree.query(mesh.boundary_points, workers=THREADS)
+        distance, index = tree.query(mesh.boundary_points, workers=THREADS)
+        nearest = np.asarray(index)
         beyond = np.maximum(distance - np.maximum(reach, LIT_WITHIN * spacing), 0.0)
         heights = np.minimum(heights, share * hints.depths[nearest] + RISE * beyond)
         lit = beyond == 0.0

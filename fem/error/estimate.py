@@ -34,7 +34,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
@@ -68,7 +68,10 @@ class Estimate:
 
     def sum_by(self, parents: IntArray) -> "Estimate":
         """Add up the indicators of tetrahedra that have a common parent (m,)."""
-        return Estimate(np.bincount(parents, self.exitance_indicators), np.bincount(parents, self.power_indicators))
+        count = int(parents.max()) + 1
+        return Estimate(
+            sum_by_index(parents, self.exitance_indicators, count), sum_by_index(parents, self.power_indicators, count)
+        )
 
     __repr__ = one_line
 

@@ -165,7 +165,7 @@ def _growing_layers(mesh: TetMesh, heights: FloatArray) -> FloatArray:
     return np.asarray(np.ceil(np.log(np.maximum(HIGHEST * width / heights, 1.0)) / np.log(GROWTH)))
 
 
-def _reached(layers: FloatArray, growing: FloatArray) -> FloatArray:
+def _reached(layers: FloatArray | IntArray, growing: FloatArray) -> FloatArray:
     """Depth of so many layers, the first of which grow, over the height of the first."""
     grown = np.minimum(layers, growing)
     highest = GROWTH ** np.maximum(growing - 1.0, 0.0)

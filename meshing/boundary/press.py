@@ -16,7 +16,7 @@ SHORTENING = 0.3
 # Shortenings by half before displacements are given up, and after that.
 HALVINGS, MOST_SHORTENINGS = 6, 60
 # The displacements within the body are smooth, and need no accuracy.
-SMOOTHING = {"rtol": 1e-2, "maxiter": 100}
+SMOOTHING_ERROR, SMOOTHING_STEPS = 1e-2, 100
 
 
 def level_off(values: FloatArray, edges: IntArray, steps: FloatArray) -> FloatArray:
@@ -44,7 +44,8 @@ def spread(mesh: TetMesh, steps: FloatArray, fixed: BoolArray) -> FloatArray:
     load = joined[free] @ result
     matrix = (diags_array(total[free]) - joined[free][:, free]).tocsr()
     precondition = diags_array(1.0 / total[free])
-    result[free] = np.column_stack([cg(matrix, axis, M=precondition, **SMOOTHING)[0] for axis in load.T])
+    for axis in range(3):
+        result[free, axis] = cg(matrix, load[:, axis], rtol=SMOOTHING_ERROR, maxiter=SMOOTHING_STEPS, M=precondition)[0]
     return result
 
 
