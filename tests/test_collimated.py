@@ -160,8 +160,8 @@ def test_all_of_a_convex_bodys_lit_side_is_lit_and_nothing_else(
     # A ray starts on every lit facet, but for those nearly edge-on, and on no other.
     _, starts, _ = mesh.closest_boundary(segments.starts)
     edge_on = 0.1 if name == "ball" else 1e-2
-    assert set(starts.tolist()) <= set(np.flatnonzero(facing > -edge_on))
-    # Measured: at most one of 240 facets of a ball, at its rim.
+    # Facets span .2 radians: measured, light starts on some that are turned away by .12.
+    assert facing[starts].min() > (-0.2 if name == "ball" else 0.0)
     assert np.isin(np.flatnonzero(facing > edge_on), starts).mean() > (0.98 if name == "ball" else 0.9999)
 
 

@@ -177,7 +177,7 @@ def _number(depths: FloatArray, growing: FloatArray) -> IntArray:
     grown = np.minimum(np.log1p((GROWTH - 1.0) * depths) / np.log(GROWTH), growing)
     highest = GROWTH ** np.maximum(growing - 1.0, 0.0)
     rest = np.maximum(depths - _reached(grown, growing), 0.0) / highest
-    return np.maximum(np.round(grown + rest), 1).astype(np.int64)
+    return np.asarray(np.maximum(np.round(grown + rest), 1), dtype=np.int64)
 
 
 def _wanted_depths(mesh: TetMesh, heights: FloatArray, growing: FloatArray, least_depths: FloatArray) -> FloatArray:

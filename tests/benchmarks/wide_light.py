@@ -84,11 +84,13 @@ def lines(files: list[Path], *, refracted: bool) -> Iterator[str]:
         tetrahedralize(sphere(radius))  # now its mesh is cached
         yield against_series(radius, tolerance)
         if refracted:
-            yield against_finer(f"ball {radius:g}, 1.4", sphere(radius), Medium(0.01, 0.99, eta=1.4), tolerance)
+            medium = Medium(sigma_a=0.01, sigma_s_prime=0.99, eta=1.4)
+            yield against_finer(f"ball {radius:g}, 1.4", sphere(radius), medium, tolerance)
     for file in files:
         surface = read_surface(file)
         scale = DIAGONAL / surface.diagonal
-        yield against_finer(file.stem, surface, Medium(0.01 * scale, 0.99 * scale, eta=1.4), 0.02)
+        medium = Medium(sigma_a=0.01 * scale, sigma_s_prime=0.99 * scale, eta=1.4)
+        yield against_finer(file.stem, surface, medium, 0.02)
 
 
 if __name__ == "__main__":
