@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from tetlux.cases.start import mark_start
+
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
 
@@ -26,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0 if all went well, 1 if some case failed, 2 if the request itself is wrong, 130 if it was interrupted.
     """
+    mark_start()
     try:
         _treat_signals_as_interrupts()
         return _main(arguments)
@@ -109,16 +112,27 @@ def _parser() -> argparse.ArgumentParser:
         "cases",
         nargs="+",
         metavar="CASE",
-        help="a YAML case file, or the name of a shipped one (see tetlux list)",
+        help="a YAML case file, a pattern such as '*.yaml', or the name of a shipped case (see tetlux list)",
     )
     run.add_argument(
         "--out", type=Path, default=Path("results"), metavar="DIR", help="folder of all results; default: results"
     )
+    run.add_argument(
+        "--jobs", type=int, metavar="N", help="worker processes; default: the cores that this process may use"
+    )
+    run.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
+    )
+    run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
+    run.add_argument("--quiet", action="store_true", help="print nothing but what failed")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
-    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, or the name of a shipped one")
+    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
     check.set_defaults(command=_check)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
@@ -137,11 +151,12 @@ def _parser() -> argparse.ArgumentParser:
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that measure the solver itself."""
     chart = commands.add_parser("chart", help="compare methods by error, seconds and unknowns")
-    chart.add_argument(
-        "cases", nargs="*", metavar="CASE", help="default: the shipped cases slab, sphere, torus and hare"
-    )
+    chart.add_argument("cases", nargs="*", metavar="CASE", help="default: the shipped cases of the chart in README")
     chart.add_argument(
         "--out", type=Path, default=Path("chart"), metavar="DIR", help="folder of the chart; default: chart"
+    )
+    chart.add_argument(
+        "--readings", action="store_true", help="compare what detectors read, not the exitance over the surface"
     )
     chart.add_argument("--quick", action="store_true", help="run a few coarse resolutions of each method only")
     chart.set_defaults(command=_chart)
@@ -155,15 +170,33 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch import load_all, run_all  # noqa: PLC0415
+    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
+    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
+    from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
+    from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
+    from tetlux.cases.results.batch_tables import BatchTables  # noqa: PLC0415
+    from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
-    return run_all(load_all(options.cases), options.out, cache=not options.no_cache)
+    cases = load_all(options.cases)
+    try:
+        ended = run_batch(
+            cases,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            scheduler=options.scheduler,
+            cache=not options.no_cache,
+            listeners=[choose_display(len(cases), quiet=options.quiet), RunLogs(), BatchTables()],
+        )
+    except RunError as error:
+        return _report(str(error), 1)
+    return 1 if ended.failed or ended.left else 0
 
 
 def _check(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch import check_all  # noqa: PLC0415
+    from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
-    return check_all(options.cases)
+    return check_all(options.cases, plan=options.plan)
 
 
 def _list(_: argparse.Namespace) -> int:
@@ -182,9 +215,9 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart.command import DEFAULT_CASES, chart  # noqa: PLC0415
+    from tetlux.cases.chart.command import chart  # noqa: PLC0415
 
-    return chart(options.cases or DEFAULT_CASES, options.out, quick=options.quick)
+    return chart(options.cases, options.out, readings=options.readings, quick=options.quick)
 
 
 def _stress(options: argparse.Namespace) -> int:

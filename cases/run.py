@@ -2,48 +2,66 @@
 
 import json
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tetlux.cases.compare.differences import as_data, compare
-from tetlux.cases.compare.picture import draw_comparison
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
-from tetlux.cases.picture.arrows import light_rays
-from tetlux.cases.picture.draw import PictureScene, RegionOutline, draw_picture
-from tetlux.cases.picture.readings import draw_readings
+from tetlux.cases.solve import solve_case
+from tetlux.cases.write.content import content_of
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import AnySolution, Results, collect_results, surface_values, volume_values
+from tetlux.cases.write.results import Results, collect_results, surface_values, volume_values
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
-from tetlux.fem.media.region import Region
-from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.scenes import media_by_scene
-from tetlux.fem.solve import solve
-from tetlux.fem.solve_scenes import solve_each
+from tetlux.fem.shared import SharedMesh
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import add_prefix
+
+# Pictures and comparisons are imported where they are used: together they take as long as a small solve.
+if TYPE_CHECKING:
+    from tetlux.cases.picture.draw import PictureScene
 
 Report = Callable[[str], None]
 FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
-# Drawn where there are so many detectors.
+# The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
 ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+
+
+@dataclass(frozen=True)
+class FinishedCase:
+    """What a finished run has to say.
+
+    Attributes
+    ----------
+    folder : Path
+        Of its results.
+    summary : dict
+        The content of ``summary.json``.
+    warnings : list of str
+    readings : list of str
+        What its detectors read, in lines for people.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    warnings: list[str]
+    readings: list[str]
 
 
 def run_case(
@@ -93,66 +111,47 @@ def run_case(
     ...     sorted(path.name for path in folder.iterdir())
     ['compare.json', 'compare.png', 'summary.json']
     """
+    finished = finish_case(case, out, report, cache=cache)
+    for line in finished.readings:
+        report(line)
+    for warning in finished.warnings:
+        if note is None:
+            report(f"note: {warning}")
+        else:
+            note(warning)
+    return finished.folder
+
+
+def finish_case(
+    case: Case, out: Path, report: Report, *, cache: bool = True, start: SharedMesh | None = None
+) -> FinishedCase:
+    """Solve a case and write its results, as `run_case` does; `start` is the mesh that it begins with."""
     started, target = time.perf_counter(), out / case.name
     try:
         with claim_folder(out, case.name) as folder:
-            solutions = _solve(case, report, cache=cache)
+            report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
+            solutions = solve_case(case, report, cache=cache, start=start)
+            seconds = solutions[0].seconds
+            report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
+            writing = time.perf_counter()
             try:
-                warnings, readings = _write(collect_results(case, solutions), folder, started)
+                summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
                 publish(folder, target, ALL_FILES)
+                report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
                 raise write_error(target, error) from error
     except (MemoryError, RuntimeError) as error:
         if not memory_ran_out(error):
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
-    for line in describe_readings(readings, case.surface.unit):
-        report(line)
-    for warning in warnings:
-        if note is None:
-            report(f"note: {warning}")
-        else:
-            note(warning)
-    return target
+    return FinishedCase(target, summary, warnings, describe_readings(readings, case.surface.unit))
 
 
-def _solve(case: Case, report: Report, *, cache: bool) -> Sequence[AnySolution]:
-    """Solve each channel by the model of the case."""
-    if case.spec.model == "charges":
-        return _solve_with_charges(case, report)
-    return solve_each(
-        case.mesh or case.surface,
-        [channel.media for channel in case.channels],
-        [list(channel.lights.values()) for channel in case.channels],
-        regions=case.regions,
-        tolerance=case.tolerance,
-        detectors=[entry.detector for entry in case.detectors],
-        detector_tolerance=case.detector_tolerance,
-        cache=cache,
-        report=report,
-    )
-
-
-def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
-    """Solve each channel by charges; the seconds of each solution are those of all channels together."""
-    solutions = []
-    assert case.tolerance is not None
-    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
-    for channel, (body, *inner) in zip(case.channels, media, strict=True):
-        regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
-        lights = list(channel.lights.values())
-        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
-        where = f"{channel.name}: " if len(case.channels) > 1 else ""
-        report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
-        solutions.append(solution)
-    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
-    return [replace(solution, seconds=seconds) for solution in solutions]
-
-
-def _write(results: Results, folder: Path, started: float) -> tuple[list[str], list[dict[str, Any]]]:
-    """Write all files of a run into a folder, and return its warnings and readings."""
-    writing = time.perf_counter()
-    case, first = results.case, results.solutions[0]
+def _write(
+    results: Results, folder: Path, started: float, writing: float
+) -> tuple[dict[str, Any], list[str], list[dict[str, Any]]]:
+    """Write all files of a run into a folder, and return its summary, warnings and readings."""
+    case = results.case
     unit = case.surface.unit
     warnings = _warnings(results)
     if "surface" in case.outputs:
@@ -161,27 +160,48 @@ def _write(results: Results, folder: Path, started: float) -> tuple[list[str], l
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     if "picture" in case.outputs:
-        warnings += draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
+        from tetlux.cases.picture.draw import draw_picture  # noqa: PLC0415
+
+        draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
     if readings:
         write_readings(readings, unit, folder / READINGS)
         if len(case.detectors) >= ENOUGH_TO_DRAW:
+            from tetlux.cases.picture.readings import draw_readings  # noqa: PLC0415
+
             whole = [row for row in readings if row["light"] == ALL]
             draw_readings(whole, _places_lit(case), case.name, unit, folder / READINGS_PICTURE)
     compared = None
     if case.comparison is not None:
+        from tetlux.cases.compare.differences import as_data, compare  # noqa: PLC0415
+        from tetlux.cases.compare.picture import draw_comparison  # noqa: PLC0415
+
         compared = compare(case.comparison, results.mesh_solutions[0])
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
-    now = time.perf_counter()
-    seconds = {**first.seconds, "write": now - writing, "total": now - started + case.reading_seconds}
-    seconds["surface"] += case.reading_seconds
-    figures = summarize(results, readings, seconds, warnings)
+    figures = summarize(results, readings, warnings) | {"content": content_of(case)}
     if compared is not None:
         figures["compare"] = compared.differences
+    figures["seconds"] = _seconds(results, started, writing)
     summary = json.dumps(figures, indent=2, allow_nan=False)
     (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
-    return warnings, readings
+    return figures, warnings, readings
+
+
+def _seconds(results: Results, started: float, writing: float) -> dict[str, float]:
+    """Seconds by stage, from the start of the command until now, of a run that began and was written at some time."""
+    case, of_solve, now = results.case, results.solutions[0].seconds, time.perf_counter()
+    seconds = {
+        "start": case.start_seconds,
+        "surface": case.reading_seconds + of_solve["surface"],
+        "mesh": of_solve["mesh"],
+        "assemble": of_solve["assemble"],
+        # With what is between the stages of the solver.
+        "solve": of_solve["solve"] + writing - started - of_solve["total"],
+        "write": now - writing,
+        "total": case.start_seconds + case.reading_seconds + now - started,
+    }
+    return {stage: round(value, 4) for stage, value in seconds.items()}
 
 
 def _places_lit(case: Case) -> FloatArray:
@@ -204,8 +224,11 @@ def _write_surface(results: Results, folder: Path) -> None:
     write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
 
 
-def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> PictureScene:
+def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> "PictureScene":
     """Collect what the picture shows."""
+    from tetlux.cases.picture.arrows import light_rays  # noqa: PLC0415
+    from tetlux.cases.picture.draw import PictureScene, RegionOutline  # noqa: PLC0415
+
     case = results.case
     # Lights of all channels: one that is dark in the first may be bright in another.
     lights = {name: light for channel in case.channels for name, light in channel.lights.items()}

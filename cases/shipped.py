@@ -3,6 +3,7 @@
 Modules that need numpy are not imported here, so that ``tetlux list`` and ``tetlux show`` answer at once.
 """
 
+import glob
 import json
 import os
 import re
@@ -63,6 +64,43 @@ def find_case_file(request: str) -> Path:
     if path.suffix.lower() not in ("", *SUFFIXES):
         _refuse_surface(path)
     return path
+
+
+def find_case_files(request: str) -> list[Path]:
+    """Find the case files of a request: of a pattern with ``*``, ``?`` or ``[...]`` all that it matches, else one.
+
+    ``**`` stands for any folders. Shells expand patterns themselves, but not quoted ones, and not on Windows.
+
+    Parameters
+    ----------
+    request : str
+        Path of a case file, name of a shipped one, or a pattern.
+
+    Returns
+    -------
+    list of Path
+        In the order of their paths.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+
+    Examples
+    --------
+    >>> [path.name for path in find_case_files("torus")]
+    ['torus.yaml']
+    """
+    if not glob.has_magic(request) or os.path.exists(request):  # noqa: PTH110
+        return [find_case_file(request)]
+    try:
+        matches = sorted(map(Path, glob.glob(request, recursive=True)))  # noqa: PTH207 - Path.glob takes no full paths
+    except (OSError, ValueError, re.error):
+        matches = []
+    paths = [path for path in matches if path.suffix.lower() in SUFFIXES and path.is_file()]
+    if not paths:
+        raise _input_error(f"{request} matches no case file; check the pattern, and the folder that it starts from.")
+    return paths
 
 
 def _refuse_surface(path: Path) -> None:

@@ -7,33 +7,41 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split, splits_for_readings
+from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
 from tetlux.fem.grading import (
     LONGEST_EDGE,
     LONGEST_IF_FITTED,
     grade_between,
     grade_mesh,
-    layer_sizes,
     places_to_resolve,
+    with_layers,
 )
-from tetlux.fem.known.split import Sources
+from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
-from tetlux.fem.quadratic.error import ReadingError
+from tetlux.fem.quadratic.field_error import field_errors
+from tetlux.fem.quadratic.reading_error import ReadingError
+from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.scenes import Scenes
+from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
+from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
-from tetlux.fem.system import MeshSolution
+from tetlux.fem.system import MeshSolution, System
 from tetlux.meshing.arrays import IntArray
-from tetlux.meshing.boundary.layers import LayeredMesh, add_layers
+from tetlux.meshing.boundary.layers import LayeredMesh
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
+# A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
+SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
 PROGRESS_AFTER_SECONDS = 8.0
+# How progress lines call errors of fields.
+FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
@@ -52,14 +60,32 @@ class Tolerances:
         Wanted relative error of what each detector reads.
     placed : tuple of PlacedDetector
         The detectors.
+    everywhere, volume : float, optional
+        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside: see
+        `tetlux.fem.quadratic.field_error`.
     """
 
     exitance: float | None
     readings: float | None = None
     placed: tuple[PlacedDetector, ...] = ()
+    everywhere: float | None = None
+    volume: float | None = None
 
-    def assess(self, steps: Sequence[MeshSolution], parents: IntArray) -> "Assessment":
+    @property
+    def fields(self) -> dict[Where, float]:
+        """Those of the exitance everywhere and of the fluence inside that are given."""
+        given: dict[Where, float | None] = {"surface": self.everywhere, "inside": self.volume}
+        return {where: tolerance for where, tolerance in given.items() if tolerance is not None}
+
+    @property
+    def need_quadratic(self) -> bool:
+        """Whether quadratic elements are solved for on each mesh."""
+        return self.readings is not None or len(self.fields) > 0
+
+    def assess(self, steps: Sequence[MeshSolution], parents: IntArray | None = None) -> "Assessment":
         """Compare the errors of solutions on one mesh with the tolerances; see `LayeredMesh` for `parents`."""
+        if parents is None:
+            parents = np.arange(len(steps[0].solution.mesh.tetrahedra))
         splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
@@ -72,14 +98,25 @@ class Tolerances:
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
             np.maximum.at(splits, parents, splits_for_readings(readings, self.readings, len(parents)))
+        for where, tolerance in self.fields.items():
+            bands = [band for step in steps for band in _bands(step, where)]
+            error = max((band.relative for band in bands), default=0.0)
+            largest_ratio = max(largest_ratio, error / tolerance)
+            summary += f", {FIELD_NAMES[where]} {error:.2%}"
+            np.maximum.at(splits, parents, splits_for_fields(bands, tolerance, len(parents)))
         return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
-        # All duals at once.
-        quadratic.operator.duals([placed.measurement for placed in self.placed])
-        return [estimate_reading(step.solution, placed.measurement) for placed in self.placed]
+        parts = quadratic.prepare([placed.measurement for placed in self.placed])
+        return [estimate_reading(step.solution, measurement) for some in parts for measurement in some]
+
+
+def _bands(step: MeshSolution, where: Where) -> list[ReadingError]:
+    quadratic = step.solution.quadratic
+    assert quadratic is not None
+    return field_errors(quadratic, where)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,19 +146,25 @@ class Problem:
     ----------
     scenes : Scenes
         The body and the media of each scene.
-    sources : list of Sources
+    lights : list of SplitLights
         The lights of each scene.
     lumping : {"lumped", "consistent"}
     limit : bool
         Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`.
     watch : Stopwatch
+    shared : SharedMesh, optional
+        The mesh to begin with, and what other problems have left on it.
+    others : sequence of Deposit
+        Lights of other problems that the first mesh is to be graded for too.
     """
 
     scenes: Scenes
-    sources: list[Sources]
+    lights: list[SplitLights]
     lumping: Lumping
     limit: bool
     watch: Stopwatch
+    shared: SharedMesh | None = None
+    others: Sequence[Deposit] = ()
 
     @property
     def media(self) -> list[tuple[AnyMedium, ...]]:
@@ -131,42 +174,51 @@ class Problem:
     @property
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
-        return len(set(self.media)), sum(len(sources.deposits) for sources in self.sources)
-
-    def layers_on(self, mesh: TetMesh, tolerance: float) -> LayeredMesh:
-        """A mesh with layers of flat tetrahedra below lit parts of the surface."""
-        deposits = [deposit for sources in self.sources for deposit in sources.deposits]
-        if not any(len(deposit.hints.lit) for deposit in deposits):
-            return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
-        return add_layers(mesh, *layer_sizes(mesh, deposits, tolerance))
+        return len(set(self.media)), sum(len(split.deposits) for split in self.lights)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
         """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
-        assembly = Assembly(mesh)
-        systems = {
-            media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit)
-            for media in dict.fromkeys(self.media)
-        }
-        return lambda scene, coarser: systems[self.media[scene]].step(self.sources[scene], self.watch, coarser)
+        each = dict.fromkeys(self.media)
+        if self.shared is not None and mesh is self.shared.mesh:
+            systems = {media: self._shared_system(self.shared, media) for media in each}
+        else:
+            assembly = Assembly(mesh)
+            systems = {
+                media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit) for media in each
+            }
+        return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
+
+    def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
+        return shared.system(
+            (media, self.lumping, self.limit),
+            lambda: self.scenes.system_on(
+                shared.mesh, media, self.lumping, shared.assembly, limit=self.limit, expected=EXPECTED_LIGHTS
+            ),
+        )
 
 
 def first_mesh(
     problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
 ) -> TetMesh:
-    """The mesher's mesh of a body, refined towards its lights, and between them and detectors."""
+    """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors."""
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
-        with _report_if_slow(report):
-            mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        for fitted, longest in ((False, LONGEST_EDGE), (True, LONGEST_IF_FITTED)):
-            deposits = [each for sources in problem.sources for each in sources.deposits_if(fitted=fitted)]
-            source_points = places_to_resolve(deposits)
+        if problem.shared is not None:
+            mesh = problem.shared.mesh
+        else:
+            with _report_if_slow(report):
+                mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        slack = 1.0 if problem.shared is None else SLACK
+        for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
+            deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
+            # The lights of others are taken to be of the same kind.
+            source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
         if tolerances.readings is not None:
             detector_points = np.array([placed.position for placed in tolerances.placed])
-            all_points, _ = places_to_resolve([each for sources in problem.sources for each in sources.deposits])
+            all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
             for media in dict.fromkeys(problem.media):
                 mesh = grade_between(
                     mesh,
@@ -178,7 +230,8 @@ def first_mesh(
                     tolerances.readings,
                     most_tetrahedra,
                 )
-    report(f"tetrahedralized: {len(mesh.tetrahedra):,} tetrahedra")
+    begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
+    report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 
 
@@ -219,7 +272,9 @@ def solve_and_refine(
     # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
     bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
-    layered = _with_layers(mesh, problem, tolerances, most_tetrahedra)
+    deposits = [deposit for split in problem.lights for deposit in split.deposits] if most_tetrahedra > 0 else []
+    sizes = deposits, tolerances.exitance or tolerances.readings or 0.02
+    layered = with_layers(mesh, *sizes)
     solve_on = problem.solver_on(layered.mesh)
     steps = best_steps = {first: solve_on(first, None)}
     least_ratio = np.inf
@@ -234,7 +289,7 @@ def solve_and_refine(
             with problem.watch.stage("mesh"):
                 scenes = problem.scenes
                 finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
-                finer_layered = _with_layers(finer, problem, tolerances, most_tetrahedra)
+                finer_layered = with_layers(finer, *sizes)
             if len(finer_layered.mesh.tetrahedra) <= most_tetrahedra:
                 # A mesh with layers is no refinement of another one.
                 refines = layered.mesh is mesh and finer_layered.mesh is finer
@@ -247,11 +302,3 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(bodies))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
-
-
-def _with_layers(mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int) -> LayeredMesh:
-    """The mesh with layers; without any if it is to be used as it is."""
-    tolerance = tolerances.exitance or tolerances.readings
-    if most_tetrahedra == 0 or tolerance is None:
-        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
-    return problem.layers_on(mesh, tolerance)

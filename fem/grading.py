@@ -9,6 +9,7 @@ from scipy.spatial.distance import cdist
 from tetlux.fem.media.coefficients import AnyMedium, coefficients_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.boundary.layers import LayeredMesh, add_layers
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
@@ -143,6 +144,13 @@ def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) ->
         lit = beyond == 0.0
         least_depths[lit] = np.maximum(least_depths[lit], LAYERS_REACH * hints.depths[nearest[lit]])
     return heights, least_depths
+
+
+def with_layers(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> LayeredMesh:
+    """A mesh with layers of flat tetrahedra below lit parts of the surface; see `layer_sizes`."""
+    if not any(len(deposit.hints.lit) for deposit in deposits):
+        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
+    return add_layers(mesh, *layer_sizes(mesh, deposits, tolerance))
 
 
 def grade_between(

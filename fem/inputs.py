@@ -7,6 +7,8 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.errors import InputError
 
+# Relative error that is wanted where no tolerance is given.
+DEFAULT_TOLERANCE = 0.02
 # Beyond this, in any unit, products of coordinates overflow.
 FARTHEST = 1e30
 # Squares of powers below this underflow, and squares of powers above its inverse overflow.

@@ -1,4 +1,4 @@
-"""Media by label of a mesh: labels looked up by number or name, and warnings about labelled parts and cavities."""
+"""Media by label of a mesh: look labels up by number or name, and warn of thin parts and of cavities."""
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Media by number or name of a label, each for one channel or a list for several.
+# From the number or name of a label to its medium, or to a list with one medium for each channel.
 GivenMedia = Mapping[Any, AnyMedium] | Mapping[Any, AnyMedium | Sequence[AnyMedium]]
 # Power into cavities below this share of the incident power is called "next to none".
 NEGLIGIBLE = 1e-6
@@ -32,7 +32,7 @@ def find_label(mesh: TetMesh, key: object) -> int:
         If the mesh has no such label, or several of that name.
     """
     labels = list(mesh.region_volumes)
-    known = f"its labels are {mesh.named(labels)}"
+    known = f"its labels are {mesh.label_text(labels)}"
     if isinstance(key, str):
         named = [label for label in labels if mesh.labels.get(label) == key]
         if len(named) > 1:
@@ -50,7 +50,7 @@ def find_label(mesh: TetMesh, key: object) -> int:
 
 
 def resolve_media(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -> list[MediaByLabel]:
-    """Look up the labels of given media, and split lists into channels; the outermost label comes first.
+    """Look up the labels of given media, and split lists into channels, with the outermost label first.
 
     Parameters
     ----------
@@ -72,18 +72,19 @@ def resolve_media(mesh: TetMesh, media: GivenMedia | Sequence[GivenMedia]) -> li
     for key, medium in media.items():
         label = find_label(mesh, key)
         if label in named:
-            raise InputError(f"label {mesh.named([label])} is given a medium twice; give it one.")
+            raise InputError(f"label {mesh.label_text([label])} is given a medium twice; give it one.")
         named[label] = medium
     for label, each in named.items():
         if not isinstance(each, AnyMedium | Sequence) or isinstance(each, str):
-            raise InputError(f"label {mesh.named([label])} is given {each!r}; give it a Medium.")
+            raise InputError(f"label {mesh.label_text([label])} is given {each!r}; give it a Medium.")
     check_labels(mesh, named)
     counts = {label: len(each) for label, each in named.items() if not isinstance(each, AnyMedium)}
     count = next(iter(counts.values()), 1)
     for label, media_given in counts.items():
         if media_given != count or media_given == 0:
             raise InputError(
-                f"label {mesh.named([label])} has {media_given} media for {count} channels; give one, or one for each."
+                f"label {mesh.label_text([label])} has {media_given} media for {count} channels; give one, or one for "
+                "each."
             )
     order = order_outermost_first(mesh, named)
     channels: list[MediaByLabel] = []
@@ -106,7 +107,7 @@ def check_single_label(mesh: TetMesh) -> None:
     if len(labels) > 1:
         first, second = list(labels)[:2]
         raise InputError(
-            f"the mesh has the labels {mesh.named(labels)} and one medium is given; give one for each, as "
+            f"the mesh has the labels {mesh.label_text(labels)} and one medium is given; give one for each, as "
             f"{{{first}: medium, {second}: other}}."
         )
 
@@ -125,7 +126,7 @@ def order_outermost_first(mesh: TetMesh, labels: Iterable[int]) -> list[int]:
 
 
 def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:
-    """Warn of labels whose parts are thin, or whose medium strains diffusion, as `warnings_for_regions` does."""
+    """Warn of labels whose parts are thin or whose medium diffusion models badly, as `warnings_for_regions` does."""
     outer = base_of(next(iter(media.values())))
     faces, pairs, _ = mesh.interfaces
     _, areas = triangle_areas(mesh.points, faces)
@@ -134,7 +135,7 @@ def warnings_for_labels(mesh: TetMesh, media: MediaByLabel) -> list[str]:
     for label, medium in list(media.items())[1:]:
         area = float(areas[(pairs == label).any(axis=1)].sum() + mesh.boundary_areas[boundary == label].sum())
         chord = 4.0 * mesh.region_volumes[label] / area
-        found += warning_for_part(f"label {mesh.named([label])}", chord, base_of(medium), outer)
+        found += warning_for_part(f"label {mesh.label_text([label])}", chord, base_of(medium), outer)
     return found
 
 

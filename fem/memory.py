@@ -109,8 +109,19 @@ def gigabytes(memory: float) -> str:
     return f"{memory / 1e9:.3g}" if memory < 1e11 else f"{memory / 1e9:.0f}"
 
 
+def share_memory(processes: int) -> None:
+    """Say that so many processes share the memory that is available, so that each takes its part only."""
+    global _processes  # noqa: PLW0603
+    _processes = processes
+
+
+_processes = 1
+
+
 def available(root: Path = Path("/")) -> float:
     """Memory that this process may still use, bytes: the least that system, control groups and ``ulimit`` leave.
+
+    It is divided by the number of processes that `share_memory` was told of.
 
     On other systems than Linux it is all memory of the machine, or infinite where that is not known. `root` is the
     folder that holds ``proc`` and ``sys``.
@@ -119,7 +130,7 @@ def available(root: Path = Path("/")) -> float:
     if not found and hasattr(os, "sysconf"):
         with suppress(OSError, ValueError):
             found = [float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")]
-    return max(0.0, min(found, default=float("inf")))
+    return max(0.0, min(found, default=float("inf"))) / _processes
 
 
 def _left_by_system(root: Path) -> Iterator[float]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.error.estimate import ROUNDING
 from tetlux.fem.known.fitted_patch import FittedPatch
-from tetlux.fem.known.split import Sources
+from tetlux.fem.known.split import SplitLights
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.notes import warnings_for
@@ -22,14 +22,14 @@ LARGEST_BULGE = 0.015
 SHALLOW = 0.1
 
 
-def notes_on(solution: Solution, sources: Sources, tolerance: float | None, where: str) -> list[str]:
+def notes_on(solution: Solution, split: SplitLights, tolerance: float | None, where: str) -> list[str]:
     """Collect the notes on a solution.
 
     Parameters
     ----------
     solution : Solution
-    sources : Sources
-        What the lights of the solution leave in the body.
+    split : SplitLights
+        The lights of the solution.
     tolerance : float, optional
         Of the exitance, if it has one.
     where : str
@@ -43,12 +43,12 @@ def notes_on(solution: Solution, sources: Sources, tolerance: float | None, wher
     notes = list(solution.surface.warnings)
     if solution.validity is not None:
         notes += warnings_for(solution.surface, solution.validity)
-    notes += [*sources.warnings, *solution.warnings]
+    notes += [*split.warnings, *solution.warnings]
     if tolerance is not None:
         notes += _on_tolerance(solution, tolerance, where)
     notes += _on_bulge(solution)
     notes += _on_power(solution)
-    notes += _on_fluence(solution, dips=sources.dips)
+    notes += _on_fluence(solution, may_be_negative=split.has_negative_source)
     notes += _on_limited_power(solution)
     notes += _on_shallow_sources(solution)
     notes += _on_exitance(solution)
@@ -72,6 +72,23 @@ def notes_on_readings(readings: Sequence[Reading], tolerance: float | None, wher
             f"{which}: the largest estimated error is {worst:.2g}, {where}.",
             value=float(worst),
         )
+    ]
+
+
+def notes_on_fields(solution: Solution, everywhere: float | None, volume: float | None, where: str) -> list[Note]:
+    """Notes on tolerances of exitance and fluence everywhere that were missed."""
+    found = (
+        ("everywhere", "of the exitance everywhere", everywhere, solution.everywhere_error),
+        ("volume", "of the fluence inside", volume, solution.volume_error),
+    )
+    return [
+        Note(
+            f"{name}-tolerance-missed",
+            f"the tolerance of {tolerance:g} {what} was not met: the estimated error is {error:.2g}, {where}.",
+            value=error,
+        )
+        for name, what, tolerance, error in found
+        if tolerance is not None and not error <= tolerance
     ]
 
 
@@ -111,12 +128,12 @@ def _on_power(solution: Solution) -> Iterator[Note]:
         )
 
 
-def _on_fluence(solution: Solution, *, dips: bool) -> Iterator[Note]:
+def _on_fluence(solution: Solution, *, may_be_negative: bool) -> Iterator[Note]:
     lowest, highest = float(solution.fluence.min()), float(solution.fluence.max())
     if lowest < -NEGLIGIBLE_DIP * highest:
         cause = (
             "beside where a thin beam enters, as the diffusion equation itself has it; read it a mean free path away."
-            if dips
+            if may_be_negative
             else "where tetrahedra are obtuse and light is scarce; ask for a smaller tolerance."
         )
         share = lowest / highest

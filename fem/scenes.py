@@ -1,4 +1,4 @@
-"""`Scenes`: one body and its checked media in every scene that is solved for, by regions or by labels of a mesh."""
+"""`Scenes`: one body with its checked media in each scene, by regions or by labels of a mesh."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,10 +50,20 @@ class Scenes:
     mesh_is_body: bool
 
     def system_on(
-        self, mesh: TetMesh, media: tuple[AnyMedium, ...], lumping: Lumping, assembly: Assembly, *, limit: bool
+        self,
+        mesh: TetMesh,
+        media: tuple[AnyMedium, ...],
+        lumping: Lumping,
+        assembly: Assembly,
+        *,
+        limit: bool,
+        expected: int = 0,
     ) -> System:
-        """Assemble the system of one set of media on a mesh."""
-        expected = self.media.count(media)
+        """Prepare the system of one set of media on a mesh, for as many lights as its scenes have, or are expected.
+
+        `solve` and `solve_each` make all their systems here, of steady diffusion: another model enters as `model_of`.
+        """
+        expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
             return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit)
@@ -81,7 +91,7 @@ def build_scenes(
     regions: Sequence[Region],
     scenes: int,
 ) -> Scenes:
-    """Check a body and its media, and distribute the media over the scenes.
+    """Check a body and its media, and assign the media to the scenes.
 
     Raises
     ------

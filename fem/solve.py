@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal, overload
+from typing import Any, Literal, TypedDict, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
@@ -24,24 +25,32 @@ from tetlux.meshing.tets.mesh import TetMesh
 __all__ = ["solve", "solve_each"]
 
 
+class Options(TypedDict, total=False):
+    """Arguments of `solve` by finite elements that have a default, for the types of what it returns."""
+
+    regions: Sequence[Region]
+    tolerance: float | None
+    detectors: Sequence[Detector]
+    detector_tolerance: float | None
+    everywhere_tolerance: float | None
+    volume_tolerance: float | None
+    mesh: TetMesh | None
+    mass: Lumping
+    subtract: Subtract
+    limit: bool
+    most_tetrahedra: int
+    cache: bool
+    report: Report
+
+
 @overload
 def solve(  # type: ignore[overload-overlap]  # media by label may hold lists of channels, see the next overload
     body: Surface | TetMesh,
     medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
     *,
-    regions: Sequence[Region] = ...,
-    tolerance: float | None = ...,
-    detectors: Sequence[Detector] = ...,
-    detector_tolerance: float | None = ...,
-    mesh: TetMesh | None = ...,
-    mass: Lumping = ...,
-    subtract: Subtract = ...,
-    limit: bool = ...,
-    most_tetrahedra: int = ...,
-    cache: bool = ...,
-    report: Report = ...,
     model: Literal["full"] = ...,
+    **options: Unpack[Options],
 ) -> Solution: ...
 
 
@@ -51,18 +60,8 @@ def solve(
     medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
     lights: Sequence[Light],
     *,
-    regions: Sequence[Region] = ...,
-    tolerance: float | None = ...,
-    detectors: Sequence[Detector] = ...,
-    detector_tolerance: float | None = ...,
-    mesh: TetMesh | None = ...,
-    mass: Lumping = ...,
-    subtract: Subtract = ...,
-    limit: bool = ...,
-    most_tetrahedra: int = ...,
-    cache: bool = ...,
-    report: Report = ...,
     model: Literal["full"] = ...,
+    **options: Unpack[Options],
 ) -> list[Solution]: ...
 
 
@@ -85,9 +84,11 @@ def solve(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
+    tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
+    everywhere_tolerance: float | None = None,
+    volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
     mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
@@ -120,6 +121,15 @@ def solve(
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
         Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+    everywhere_tolerance : float, optional
+        Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
+        of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
+        millionth. Not guaranteed for the rest, such as edges of shadows and corners. Without a tolerance it is one of
+        the L2 error too. The exitance and fluence of the solution then are those of quadratic elements.
+    volume_tolerance : float, optional
+        Wanted relative error of the fluence at almost every point inside: of some 95 % of the volume of each region
+        within each two decades of fluence, down to a millionth of the largest at a node. Not guaranteed within a mean
+        free path of sources that are not points.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
     mass : {"lumped", "consistent"}
@@ -183,6 +193,8 @@ def solve(
             tolerance,
             {
                 "detector_tolerance": detector_tolerance is not None,
+                "everywhere_tolerance": everywhere_tolerance is not None,
+                "volume_tolerance": volume_tolerance is not None,
                 "mass": mass != "lumped",
                 "subtract": subtract != "fitted",
                 "limit": not limit,
@@ -203,6 +215,8 @@ def solve(
         tolerance=tolerance,
         detectors=detectors,
         detector_tolerance=detector_tolerance,
+        everywhere_tolerance=everywhere_tolerance,
+        volume_tolerance=volume_tolerance,
         mesh=mesh,
         mass=mass,
         subtract=subtract,

@@ -3,20 +3,26 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.kept import KeptPlaces, keep_with, kept_on
-from tetlux.fem.known.split import Subtract, check_scenes, sources_of, without_fit
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
+from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
+from tetlux.fem.known.kept_patches import forget_patches
+from tetlux.fem.known.split import Subtract, check_scenes, replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
-from tetlux.fem.notes import notes_on, notes_on_readings
+from tetlux.fem.notes import notes_on, notes_on_fields, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, Detector, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.outcome.fields import error_of_field, use_quadratic_elements
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
+from tetlux.fem.shared import SharedMesh
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
@@ -36,10 +42,13 @@ def solve_each(
     scenes: Sequence[Sequence[Light]],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float | None = 0.02,
+    tolerance: float | None = DEFAULT_TOLERANCE,
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
+    everywhere_tolerance: float | None = None,
+    volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
+    start: SharedMesh | None = None,
     mass: Lumping = "lumped",
     subtract: Subtract = "fitted",
     limit: bool = True,
@@ -65,8 +74,12 @@ def solve_each(
         What is to be read in each scene.
     detector_tolerance : float, optional
         Wanted relative error of what each detector reads.
+    everywhere_tolerance, volume_tolerance : float, optional
+        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside.
     mesh : TetMesh, optional
         A mesh of the body, which is used as it is.
+    start : SharedMesh, optional
+        The mesh to begin with in place of the mesher's; see `tetlux.fem.share.share_mesh`.
     mass : {"lumped", "consistent"}
         Quadrature of the terms without derivatives.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
@@ -107,8 +120,12 @@ def solve_each(
     >>> deep.mesh is shallow.mesh, deep.power.exited < shallow.power.exited
     (True, True)
     """
-    _check_tolerances(tolerance, detectors, detector_tolerance)
+    tolerances = check_tolerances(
+        Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance), detectors
+    )
     check_scenes(scenes)
+    if not most_tetrahedra >= 1:
+        raise InputError(f"most_tetrahedra is {most_tetrahedra}; give a number of at least 1.")
     if isinstance(body, TetMesh):
         if mesh is not None:
             raise InputError("a mesh is given twice; give it as the body, or a surface and its mesh.")
@@ -116,37 +133,47 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = KeptPlaces() if mesh is None else kept_on(mesh)
+        kept = _kept_for(mesh, start)
         if isinstance(body, TetMesh):
-            subtract = without_fit(subtract)
-        sources = [
-            sources_of(lights, each, subtract, tolerance=tolerance or detector_tolerance or 0.02, kept=kept)
-            for lights, each in zip(scenes, checked.bodies, strict=True)
+            subtract = replace_fitted(subtract)
+        wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
+        split = [
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene)
+            for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
-        placed = tuple(place_detector(detector, dark) for detector in detectors)
-        tolerances = Tolerances(tolerance, detector_tolerance, placed)
-    if detector_tolerance is not None:
+        tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
+    if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    problem = Problem(checked, sources, mass, limit, watch)
-    given, reading = mesh is not None, len(detectors) > 0
+    problem = Problem(checked, split, mass, limit, watch, start)
+    given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    keep_with(steps[0].solution.mesh, kept)
+    keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions = []
     for number, step in enumerate(steps):
         with watch.stage("solve"):
-            readings = read_all(detectors, step.solution)
-        notes = notes_on(step.solution, sources[number], tolerance, where)
-        notes += notes_on_readings(readings, detector_tolerance, where)
-        notes += checked.warnings(number, step.solution, given=given)
-        solutions.append(replace(step.solution, readings=readings, warnings=list(dict.fromkeys(notes))))
+            solution = _with_fields(replace(step.solution, readings=read_all(detectors, step.solution)), tolerances)
+        notes = notes_on(solution, split[number], tolerances.exitance, where)
+        notes += notes_on_readings(solution.readings, detector_tolerance, where)
+        notes += notes_on_fields(solution, everywhere_tolerance, volume_tolerance, where)
+        notes += checked.warnings(number, solution, given=given)
+        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes))))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptFits:
+    """The places of charges to follow, and to add to."""
+    if start is not None:
+        # What a run finds does not depend on the runs before it.
+        forget_patches(start.mesh)
+        return start.kept
+    return KeptFits() if mesh is None else fits_of(mesh)
 
 
 def _in_words(limit: MeshLimit) -> str:
@@ -156,8 +183,22 @@ def _in_words(limit: MeshLimit) -> str:
     return f"at the {limit.tetrahedra:,} tetrahedra that {gigabytes(limit.memory)} GB of memory suffice for"
 
 
-def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], detector_tolerance: float | None) -> None:
-    """Refuse tolerances that are not sensible or do not go with the detectors.
+def _with_fields(solution: Solution, tolerances: Tolerances) -> Solution:
+    """The solution by quadratic elements with their errors, where these were asked for."""
+    if not tolerances.fields:
+        return solution
+    errors = {where: error_of_field(solution, where) for where in tolerances.fields}
+    return replace(
+        use_quadratic_elements(solution),
+        everywhere_error=errors.get("surface", np.nan),
+        volume_error=errors.get("inside", np.nan),
+    )
+
+
+def check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
+    """Refuse tolerances out of range, without a detector, or none at all.
+
+    A tolerance everywhere is one of the L2 error too.
 
     Raises
     ------
@@ -165,11 +206,18 @@ def _check_tolerances(tolerance: float | None, detectors: Sequence[Detector], de
     """
     if not isinstance(detectors, Sequence):
         raise InputError(f"detectors are given in a list, but {detectors!r} is none; write [detector].")
-    if tolerance is not None:
-        check_tolerance(tolerance)
-    if detector_tolerance is not None:
-        check_tolerance(detector_tolerance, "detector_tolerance")
-        if len(detectors) == 0:
-            raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
-    elif tolerance is None:
+    for name, value in (
+        ("tolerance", given.exitance),
+        ("detector_tolerance", given.readings),
+        ("everywhere_tolerance", given.everywhere),
+        ("volume_tolerance", given.volume),
+    ):
+        if value is not None:
+            check_tolerance(value, name)
+    if given.readings is not None and len(detectors) == 0:
+        raise InputError("detector_tolerance is for what detectors read, and there is none; give detectors.")
+    if given.exitance is None and given.everywhere is not None:
+        return replace(given, exitance=given.everywhere)
+    if given.exitance is None and not given.need_quadratic:
         raise InputError("there is no tolerance; give tolerance, or detectors and a detector_tolerance.")
+    return given

@@ -10,20 +10,26 @@ STAGES = ("surface", "mesh", "assemble", "solve", "total")
 
 @dataclass
 class Stopwatch:
-    """Seconds by stage; the total counts from when it was made."""
+    """Seconds by stage, which add up to the total since it was made; a stage does not count those within it."""
 
     seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
     started: float = field(default_factory=time.perf_counter)
+    _within: list[float] = field(default_factory=lambda: [0.0])
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Add the time of the block to a stage."""
         start = time.perf_counter()
+        self._within.append(0.0)
         try:
             yield
         finally:
-            self.seconds[name] += time.perf_counter() - start
+            whole = time.perf_counter() - start
+            self.seconds[name] += whole - self._within.pop()
+            self._within[-1] += whole
 
     def read(self) -> dict[str, float]:
-        """Seconds so far."""
-        return {**self.seconds, "total": time.perf_counter() - self.started}
+        """Seconds so far; what belongs to no stage is that of solving."""
+        total = time.perf_counter() - self.started
+        others = sum(seconds for name, seconds in self.seconds.items() if name not in ("solve", "total"))
+        return {**self.seconds, "solve": total - others, "total": total}

@@ -10,10 +10,11 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
 from tetlux.fem.error.by_operator import estimate_by_operator
 from tetlux.fem.error.estimate import Estimate
-from tetlux.fem.known.kept import kept_on
-from tetlux.fem.known.patch import good_nodes, inherit_good_nodes
-from tetlux.fem.known.split import Sources, Subtract, sources_of, without_fit
-from tetlux.fem.known.subtraction import Subtraction, subtract_fitted, subtract_on
+from tetlux.fem.known.kept_fits import fits_of
+from tetlux.fem.known.kept_patches import keep_patch
+from tetlux.fem.known.patch import find_accurate_nodes, inherit_accurate_nodes
+from tetlux.fem.known.split import SplitLights, Subtract, replace_fitted, split_lights
+from tetlux.fem.known.subtraction import Subtraction, subtract_as_before, subtract_fitted, subtract_on
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
@@ -170,30 +171,30 @@ class System:
         with watch.stage("surface"):
             body = Body(self.true_surface, self.media, MeshPartition(self.mesh))
             if self.surface is None or self.surface is self.mesh.surface:
-                subtract = without_fit(subtract)
-            sources = sources_of(lights, body, subtract, kept=kept_on(self.mesh))
-        solution = self._solve(sources, watch, None).whole
-        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *sources.warnings])
+                subtract = replace_fitted(subtract)
+            split = split_lights(lights, body, subtract, kept=fits_of(self.mesh))
+        solution = self._solve(split, watch, None).whole
+        return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *split.warnings])
 
-    def step(self, sources: Sources, watch: Stopwatch, coarser: MeshSolution | None = None) -> MeshSolution:
+    def step(self, split: SplitLights, watch: Stopwatch, coarser: MeshSolution | None = None) -> MeshSolution:
         """Solve, and estimate the error; `coarser` is the solution on a mesh that this one is a refinement of."""
         self._require_steady_diffusion("errors are estimated; call System.solve")
-        solved = self._solve(sources, watch, coarser)
+        solved = self._solve(split, watch, coarser)
         with watch.stage("solve"):
             inner = [region.surface for region in self.regions]
             estimate = estimate_by_operator(solved.loads, solved.of_lights, solved.whole, inner)
         return MeshSolution(replace(solved.whole, error_estimate=estimate.error), estimate, solved.accurate_nodes)
 
-    def _solve(self, sources: Sources, watch: Stopwatch, coarser: MeshSolution | None) -> "_Solved":
+    def _solve(self, split: SplitLights, watch: Stopwatch, coarser: MeshSolution | None) -> "_Solved":
         """Turn deposits into loads and patches, solve one linear system for all, and make a solution of each light."""
         with watch.stage("assemble"):
-            loads = self._loads(sources)
-            subtractions = self._subtractions(sources, coarser)
+            loads = self._loads(split)
+            subtractions = self._subtractions(split, coarser)
             # A light whose points are all subtracted may have nothing on the mesh.
             lit = [light for light, load in enumerate(loads) if load.at_nodes.any()]
             coarse = () if coarser is None else coarser.solution.patches
             fitted = [
-                subtract_fitted(light, each, self.plain, self.mass, coarse) for light, each in sources.fitted.items()
+                subtract_fitted(light, each, self.plain, self.mass, coarse) for light, each in split.fitted.items()
             ]
             operators = [*(self.plain for _ in [*subtractions, *fitted]), *(loads[light].operator for light in lit)]
         with watch.stage("solve"):
@@ -203,11 +204,13 @@ class System:
             for column, each in enumerate(fitted, len(subtractions)):
                 fluences[:, column] = each.fluence_of(fluences[:, column])
         accurate = tuple(
-            good_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False)
+            find_accurate_nodes(each.patch, fluence) for each, fluence in zip(subtractions, fluences.T, strict=False)
         )
         if coarser is None:
             results += self._shrink_patches(subtractions, accurate, fluences, watch)
-        owners = np.array([*sources.owners, *sources.fitted, *lit], dtype=np.int64)
+        for each in subtractions:
+            keep_patch(each.patch, "linear")
+        owners = np.array([*split.owners, *split.fitted, *lit], dtype=np.int64)
         of_lights = []
         for light, load in enumerate(loads):
             fluence = fluences[:, owners == light].sum(axis=1)
@@ -216,15 +219,15 @@ class System:
         quadratic = None
         if is_steady_diffusion(self.model):
             of_lights, quadratic = attach_quadratic(of_lights, loads, self.quadratic)
-        whole = replace(self._sum(of_lights, loads, results, sources), quadratic=quadratic)
+        whole = replace(self._sum(of_lights, loads, results, split), quadratic=quadratic)
         return _Solved(loads, of_lights, whole, accurate)
 
-    def _loads(self, sources: Sources) -> list[Load]:
+    def _loads(self, split: SplitLights) -> list[Load]:
         """The load of each light: of distributed light with `layer_operator`, else with the plain operator."""
         loads = []
-        for light, deposit in enumerate(sources.remaining):
+        for light, deposit in enumerate(split.remaining):
             on_mesh = self._scale_emission(deposit.evaluate_on(self.mesh, self.true_surface, self.coefficients))
-            known = light in sources.owners or light in sources.fitted
+            known = light in split.owners or light in split.fitted
             operator = self.layer_operator if on_mesh.terms.is_distributed and not known else self.plain
             loads.append(load_of(on_mesh, operator))
         return loads
@@ -238,23 +241,20 @@ class System:
         emission = deposit.terms.emission * share[self.mesh.regions]
         return replace(deposit, terms=replace(deposit.terms, emission=emission))
 
-    def _subtractions(self, sources: Sources, coarser: MeshSolution | None) -> list[Subtraction]:
-        """Subtract each patch of charges where it was accurate on the coarser mesh; everywhere if there was none."""
-        mesh = self.mesh
-        accurate: Sequence[BoolArray | None] = [None] * len(sources.charges)
-        if coarser is not None:
-            coarse = coarser.solution.mesh.points
-            accurate = [inherit_good_nodes(each, coarse, mesh) for each in coarser.accurate_nodes]
-        return [
-            subtract_on(mesh, light, charges, self.mass, nodes)
-            for light, charges, nodes in zip(sources.owners, sources.charges, accurate, strict=True)
-        ]
+    def _subtractions(self, split: SplitLights, coarser: MeshSolution | None) -> list[Subtraction]:
+        """Subtract charges where they were accurate on the coarser mesh, or as before on this one, or everywhere."""
+        lights = zip(split.owners, split.charges, strict=True)
+        if coarser is None:
+            return [subtract_as_before(self.mesh, *light, self.mass) for light in lights]
+        coarse = coarser.solution.mesh.points
+        accurate = [inherit_accurate_nodes(each, coarse, self.mesh) for each in coarser.accurate_nodes]
+        return [subtract_on(self.mesh, *light, self.mass, nodes) for light, nodes in zip(lights, accurate, strict=True)]
 
     def _shrink_patches(
         self, subtractions: list[Subtraction], accurate: Sequence[BoolArray], fluences: NumberArray, watch: Stopwatch
     ) -> list[LinearResult]:
         """Shrink patches to their accurate nodes and solve for them again, in place."""
-        shrinking = [i for i in range(len(subtractions)) if not accurate[i].all()]
+        shrinking = [i for i, each in enumerate(subtractions) if not each.is_kept and not accurate[i].all()]
         if not shrinking:
             return []
         with watch.stage("assemble"):
@@ -270,14 +270,14 @@ class System:
         of_lights: Sequence[Solution],
         loads: Sequence[Load],
         results: Sequence[LinearResult],
-        sources: Sources,
+        split: SplitLights,
     ) -> Solution:
         """The solution of all lights together, with residual, iterations and notes of the linear solver."""
         solvers = [operator.solver for operator in dict.fromkeys(load.operator for load in loads)]
         return replace(
             sum_solutions(of_lights),
             warnings=[solver.note for solver in solvers if solver.note],
-            validity=Validity(self.mesh, self.coefficients, sources.deposits),
+            validity=Validity(self.mesh, self.coefficients, split.deposits),
             residual=max((result.residual for result in results), default=0.0),
             iterations=max((result.iterations for result in results), default=0),
         )

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
-# Real or complex numbers.
+# Real or complex numbers, and one of them.
 NumberArray = npt.NDArray[Any]
+Number = Any
 IntArray = npt.NDArray[np.int64]
 # Half the memory of an IntArray, for large tables.
 IndexArray = npt.NDArray[np.int32]

@@ -9,7 +9,16 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.pipeline import LONGEST, surface_from_arrays
 from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
+from tetlux.meshing.surface.subdivide import number_triangle_edges
 from tetlux.meshing.surface.surface import Surface
+
+BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+BOX_FACES = np.array(
+    [
+        [1, 3, 0], [4, 1, 0], [0, 3, 2], [2, 4, 0], [1, 7, 3], [5, 1, 4],
+        [5, 7, 1], [3, 7, 2], [6, 4, 2], [2, 7, 6], [6, 5, 4], [7, 5, 6],
+    ]
+)  # fmt: skip
 
 
 def _check_lengths(**lengths: float) -> None:
@@ -52,10 +61,33 @@ def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int
     _check_lengths(radius=radius)
     if not 1 <= subdivisions <= 7:
         raise InputError(f"subdivisions is {subdivisions}; give 1 to 7.")
-    import trimesh  # noqa: PLC0415
+    points, faces = _icosphere(subdivisions)
+    return _make_surface(Sphere(radius, _to_vector(center)), radius * points + np.asarray(center), faces, unit)
 
-    mesh = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
-    return _make_surface(Sphere(radius, _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit)
+
+def _icosphere(subdivisions: int) -> tuple[FloatArray, IntArray]:
+    """An icosahedron whose triangles are split into four several times, with its points on the unit sphere."""
+    # One point opposite to the other, and between them two rings of five.
+    step = 0.4 * np.pi * np.arange(5)
+    height = np.sqrt(0.2)
+    rings = [
+        np.column_stack([2.0 * height * np.cos(angle), 2.0 * height * np.sin(angle), np.full(5, z)])
+        for angle, z in ((step, height), (step + 0.2 * np.pi, -height))
+    ]
+    points = np.vstack([[0.0, 0.0, 1.0], *rings, [0.0, 0.0, -1.0]])
+    upper = 1 + np.arange(5)
+    after = 1 + (np.arange(5) + 1) % 5
+    lower, lower_after = upper + 5, after + 5
+    top, bottom = np.zeros(5, dtype=np.int64), np.full(5, 11)
+    triangles = [(top, upper, after), (upper, lower, after), (lower, lower_after, after), (bottom, lower_after, lower)]
+    faces = np.vstack([np.column_stack(triangle) for triangle in triangles])
+    for _ in range(subdivisions):
+        ends, edge = number_triangle_edges(faces)
+        (a, b, c), (ab, bc, ca) = faces.T, edge.T + len(points)
+        faces = np.vstack([np.column_stack(part) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+        points = np.vstack([points, points[ends].sum(axis=1)])
+        points /= np.linalg.norm(points, axis=1, keepdims=True)
+    return points, faces
 
 
 def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> Surface:
@@ -87,12 +119,8 @@ def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> 
     """
     for axis, length in zip("xyz", size, strict=True):
         _check_lengths(**{f"size along {axis}": length})
-    import trimesh  # noqa: PLC0415
-
-    mesh = trimesh.creation.box(extents=size)
-    return _make_surface(
-        Box(_to_vector(size), _to_vector(center)), mesh.vertices + np.asarray(center), mesh.faces, unit
-    )
+    points = BOX_CORNERS * size + np.asarray(center)
+    return _make_surface(Box(_to_vector(size), _to_vector(center)), points, BOX_FACES, unit)
 
 
 def slab(width: float, depth: float, *, unit: str = "mm") -> Surface:

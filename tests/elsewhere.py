@@ -11,6 +11,7 @@ from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
 # What is imported here only saves that to every process.
+import tetlux.cases.picture.draw
 import tetlux.cases.run  # noqa: F401
 from tetlux.cases.cli import main
 

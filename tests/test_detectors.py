@@ -94,7 +94,7 @@ def test_a_fibre_collects_within_its_aperture(ball: Surface) -> None:
         assert part.exitance == whole.exitance
         assert part.power is not None
         assert whole.power is not None
-        return part.power / whole.power
+        return float(part.power) / float(whole.power)
 
     # Lambert: sin² of the angle, and all of it at right angles.
     assert share(1.0, 1.0) == pytest.approx(1.0, rel=1e-12)

@@ -18,10 +18,8 @@ import pytest
 
 from tests.conftest import block
 from tests.elsewhere import start_elsewhere
-from tetlux.cases import run
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
-from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import ALL_FILES
 from tetlux.cases.write.publish import claim_folder
 from tetlux.meshing import RunError, sphere, tetrahedralize
@@ -70,8 +68,9 @@ def finished(folder: Path) -> float | None:
 
 
 def left(folder: Path) -> list[str]:
-    """What is in a folder of results beside those of the ball."""
-    return sorted(path.name for path in folder.iterdir() if path.name != "ball")
+    """What is in a folder of results beside those of the ball, tables, and logs."""
+    known = ("ball", "results.csv", "results.parquet", "index.html", "logs")
+    return sorted(path.name for path in folder.iterdir() if path.name not in known)
 
 
 def processes_in(folder: Path) -> list[int]:
@@ -302,13 +301,12 @@ def test_interrupted_at_any_stage(
 
     if stage == "meshing":
         monkeypatch.setattr(child_mesher, "MESHER", INTERRUPTS)
-    elif stage == "drawing":
-        monkeypatch.setattr(picture, "RENDERER", INTERRUPTS)
     else:
         where = {
-            "reading": "tetlux.cases.batch.load_cases",
+            "reading": "tetlux.cases.batch.requests.load_cases",
             "solving": "tetlux.fem.error.by_operator.estimate_error",
             "writing": "tetlux.cases.run.write_mesh",
+            "drawing": "tetlux.cases.picture.draw.draw_frame",
             "publishing": "tetlux.cases.run.publish",
         }[stage]
         monkeypatch.setattr(where, interrupted)
@@ -434,7 +432,7 @@ def test_nowhere_to_print_to(command: list[str], case: Path) -> None:
 def test_what_is_in_the_way_is_told_before_anything_is_solved(
     case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(run, "solve_each", lambda *_, **__: pytest.fail("solved for nothing"))
+    monkeypatch.setattr("tetlux.cases.solve.solve_each", lambda *_, **__: pytest.fail("solved for nothing"))
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "ball").write_text("a file")
     assert main(["run", str(case), "--out", str(tmp_path / "out")]) == 1
@@ -468,16 +466,17 @@ def test_a_mesher_that_dies_fails_its_case_only(
 
 
 def test_a_chart_is_replaced_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in chart.FILES:
+    names = chart.chart_files("chart")
+    for name in names:
         (tmp_path / name).write_text("old")
     monkeypatch.setattr(chart, "draw_chart", lambda _, path: path.write_text("new"))
     monkeypatch.setattr(chart, "as_data", lambda _: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        chart.write_chart([], tmp_path)
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(chart.FILES, "old")
+        chart.write_chart([], tmp_path, "chart")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(names, "old")
     monkeypatch.setattr(chart, "as_data", lambda _: {})
-    chart.write_chart([], tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(chart.FILES)
+    chart.write_chart([], tmp_path, "chart")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert (tmp_path / "chart.json").read_text() == "{}\n"
 
 

@@ -191,5 +191,5 @@ def test_refined_meshes_keep_their_labels() -> None:
     mesh = mesh_from_arrays(POINTS, TETRAHEDRA, labels=UPPER - 5, names={-5: "below"})
     fine = refine(mesh, np.ones(len(TETRAHEDRA), dtype=bool))
     assert fine.region_volumes == pytest.approx({-5: 4000.0, -4: 4000.0})
-    assert fine.named([-5, -4]) == "-5 (below) and -4"
-    assert replace(mesh, labels={}).named([-5]) == "-5"
+    assert fine.label_text([-5, -4]) == "-5 (below) and -4"
+    assert replace(mesh, labels={}).label_text([-5]) == "-5"

@@ -93,7 +93,7 @@ def test_a_wrong_word_is_answered_with_the_right_one(right: str, wrong: str, sen
     ("sweep", "sentence"),
     [
         ("medium.sigma_a: [0.1, -0.1]", "line 5: medium.sigma_a: in the run medium.sigma_a=-0.1: sigma_a is -0.1;"),
-        ("medium.mua: [0.1]", 'medium.mua: in the run medium.mua=0.1: unknown key; did you mean "sigma_a"'),
+        ("medium.mua: [0.1]", 'line 5: sweep.medium.mua: unknown key; did you mean "medium.sigma_a"?'),
         ("medium.sigma_a: [0.1, 0.2], lights.0.pencil.power: [1, -1]",
          "lights[0].pencil.power: in the run medium.sigma_a=0.1,lights.0.pencil.power=-1: power is -1;"),
         # What is wrong with the body of one run is told at the surface, which all runs have.

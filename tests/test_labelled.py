@@ -35,7 +35,7 @@ LIGHT = [PointSource((10.0, 10.0, 19.0))]
 
 def absorbed(mesh: TetMesh, media: Mapping[Any, Medium]) -> float:
     solution: Solution = solve(mesh, media, LIGHT, tolerance=0.9)
-    return solution.power.absorbed
+    return float(solution.power.absorbed)
 
 
 def test_an_island_within_a_shell() -> None:

@@ -13,7 +13,7 @@ from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.known import beam_as_charges as lines
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.images import MOST_CHARGES
-from tetlux.fem.known.split import sources_of
+from tetlux.fem.known.split import split_lights
 from tetlux.meshing import Surface, slab, sphere
 from tetlux.meshing.arrays import FloatArray
 
@@ -180,17 +180,17 @@ def test_only_beams_without_width_are_points(ball: Surface) -> None:
     thin = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), deposit="line")
     wide = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=1.0, deposit="line")
     one, other = (
-        sources_of([thin], Body(ball, (FORWARD,)), "half-space"),
-        sources_of([wide], Body(ball, (FORWARD,)), "half-space"),
+        split_lights([thin], Body(ball, (FORWARD,)), "half-space"),
+        split_lights([wide], Body(ball, (FORWARD,)), "half-space"),
     )
     assert len(one.charges) == 1
     assert len(one.deposits[0].terms.segments.starts) == 0
     assert one.deposits[0].hints.resolution == FORWARD.mean_free_path
     assert len(other.charges) == 0
     # Without images its rays' points could be afforded.
-    assert len(sources_of([wide], Body(ball, (FORWARD,)), "free-space").charges) == 0
+    assert len(split_lights([wide], Body(ball, (FORWARD,)), "free-space").charges) == 0
     assert other.remaining[0].on_mesh is not None
-    plain = sources_of([thin], Body(ball, (FORWARD,)), "nothing")
+    plain = split_lights([thin], Body(ball, (FORWARD,)), "nothing")
     assert len(plain.charges) == 0
     assert plain.remaining[0] is plain.deposits[0]
 
@@ -200,9 +200,9 @@ def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
         PencilBeam((20.0 * math.cos(a), 20.0 * math.sin(a), 0.0), (-math.cos(a), -math.sin(a), 0.0), deposit="line")
         for a in 0.3 * np.arange(20)
     ]
-    sources = sources_of(beams, Body(ball, (FORWARD,)), "half-space")
-    assert 5 < len(sources.charges) < 20
-    assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
-    put = sum(float(c.strengths[: c.sources].sum()) for c in sources.charges)
-    put += sum(scattered(d, FORWARD) for d in sources.remaining)
+    split = split_lights(beams, Body(ball, (FORWARD,)), "half-space")
+    assert 5 < len(split.charges) < 20
+    assert sum(len(c.positions) for c in split.charges) <= MOST_CHARGES
+    put = sum(float(c.strengths[: c.sources].sum()) for c in split.charges)
+    put += sum(scattered(d, FORWARD) for d in split.remaining)
     assert put == pytest.approx(sum(scattered(b.deposit_in(Body(ball, (FORWARD,))), FORWARD) for b in beams), rel=1e-12)

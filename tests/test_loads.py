@@ -13,7 +13,7 @@ from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.operators.loads import load_vector
 from tetlux.meshing import Surface, TetMesh
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.search import cell_tree
+from tetlux.meshing.search import box_tree
 
 FORWARD = Medium(sigma_a=0.05, sigma_s=3.0, g=0.8, eta=1.4)
 # Paths may run this far outside a tetrahedron; slopes on its two sides differ by some times more.
@@ -213,7 +213,7 @@ def test_portions_make_no_difference(portion: int, monkeypatch: pytest.MonkeyPat
     starts, ends = random.uniform(-2.5, 2.5, size=(2, 70, 3)) - [0, 0, 2.5]
     segments = beams(starts, ends)
     load = segment_load(mesh, coefficients_of(FORWARD), segments)
-    monkeypatch.setattr(cell_tree, "PAIRS_AT_ONCE", portion)
+    monkeypatch.setattr(box_tree, "PAIRS_AT_ONCE", portion)
     assert segment_load(mesh, coefficients_of(FORWARD), segments) == pytest.approx(load, abs=1e-14)
     tree = mesh.tree
     parts = list(tree.cut(segments.starts, segments.directions, segments.lengths))
@@ -247,8 +247,8 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
         starts = np.column_stack([random.uniform(-0.5, 0.5, size=(200, 2)) * size, np.zeros(200)])
         segments = beams(starts, starts * 0.5 - np.array([0.0, 0.0, size]))
         tree = mesh.tree
-        levels = [Counting(level) for level in tree._levels]
-        tree._levels = levels  # type: ignore[assignment]
+        levels = [Counting(level) for level in tree._boxes._levels]
+        tree._boxes._levels = levels  # type: ignore[assignment]
         passed = sum(len(part.cells) for part in tree.cut(segments.starts, segments.directions, segments.lengths))
         opened = sum(level.opened for level in levels)
         # 6.1 in the ball, 1.0 in the block.
@@ -256,7 +256,7 @@ def test_few_boxes_are_opened_for_each_tetrahedron_that_is_passed(ball_mesh: Tet
         tested = [len(cells) for *_, cells in tree._near(segments.starts, segments.directions, segments.lengths)]
         # 2.7 and 2.1.
         assert sum(tested) < 4.0 * passed
-        assert max(tested) <= cell_tree.PAIRS_AT_ONCE
+        assert max(tested) <= box_tree.PAIRS_AT_ONCE
 
 
 def test_far_from_the_origin_nothing_falls_between_tetrahedra() -> None:

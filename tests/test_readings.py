@@ -281,8 +281,9 @@ def test_a_case_with_a_tolerance_for_detectors(tmp_path: Path, capsys: pytest.Ca
     ("tolerance", "message"),
     [
         ("{detectors: 2}", "tolerance.detectors: expected a number less than 1"),
-        ("{}", "give a tolerance of exitance or detectors, or leave tolerance out"),
-        ("{readings: 0.01}", "unknown key; .*the keys here are exitance, detectors"),
+        ("{}", "give a tolerance of exitance, detectors, everywhere or volume, or leave tolerance out"),
+        ("{readings: 0.01}", "unknown key; .*the keys here are exitance, detectors, everywhere, volume"),
+        ("{volume: 0}", "tolerance.volume: expected a number greater than or equal to 0.0001"),
         ("[0.01]", "expected a number"),
     ],
 )

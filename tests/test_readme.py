@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.meshes_made import cube_of_cubes
+from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.meshing import TetMesh
@@ -21,7 +22,7 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_python_lines_run_and_say_what_they_promise() -> None:
-    first, second = blocks("python")
+    first, second, _ = blocks("python")
     names: dict[str, Any] = {}
     exec(first, names)
     solution = names["solution"]
@@ -45,7 +46,7 @@ def test_the_python_lines_run_and_say_what_they_promise() -> None:
 
 
 def test_the_case_file_is_right(tmp_path: Path) -> None:
-    text, marble, head = blocks("yaml")
+    text, _, marble, head = blocks("yaml")
     (tmp_path / "plate.yaml").write_text(text)
     assert [case.name for case in load_cases(tmp_path / "plate.yaml")] == [
         f"plate/medium.sigma_a={value}" for value in (0.001, 0.01, 0.1)
@@ -64,6 +65,26 @@ def test_the_case_file_is_right(tmp_path: Path) -> None:
     (case,) = load_cases(tmp_path / "head.yaml")
     assert case.mesh is not None
     assert case.mesh.region_volumes == pytest.approx({1: 4000.0, 2: 4000.0})
+
+
+def test_a_sweep_ends_in_a_plot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pandas")
+    _, sweep, *_ = blocks("yaml")
+    monkeypatch.chdir(tmp_path)
+    Path("probe.yaml").write_text(sweep)
+    assert main(["run", "probe.yaml", "--quiet", "--jobs", "1"]) == 0
+    names: dict[str, Any] = {}
+    exec(blocks("python")[2], names)
+    weak, strong = (line.get_ydata() for line in names["axes"].get_lines())
+    # More absorption, less light; 5 mm away least where both are strong.
+    assert (np.diff(weak) < 0).all()
+    assert (np.diff(strong) < 0).all()
+    assert strong[-1] < weak[-1]
+    assert len(weak) == 4
+    assert names["axes"].get_xlabel() == "absorption [1/mm]"
+    assert {"results.csv", "readings.csv", "index.html", "logs", "probe"} <= {
+        path.name for path in Path("results").iterdir()
+    }
 
 
 def test_every_key_of_the_case_file_is_explained() -> None:

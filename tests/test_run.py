@@ -1,7 +1,6 @@
 """Runs: what they write, whole or not at all."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,11 +9,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tetlux.cases import batch, run
+from tetlux.cases import run
+from tetlux.cases.batch import grouping, workshop
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
-from tetlux.cases.picture import draw as picture
 from tetlux.cases.run import run_case
 from tetlux.cases.shipped import find_case_file
 from tetlux.fem.exact import slab
@@ -79,10 +78,11 @@ def test_the_summary_holds_what_it_promises(finished: Path) -> None:
     # At nodes, none of which need lie where the exitance is largest.
     assert channel["fluence"]["max"] > 2 * 2.948 * channel["exitance"]["mean"]
     assert 0 < channel["error_estimate"] <= 0.1
-    assert set(summary["seconds"]) == {"surface", "mesh", "assemble", "solve", "write", "total"}
-    near, *others = summary["warnings"]
+    *stages, total = summary["seconds"]
+    assert (*stages, total) == ("start", "surface", "mesh", "assemble", "solve", "write", "total")
+    assert sum(summary["seconds"][stage] for stage in stages) == pytest.approx(summary["seconds"]["total"], abs=1e-3)
+    (near,) = summary["warnings"]
     assert near.startswith("within 2 mean free paths of where light enters")
-    assert all("without PyVista" in warning for warning in others)
     validity = channel["validity"]
     assert validity["albedo"] == pytest.approx(channel["albedo"])
     assert validity["least_thickness_in_mean_free_paths"] == pytest.approx(20 * 1.01, rel=0.03)
@@ -125,24 +125,25 @@ def test_what_holds_for_a_sweep_is_said_once(
     (tmp_path / "ball.yaml").write_text(QUICK + "outputs: []\nsweep: {medium.sigma_a: [0.01, 0.02, 0.03, 0.04]}\n")
     (tmp_path / "alone.yaml").write_text(QUICK + "outputs: []\n")
 
-    def pretend(case: Case, out: Path, report: run.Report, *, cache: bool, note: run.Report) -> Path:
+    def pretend(case: Case, out: Path, *_: object, **__: object) -> run.FinishedCase:
         if "0.03" in case.name:
             raise RunError("no luck")
-        note("of every run")
-        if "0.02" in case.name:
-            note("of one run")
-        return out
+        return run.FinishedCase(out, {}, ["of every run", *(["of one run"] if "0.02" in case.name else [])], [])
 
-    monkeypatch.setattr(batch, "run_case", pretend)
-    assert main(["run", str(tmp_path / "ball.yaml"), str(tmp_path / "alone.yaml"), "--out", str(tmp_path / "o")]) == 1
+    monkeypatch.setattr(workshop, "finish_case", pretend)
+    monkeypatch.setattr(grouping, "FEWEST_TO_SHARE", 99)
+    here = ["--jobs", "1", "--out", str(tmp_path / "o")]
+    assert main(["run", str(tmp_path / "ball.yaml"), str(tmp_path / "alone.yaml"), *here]) == 1
     lines = capsys.readouterr().out.splitlines()
     notes = [line for line in lines if "of every run" in line or "of one run" in line]
     assert notes[0].startswith("note, in 3 of 4 runs (ball/")
     assert notes[1] == "note, in 1 of 4 runs (ball/medium.sigma_a=0.02): of one run"
     assert notes[2].endswith("s  note: of every run")
     assert len(notes) == 3
-    monkeypatch.setattr(batch, "run_case", lambda case, out, report, *, cache, note: note("of every run") or out)
-    assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "o")]) == 0
+    monkeypatch.setattr(
+        workshop, "finish_case", lambda case, out, *_, **__: run.FinishedCase(out, {}, ["of every run"], [])
+    )
+    assert main(["run", str(tmp_path / "ball.yaml"), *here]) == 0
     (said,) = [line for line in capsys.readouterr().out.splitlines() if "of every run" in line]
     assert said == "note, in all 4 runs: of every run"
 
@@ -187,7 +188,7 @@ def test_a_failing_case_does_not_stop_the_others(
             raise RunError("the mesher failed.")
         return solve_each(surface, *rest, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(run, "solve_each", failing)
+    monkeypatch.setattr("tetlux.cases.solve.solve_each", failing)
     (tmp_path / "a.yaml").write_text(QUICK.replace("sphere: {radius: 10}", "box: {size: [9, 9, 9]}"))
     (tmp_path / "b.yaml").write_text(QUICK + "outputs: [surface]\n")
     assert main(["run", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml"), "--out", str(tmp_path / "out")]) == 1
@@ -217,16 +218,6 @@ def test_an_output_folder_that_cannot_be_made(case: Case, tmp_path: Path, capsys
     assert "choose another folder with --out" in printed.err
     with pytest.raises(RunError, match="results cannot be written to"):
         run_case(replace(case, outputs=()), tmp_path / "file")
-
-
-def test_a_machine_without_rendering_still_gets_its_picture(
-    case: Case, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(picture, "RENDERER", (sys.executable, "-c", "import os; os.kill(os.getpid(), 11)"))
-    folder = run_case(replace(case, outputs=("picture",)), tmp_path)
-    assert (folder / "picture.png").stat().st_size > 20_000
-    summary = json.loads((folder / "summary.json").read_text())
-    assert "apt-get install" in summary["warnings"][-1]
 
 
 def test_a_warning_of_some_channels_names_them(tmp_path: Path) -> None:

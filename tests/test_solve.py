@@ -327,3 +327,9 @@ def test_charges_refuse_what_is_for_finite_elements(ball: Surface, options: dict
     expected = f'model "charges" does not take {names}; leave out what it does not take, or give model="full".'
     with pytest.raises(InputError, match=f"^{expected}$"):
         solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], model="charges", **options)
+
+
+@pytest.mark.parametrize("most", [0, -5, float("nan")])
+def test_no_tetrahedra_at_all_are_refused(ball: Surface, most: int) -> None:
+    with pytest.raises(InputError, match=rf"^most_tetrahedra is {most}; give a number of at least 1\.$"):
+        solve(ball, TISSUE, [PointSource((0.0, 0.0, 5.0))], most_tetrahedra=most)

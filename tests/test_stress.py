@@ -15,7 +15,7 @@ from PIL import Image
 
 from tetlux.cases.cli import main
 from tetlux.cases.stress import command as stress_module
-from tetlux.cases.stress import scenarios
+from tetlux.cases.stress import point_scenarios, scenarios
 from tetlux.cases.stress.command import stress
 from tetlux.cases.stress.files import COLUMNS, FILES
 from tetlux.cases.stress.grid import PANELS
@@ -25,7 +25,7 @@ from tetlux.cases.stress.panels import Axis, Panel, Value
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
 from tetlux.cases.stress.trials import Trial
-from tetlux.cases.stress.variants import CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
+from tetlux.cases.stress.variants import CHARGES, CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
 from tetlux.fem.linear import direct, krylov
 from tetlux.fem.linear import solver as linear
 from tetlux.meshing.arrays import FloatArray
@@ -99,6 +99,10 @@ def test_bad_tetrahedra_and_hard_shapes_are_among_them() -> None:
     shapes = " ".join(map(str, quick["shapes"].x.values))
     for kind in ("needle", "plate", "touching", "cavity"):
         assert kind in shapes
+    kinds = " ".join(map(str, (*quick["charges"].x.values, *quick["charges"].y.values)))
+    for kind in ("thin", "edge", "core", "shallow", "albedo 0.5"):
+        assert kind in kinds
+    assert {"near", "far"} <= set(quick["readings"].y.values)
     variants = {variant.name for panel in PANELS for variant in panel.variants}
     assert {DEFAULT.name, NOT_REFINED.name, CONSISTENT.name, NOTHING.name} <= variants
 
@@ -142,7 +146,9 @@ def test_a_run_is_measured_against_the_closed_form() -> None:
     assert 0.001 < diagnostics.error < 0.1
     assert diagnostics.overshoot is not None
     assert diagnostics.overshoot < 0
+    assert diagnostics.ledger is not None
     assert abs(diagnostics.ledger) < 1e-12
+    assert diagnostics.residual is not None
     assert 0 < diagnostics.residual < 1e-10
 
 
@@ -187,6 +193,34 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     assert 5 < measure(scenarios.diffuse_by_decay_and_albedo(1.0, 0.99), DEFAULT).iterations < 200
 
 
+def test_charges_are_measured_against_the_closed_form() -> None:
+    scenario = point_scenarios.charges_by_body_and_light("box, by an edge", "1 deep")
+    found = measure(scenario, CHARGES)
+    assert found.error is not None
+    assert found.bound is not None
+    # Measured .0021, estimate .0042, bound .012.
+    assert 1e-4 < found.error < 0.01
+    assert found.error < found.bound < 0.1
+    assert (found.lowest, found.ledger, found.residual) == (None, None, None)
+    assert broken_rules(run_of(found, CHARGES)) == {}
+    assert list(violations(run_of(replace(found, bound=0.5 * found.error), CHARGES))) == ["bound"]
+
+
+def test_readings_are_measured_and_a_miss_is_found() -> None:
+    scenario = point_scenarios.readings_by_body_and_place("ball", "behind")
+    found = measure(scenario, DEFAULT)
+    assert found.error is not None
+    # Measured .0005, bar .0006.
+    assert 1e-5 < found.error < 0.03
+    assert 1e-5 < found.estimate < 0.05
+    assert broken_rules(run_of(found)) == {}
+    assert scenario.readings is not None
+    places, truth = scenario.readings
+    other = measure(replace(scenario, readings=(places, truth * np.array([1.0, 1.0, 1.2, 1.0]))), DEFAULT)
+    assert other.error == pytest.approx(1.0 - 1.0 / 1.2, abs=0.03)
+    assert list(violations(run_of(other))) == ["silent error"]
+
+
 @pytest.mark.parametrize("kind", scenarios.LENGTH_KINDS[:4])
 def test_lengths_are_compared_with_scale_1(kind: str) -> None:
     scenario = scenarios.ball_by_length_and_light(1e3, kind)
@@ -214,6 +248,8 @@ def test_lengths_are_compared_with_scale_1(kind: str) -> None:
         ({"error": 0.051}, "silent error"),
         ({"error": math.inf}, "silent error"),
         ({"error": 0.2, "warnings": (OF_MODEL,)}, "silent error"),
+        ({"error": 0.06, "estimate": 0.02, "of_readings": True}, "silent error"),
+        ({"error": 0.01, "bound": 0.009}, "bound"),
         ({"finite": False}, "not a number"),
         ({"lowest": math.nan}, "not a number"),
     ],
@@ -237,6 +273,9 @@ def test_what_must_hold_is_named_where_it_does_not(changes: dict[str, Any], rule
         {"overshoot": 1e-12},
         {"error": None},
         {"error": 0.2, "warnings": (OF_MODEL, NOT_MET)},
+        {"error": 0.06, "estimate": 0.04, "of_readings": True},
+        {"error": 0.06, "estimate": math.inf, "of_readings": True},
+        {"lowest": None, "ledger": None, "residual": None},
     ],
 )
 def test_what_is_allowed_is_no_violation(changes: dict[str, Any]) -> None:

@@ -12,7 +12,7 @@ from tetlux.fem.exact import half_space
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
 from tetlux.fem.known.patch import Patch, _any_inside, _point_cells, patch_of
-from tetlux.fem.known.split import Subtract, sources_of
+from tetlux.fem.known.split import Subtract, split_lights
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.meshing import Surface, TetMesh, box, slab, sphere, surface_from_arrays, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
@@ -202,13 +202,13 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
     point = PointSource((0.0, 0.0, -9.0))
     for radius, most in ((2.5, 1), (20.0, 0)):
         wide = PencilBeam((0.0, 0.0, 30.0), (0.0, 0.0, -1.0), radius=min(radius, 9.0))
-        sources = sources_of([point, wide], Body(ball, (TISSUE,)), "half-space")
-        assert len(sources.charges[0].positions) > 1
-        assert sum(len(c.positions) for c in sources.charges) <= MOST_CHARGES
-        assert sum(float(d.terms.powers.sum()) for d in sources.remaining) + sum(
-            float(c.strengths[: c.sources].sum()) for c in sources.charges
-        ) == pytest.approx(sum(float(d.terms.powers.sum()) for d in sources.deposits))
-        assert len(sources.charges) >= 1 + most
+        split = split_lights([point, wide], Body(ball, (TISSUE,)), "half-space")
+        assert len(split.charges[0].positions) > 1
+        assert sum(len(c.positions) for c in split.charges) <= MOST_CHARGES
+        assert sum(float(d.terms.powers.sum()) for d in split.remaining) + sum(
+            float(c.strengths[: c.sources].sum()) for c in split.charges
+        ) == pytest.approx(sum(float(d.terms.powers.sum()) for d in split.deposits))
+        assert len(split.charges) >= 1 + most
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from tests.benchmarks.scenes import SCENES
 from tetlux.fem import PointSource, System, solve, solve_each
 from tetlux.fem.body.body import Body
-from tetlux.fem.known.split import sources_of
+from tetlux.fem.known.split import split_lights
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing import Surface, TetMesh, refine, sphere
 
@@ -47,7 +47,7 @@ def test_every_scene_of_several_meets_the_tolerance(ball: Surface) -> None:
 def test_a_gap_that_cannot_be_closed_is_no_curvature(ball_mesh: TetMesh) -> None:
     """Nodes stuck beside their surface add as much to the estimate on a finer mesh, and not more and more."""
     wide, medium = sphere(10.4), SCENES["sphere"]("").medium
-    sources = sources_of([PointSource((0.0, 0.0, 0.0))], Body(ball_mesh.surface, (medium,)), "half-space")
+    sources = split_lights([PointSource((0.0, 0.0, 0.0))], Body(ball_mesh.surface, (medium,)), "half-space")
     errors, mesh = [], ball_mesh
     for _ in range(3):
         errors.append(System(mesh, medium, wide).step(sources, Stopwatch()).estimate.error)

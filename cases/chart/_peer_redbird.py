@@ -29,13 +29,15 @@ def _solve(redbirdpy: Any, job: dict[str, Any]) -> Any:
     nodes, cells = job["nodes"], job["tetrahedra"]
     # redbirdpy's boundary term is (1 - R)/(1 + R)/2, that of tetlux is 1/(2A).
     reflection = (1.0 - 2.0 * float(job["robin"])) / (1.0 + 2.0 * float(job["robin"]))
-    scattering = 1.0 / (3.0 * float(job["diffusion"])) - float(job["sigma_a"])
+    absorption = job["sigma_a"]
+    scattering = 1.0 / (3.0 * job["diffusion"]) - absorption
+    media = np.column_stack([absorption, scattering, np.zeros(len(absorption)), np.full(len(absorption), job["eta"])])
     config, _ = redbirdpy.meshprep(
         {
             "node": nodes,
             "elem": cells + 1,
-            "seg": np.ones(len(cells), dtype=int),
-            "prop": np.array([[0.0, 0.0, 1.0, 1.0], [float(job["sigma_a"]), scattering, 0.0, float(job["eta"])]]),
+            "seg": job["regions"] + 1,
+            "prop": np.vstack([[0.0, 0.0, 1.0, 1.0], media]),
             "reff": reflection,
             # With a direction redbirdpy would move the sources by a mean free path along it.
             "srcpos": job["points"],

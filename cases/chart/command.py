@@ -4,11 +4,11 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from tetlux.cases.batch import load_all
-from tetlux.cases.chart.benchmark import prepare_benchmark
-from tetlux.cases.chart.files import FILES, write_chart
-from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS
-from tetlux.cases.chart.meshless import MESHLESS, MONTE_CARLO, has_monte_carlo
+from tetlux.cases.batch.requests import load_all
+from tetlux.cases.chart.benchmark import prepare_benchmark, prepare_readings_benchmark
+from tetlux.cases.chart.files import chart_files, write_chart
+from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, READING_METHODS
+from tetlux.cases.chart.meshless import CHARGES_FOR_READINGS, MESHLESS, MONTE_CARLO, has_monte_carlo
 from tetlux.cases.chart.methods import Method
 from tetlux.cases.chart.peers import PEERS
 from tetlux.cases.chart.runs import MeasuredBenchmark, measure_methods
@@ -17,13 +17,17 @@ from tetlux.fem import Medium, PointSource, solve
 from tetlux.meshing.errors import InputError, TetluxError
 from tetlux.meshing.shapes import sphere
 
-DEFAULT_CASES = ("slab", "sphere", "torus", "hare")
+DEFAULT_CASES = ("slab", "sphere", "torus", "hare", "daylight")
+DEFAULT_CASES_OF_READINGS = ("fibres", "finger", "head")
+# Names of the files.
+CHART, CHART_OF_READINGS = "chart", "chart-readings"
 
 
 def chart(
     requests: Sequence[str],
     out: Path,
     *,
+    readings: bool = False,
     quick: bool = False,
     report: Callable[[str], None] = print,
 ) -> int:
@@ -34,9 +38,12 @@ def chart(
     Parameters
     ----------
     requests : sequence of str
-        Case files, or names of those that ship.
+        Case files, or names of those that ship; if there are none, those of the chart in README.
     out : Path
         Folder of the three files.
+    readings : bool
+        Whether to compare what detectors read, and not the exitance over the surface; the files are then named
+        ``chart-readings``.
     quick : bool
         Whether to run a few coarse resolutions of each method only.
     report : callable
@@ -52,40 +59,44 @@ def chart(
     InputError
         If a case is wrong or has a sweep, or `out` cannot be written to.
     """
-    cases = load_all(requests)
+    cases = load_all(requests or (DEFAULT_CASES_OF_READINGS if readings else DEFAULT_CASES))
+    name, prepare = (CHART_OF_READINGS, prepare_readings_benchmark) if readings else (CHART, prepare_benchmark)
     for case in cases:
         if case.sweep_values:
             raise InputError(f"{case.source} has a sweep, but a chart takes single scenes; leave sweep out.")
     check_writable(out)
-    methods = _methods(report)
+    methods = _methods(report, readings=readings)
     _warm_up()
     measured: list[MeasuredBenchmark] = []
     failed = 0
     for case in cases:
         try:
-            benchmark = prepare_benchmark(case, quick=quick)
+            benchmark = prepare(case, quick=quick)
             count, reference = len(benchmark.samples.points), benchmark.reference.description
-            report(f"{case.name}: {count:,} sample points; the reference is {reference}")
+            points = "detectors" if readings else "sample points"
+            report(f"{case.name}: {count:,} {points}; the reference is {reference}")
             measured.append(
                 MeasuredBenchmark(benchmark, measure_methods(benchmark, methods, quick=quick, report=report))
             )
-            write_chart(measured, out)
+            write_chart(measured, out, name)
         except TetluxError as error:
             failed += 1
             print(f"tetlux: {case.name} failed: {error}", file=sys.stderr, flush=True)
     if failed < len(cases):
-        report(f"written to {out}: {', '.join(FILES)}")
+        report(f"written to {out}: {', '.join(chart_files(name))}")
     return 1 if failed else 0
 
 
-def _methods(report: Callable[[str], None]) -> list[Method]:
+def _methods(report: Callable[[str], None], *, readings: bool) -> list[Method]:
     """The methods that can run here; report those that cannot."""
-    methods = [*MESHLESS, *FINITE_ELEMENTS]
+    methods = [CHARGES_FOR_READINGS, *READING_METHODS] if readings else [*MESHLESS, *FINITE_ELEMENTS]
     for peer in PEERS:
         if peer.is_installed:
             methods += peer.methods
         else:
             report(f'{peer.name} is left out, since it is not installed; pip install "tetlux[peers]" installs it.')
+    if readings:
+        return methods
     if has_monte_carlo():
         methods.append(MONTE_CARLO)
     else:

@@ -16,22 +16,34 @@ from tetlux.cases.write.publish import replace_files
 from tetlux.cases.write.summary import LIBRARIES
 from tetlux.meshing.host.libraries import installed_versions
 
-FILES = ("chart.csv", "chart.png", "chart.json")
+
+def chart_files(name: str) -> tuple[str, str, str]:
+    """The files of a chart."""
+    return f"{name}.csv", f"{name}.png", f"{name}.json"
 
 
-def write_chart(measured: Sequence[MeasuredBenchmark], out: Path) -> None:
+def write_chart(measured: Sequence[MeasuredBenchmark], out: Path, name: str) -> None:
     """Write the three files, all or none.
+
+    Parameters
+    ----------
+    measured : sequence of MeasuredBenchmark
+    out : Path
+        Their folder.
+    name : str
+        Of the files, without their suffix.
 
     Raises
     ------
     RunError
         If they cannot be written.
     """
-    with replace_files(out, FILES) as folder:
-        _write_table([run for entry in measured for run in entry.runs], folder / "chart.csv")
-        draw_chart(measured, folder / "chart.png")
+    table, picture, data = chart_files(name)
+    with replace_files(out, (table, picture, data)) as folder:
+        _write_table([run for entry in measured for run in entry.runs], folder / table)
+        draw_chart(measured, folder / picture)
         text = json.dumps(as_data(measured), indent=2, allow_nan=False)
-        (folder / "chart.json").write_text(text + "\n", encoding="utf-8")
+        (folder / data).write_text(text + "\n", encoding="utf-8")
 
 
 def _write_table(runs: Sequence[Measurement], path: Path) -> None:
@@ -47,8 +59,8 @@ def as_data(measured: Sequence[MeasuredBenchmark]) -> dict[str, Any]:
         "cases": {entry.benchmark.case.name: _case_as_data(entry) for entry in measured},
         "runs": [asdict(run) for entry in measured for run in entry.runs],
         "seconds": "from the surface in memory to the exitance at the surface, without imports and mesh cache",
-        "error": "relative L2 error of the exitance over the samples of the surface; for Monte Carlo, which solves "
-        "radiative transfer, the difference between the two models",
+        "error": f"{measured[0].benchmark.quantity}; for Monte Carlo, which solves radiative transfer, the difference "
+        "between the two models",
         "machine": {"cores": os.cpu_count(), "processor": platform.machine()},
         "versions": {"python": platform.python_version()}
         | installed_versions((*LIBRARIES, *(peer.package for peer in PEERS))),

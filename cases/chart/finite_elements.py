@@ -1,5 +1,6 @@
 """Methods of the chart: tetlux's finite elements, plain and with grading, adaptivity and subtraction."""
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -51,24 +52,26 @@ def _on_mesh(
 
         def solution_for(surface: Surface) -> Solution:
             mesh = mesh_for(benchmark, surface, value)
-            return solve(surface, case.medium, case.lights, mesh=mesh, subtract=subtract)
+            return solve(surface, case.medium, case.lights, regions=benchmark.regions, mesh=mesh, subtract=subtract)
 
         return _time_solution(benchmark, solution_for)
 
     return run
 
 
-def _uniform_mesh(_benchmark: Benchmark, surface: Surface, refinements: float) -> TetMesh:
-    mesh = tetrahedralize(surface, cache=False)
+def _uniform_mesh(benchmark: Benchmark, surface: Surface, refinements: float) -> TetMesh:
+    inner = [region.surface for region in benchmark.regions]
+    mesh = tetrahedralize(surface, inner, cache=False)
     for _ in range(int(refinements)):
-        mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), surface)
+        mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), surface, inner)
     return mesh
 
 
 def graded_mesh(benchmark: Benchmark, surface: Surface, longest: float) -> TetMesh:
     """Make a mesh whose edges are at most `longest` times their distance from the light."""
-    mesh = tetrahedralize(surface, cache=False)
-    return grade_mesh(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest)
+    inner = [region.surface for region in benchmark.regions]
+    mesh = tetrahedralize(surface, inner, cache=False)
+    return grade_mesh(mesh, surface, *benchmark.lit, MOST_TETRAHEDRA, longest=longest, inner=inner)
 
 
 def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:
@@ -82,6 +85,7 @@ def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:
                 surface,
                 case.medium,
                 case.lights,
+                regions=benchmark.regions,
                 tolerance=tolerance,
                 subtract=subtract,
                 most_tetrahedra=MOST_TETRAHEDRA,
@@ -91,6 +95,37 @@ def _adaptive(subtract: Subtract) -> Callable[[Benchmark, float], Outcome]:
         return _time_solution(benchmark, solution_for)
 
     return run
+
+
+def _readings(benchmark: Benchmark, tolerance: float) -> Outcome:
+    """Refine until the error bar of each reading meets a tolerance."""
+    case = benchmark.case
+
+    def run() -> Outcome:
+        surface = replace(case.surface)
+        started = time.perf_counter()
+        solution = solve(
+            surface,
+            case.medium,
+            case.lights,
+            regions=benchmark.regions,
+            tolerance=None,
+            detectors=benchmark.detectors,
+            detector_tolerance=tolerance,
+            most_tetrahedra=MOST_TETRAHEDRA,
+            cache=False,
+        )
+        seconds = time.perf_counter() - started
+        bars = [math.nan if each.relative_error is None else each.relative_error for each in solution.readings]
+        return Outcome(
+            np.array([reading.exitance for reading in solution.readings]),
+            seconds,
+            len(solution.mesh.points),
+            len(solution.mesh.tetrahedra),
+            float(np.median(bars)),
+        )
+
+    return fastest_run(benchmark, run)
 
 
 def _has_point_sources(benchmark: Benchmark) -> bool:
@@ -137,4 +172,16 @@ FINITE_ELEMENTS = (
         _has_point_sources,
     ),
     Method(OURS, "tolerance", (0.05, 0.02, 0.01, 0.005, 0.002, 0.001), _adaptive("fitted"), quick=2),
+)
+# Methods of a chart of readings, where light has faded by decades and uniform meshes are of no use.
+READING_METHODS = (
+    *(method for method in FINITE_ELEMENTS if method.name in ("P1, graded", "P1, adaptive")),
+    Method(
+        "half-space subtracted, adaptive",
+        "tolerance",
+        (0.05, 0.02, 0.01, 0.005, 0.002),
+        _adaptive("half-space"),
+        _has_point_sources,
+    ),
+    Method(OURS, "detector tolerance", (0.1, 0.05, 0.02, 0.01, 0.005, 0.002), _readings, quick=2),
 )

@@ -46,8 +46,17 @@ def _charges(benchmark: Benchmark, tolerance: float) -> Outcome:
         # A copy, which has no cached results of earlier runs.
         surface = replace(benchmark.case.surface)
         started = time.perf_counter()
-        solution = solve(surface, benchmark.case.medium, benchmark.case.lights, model="charges", tolerance=tolerance)
-        solution.exitance  # noqa: B018 - computed at first access
+        solution = solve(
+            surface,
+            benchmark.case.medium,
+            benchmark.case.lights,
+            regions=benchmark.regions,
+            model="charges",
+            tolerance=tolerance,
+            detectors=benchmark.detectors,
+        )
+        if not benchmark.detectors:
+            solution.exitance  # noqa: B018 - computed at first access
         seconds = time.perf_counter() - started
         exitance = solution.exitance_at(benchmark.samples.points)
         return Outcome(exitance, seconds, solution.charges, None, solution.error_estimate)
@@ -106,14 +115,18 @@ def has_monte_carlo() -> bool:
     return importlib.util.find_spec("numba") is not None
 
 
+CHARGES = Method(
+    "charges",
+    "tolerance",
+    (0.02, 0.005, 0.002, 0.001, 0.0005),
+    _charges,
+    lambda benchmark: benchmark.has_point_sources,
+    quick=2,
+)
+# Readings far from the light need more charges than the exitance over the surface does.
+CHARGES_FOR_READINGS = replace(CHARGES, values=(0.02, 0.001, 0.0005, 0.0002, 0.0001))
 MESHLESS = (
-    Method(
-        "charges",
-        "tolerance",
-        (0.02, 0.005, 0.002, 0.001, 0.0005),
-        _charges,
-        lambda benchmark: benchmark.has_point_sources and isinstance(benchmark.case.medium, Medium),
-    ),
+    CHARGES,
     Method(
         "dipole alone",
         "",

@@ -74,7 +74,8 @@ class Method:
 
     def values_for(self, benchmark: Benchmark, *, quick: bool = False) -> tuple[float, ...]:
         """The values for which the reference of a benchmark is accurate enough; if `quick`, the first few."""
-        least = COARSER * benchmark.reference.error if self.parameter == "tolerance" else 0.0
+        compared = "detector tolerance" if benchmark.detectors else "tolerance"
+        least = COARSER * benchmark.reference.error if self.parameter == compared else 0.0
         values = tuple(value for value in self.values if value >= least)
         return values[: self.quick] if quick else values
 

@@ -4,7 +4,7 @@ import importlib.util
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,15 @@ import numpy as np
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.finite_elements import GRADINGS, graded_mesh
 from tetlux.cases.chart.methods import REPEAT_SECONDS, Method, Outcome
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.region import only_medium
 from tetlux.fem.outcome.exitance_field import LinearFluence
+from tetlux.meshing.arrays import Vector
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.scratch import run_child, scratch
-from tetlux.meshing.surface.solids import Slab, Sphere, Torus
+from tetlux.meshing.surface.solids import Cylinder, Shape, Slab, Sphere, Torus
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.nesting import nesting
 
 # A peer is stopped after this many seconds.
 TIME_LIMIT = 300.0
@@ -48,11 +53,12 @@ class Peer:
 
 
 def _problem(benchmark: Benchmark) -> dict[str, Any]:
-    """The equation and its sources, as every peer needs them."""
+    """The equation and its sources, as every peer needs them; coefficients of the body and of each region."""
     medium = benchmark.case.medium
+    media = [medium, *(each for region in benchmark.regions if isinstance(each := only_medium(region), Medium))]
     return {
-        "diffusion": medium.diffusion,
-        "sigma_a": medium.sigma_a,
+        "diffusion": np.array([each.diffusion for each in media]),
+        "sigma_a": np.array([each.sigma_a for each in media]),
         "robin": 1.0 / (2.0 * medium.boundary_factor),
         "eta": medium.eta,
         "points": np.array([point for point, _ in benchmark.sources]),
@@ -87,29 +93,41 @@ def run_peer(script: str, job: dict[str, Any]) -> dict[str, Any]:
             return {key: data[key] for key in data.files}
 
 
-def _exact_shape(benchmark: Benchmark) -> dict[str, Any]:
-    """The shape of the body, as ``_peer_ngsolve.py`` makes it."""
-    shape = benchmark.shape
-    if isinstance(shape, Sphere):
-        return {"kind": "sphere", "sizes": [shape.radius], "center": shape.center}
-    if isinstance(shape, Torus):
-        return {"kind": "torus", "sizes": [shape.major, shape.minor], "center": shape.center}
-    assert isinstance(shape, Slab)
-    return {"kind": "slab", "sizes": [shape.width, shape.depth], "center": (0.0, 0.0, 0.0)}
+def exact_shapes(surface: Surface, inner: Sequence[Surface]) -> dict[str, Any]:
+    """The shapes of a body and of its regions, as ``_peer_ngsolve.py`` makes them, with the longest edge of a mesh."""
+    surfaces = [surface, *inner]
+    kinds, sizes, centers = zip(*(_exact_shape(surface.shape) for surface in surfaces), strict=True)
+    thickness = min(2.0 * surface.volume / surface.area for surface in surfaces)
+    return {
+        "kinds": np.array(kinds),
+        "sizes": np.array(sizes),
+        "centers": np.array(centers),
+        "parents": np.array(nesting(surface, inner).parents, dtype=int),
+        "longest": LONGEST * thickness,
+    }
+
+
+def _exact_shape(shape: Shape | None) -> tuple[str, tuple[float, float], Vector]:
+    """Kind, sizes and centre of a shape."""
+    match shape:
+        case Sphere():
+            return "sphere", (shape.radius, 0.0), shape.center
+        case Torus():
+            return "torus", (shape.major, shape.minor), shape.center
+        case Cylinder():
+            return "cylinder", (shape.radius, shape.height), shape.center
+        case Slab():
+            return "slab", (shape.width, shape.depth), (0.0, 0.0, 0.0)
+    raise AssertionError(shape)
 
 
 def _ngsolve(order: int) -> Callable[[Benchmark, float], Outcome]:
     """Make a method that solves with NGSolve on netgen's mesh of the exact shape, graded towards the source."""
 
     def run(benchmark: Benchmark, grading: float) -> Outcome:
-        surface = benchmark.case.surface
-        job = {
-            "order": order,
-            "resolution": grading,
-            "longest": LONGEST * 2.0 * surface.volume / surface.area,
-            "samples": benchmark.samples.points,
-        }
-        result = run_peer("_peer_ngsolve.py", _problem(benchmark) | _exact_shape(benchmark) | job)
+        shapes = exact_shapes(benchmark.case.surface, [region.surface for region in benchmark.regions])
+        job = {"order": order, "resolution": grading, "samples": benchmark.samples.points}
+        result = run_peer("_peer_ngsolve.py", _problem(benchmark) | shapes | job)
         return Outcome(result["exitance"], float(result["seconds"]), int(result["unknowns"]), int(result["tetrahedra"]))
 
     return run
@@ -121,7 +139,7 @@ def _redbird(benchmark: Benchmark, longest: float) -> Outcome:
     started = time.perf_counter()
     mesh = graded_mesh(benchmark, surface, longest)
     meshing = time.perf_counter() - started
-    job = {"nodes": mesh.points, "tetrahedra": mesh.tetrahedra}
+    job = {"nodes": mesh.points, "tetrahedra": mesh.tetrahedra, "regions": mesh.regions}
     result = run_peer("_peer_redbird.py", _problem(benchmark) | job)
     field = LinearFluence(mesh, surface, benchmark.case.medium, result["fluence"])
     return Outcome(
@@ -137,7 +155,9 @@ def _has_point_sources(benchmark: Benchmark) -> bool:
 
 
 def _has_exact_shape(benchmark: Benchmark) -> bool:
-    return benchmark.has_point_sources and isinstance(benchmark.shape, Sphere | Slab | Torus)
+    known = isinstance(benchmark.shape, Sphere | Slab | Torus | Cylinder)
+    inner = all(isinstance(region.surface.shape, Sphere | Cylinder) for region in benchmark.regions)
+    return benchmark.has_point_sources and known and inner
 
 
 PEERS = (

@@ -25,9 +25,15 @@ PANELS = ((1.1, 3.7), (5.9, 2.4), (9.05, 2.4), (11.7, 4.2))
 WIDEST = 150  # most characters in a line of notes
 # Columns of the key, by position: the quantity whose exponent is shown, and the heading.
 KEY_COLUMNS = {0.89: ("error", "p"), 1.0: ("seconds", "q")}
-NOTE = (
+OF_EXITANCE = (
     "Seconds: from the surface in memory to the exitance at the surface, meshing included, with nothing cached. "
     "Error: relative L2 over the surface (of a slab with a closed form, both faces away from the rim). "
+)
+OF_READINGS = (
+    "Seconds: from the surface in memory to the readings, meshing included, with nothing cached. "
+    "Error: of each detector's reading, relative; the median over the detectors. "
+)
+NOTE = (
     "NGSolve is given the exact shape, all others its triangles. "
     "p, q: error ~ unknowns^p, seconds ~ unknowns^q, by least squares over the runs shown."
 )
@@ -90,7 +96,7 @@ def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
             figure.add_axes((x / WIDTH, bottom / height, width / WIDTH, (ROW - BELOW - ABOVE) / height))
             for x, width in PANELS
         )
-        _draw_runs(entry.runs, left, middle, right)
+        _draw_runs(entry.runs, entry.benchmark.quantity, left, middle, right)
         _draw_reference(entry.benchmark, left, middle)
         _draw_key(entry.runs, key)
     figure.text(
@@ -101,7 +107,8 @@ def draw_chart(measured: Sequence[MeasuredBenchmark], path: Path) -> None:
 
 def _notes(measured: Sequence[MeasuredBenchmark]) -> list[str]:
     """The lines of the notes below the picture."""
-    lines = textwrap.wrap(NOTE, WIDEST)
+    read = any(entry.benchmark.detectors for entry in measured)
+    lines = textwrap.wrap((OF_READINGS if read else OF_EXITANCE) + NOTE, WIDEST)
     if any(run.method == MONTE_CARLO.name for entry in measured for run in entry.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
     if any(entry.benchmark.reference.error > 0 for entry in measured):
@@ -132,8 +139,8 @@ def _draw_reference(benchmark: Benchmark, left: Axes, middle: Axes) -> None:
     )
 
 
-def _draw_runs(runs: Sequence[Measurement], left: Axes, middle: Axes, right: Axes) -> None:
-    """Error over seconds, error over unknowns, seconds over unknowns."""
+def _draw_runs(runs: Sequence[Measurement], error: str, left: Axes, middle: Axes, right: Axes) -> None:
+    """Error over seconds, error over unknowns, seconds over unknowns; `error` says which error it is."""
     _draw_front(runs, left)
     for name, style in STYLES.items():
         mine = [run for run in runs if run.method == name]
@@ -142,7 +149,6 @@ def _draw_runs(runs: Sequence[Measurement], left: Axes, middle: Axes, right: Axe
         _plot_line(left, style, [run.seconds for run in mine], [run.error for run in mine])
         _plot_line(middle, style, unknowns, [run.error for run in sized])
         _plot_line(right, style, unknowns, [run.seconds for run in sized])
-    error = "relative L2 error of exitance"
     for axes, below, beside in ((left, "seconds", error), (middle, "unknowns", error), (right, "unknowns", "seconds")):
         _format_axes(axes, below, beside)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from tetlux.cases.file.channels import check_unique_names
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import BODY
 from tetlux.cases.file.media import read_media
 from tetlux.cases.file.reader import Reader
@@ -121,7 +121,7 @@ def _read_mesh_body(document: Document, spec: MeshSpec, unit: str, channels: int
         with document.at(key):
             label = find_label(mesh, name)
             if label in media:
-                raise InputError(f"label {mesh.named([label])} has two media; give it one.")
+                raise InputError(f"label {mesh.label_text([label])} has two media; give it one.")
         nodes = mesh.points[mesh.tetrahedra[mesh.regions == label].reshape(-1)]
         media[label] = read_media(document, key, medium, nodes, mesh.unit, channels, reader)
     with document.at(("mesh", "labels")):

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from tetlux.cases.compare.comparison import Comparison
 from tetlux.cases.file.detectors import NamedDetector
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.picture.view import UPRIGHT
@@ -17,6 +17,9 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.notes import Note, in_region
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+if TYPE_CHECKING:
+    from tetlux.cases.compare.comparison import Comparison
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,22 +68,26 @@ class Case:
     detectors : tuple of NamedDetector
     detector_tolerance : float, optional
         Of what the detectors read.
+    everywhere_tolerance, volume_tolerance : float, optional
+        Of the exitance at almost every point of the surface, and of the fluence inside.
     camera : (3,) floats, optional
         Where the picture is taken from and radiance is computed, unit.
     up : (3,) floats
         The direction that is up in the picture.
     toward : (3,) ndarray, optional
         Unit vector from the body to the eye of the picture; if not given, it is chosen by the light.
+    start_seconds : float
+        From the start of the command until its first case file was read; 0 for other cases.
     reading_seconds : float
-        Time spent on reading and checking the surface.
+        Time spent on reading and checking the case and its files.
     mesh : TetMesh, optional
         A mesh that is used as it is; `surface` is then its boundary.
     comparison : Comparison, optional
         Closed forms to compare the run with.
     spec : CaseSpec
         The validated case file of this run.
-    sweep_values : mapping of str to float or str
-        The values of this run of a sweep, by dotted key; empty without a sweep.
+    sweep_values : mapping
+        The values of this run of a sweep, plain data by dotted key; empty without a sweep.
     """
 
     name: str
@@ -92,14 +99,17 @@ class Case:
     tolerance: float | None
     outputs: tuple[str, ...]
     spec: CaseSpec
-    sweep_values: Mapping[str, float | str]
+    sweep_values: Mapping[str, Any]
     detectors: tuple[NamedDetector, ...] = ()
     detector_tolerance: float | None = None
+    everywhere_tolerance: float | None = None
+    volume_tolerance: float | None = None
     camera: Vector | None = None
     up: Vector = UPRIGHT
     toward: FloatArray | None = None
+    start_seconds: float = 0.0
     reading_seconds: float = 0.0
-    comparison: Comparison | None = None
+    comparison: "Comparison | None" = None
     mesh: TetMesh | None = None
 
     @property

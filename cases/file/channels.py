@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from tetlux.cases.file.colours import RGB
-from tetlux.cases.file.document import Document, Key, format_key
+from tetlux.cases.file.documents.document import Document, Key, format_key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.media import MaterialSpec, Media
 

@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel
 
-from tetlux.cases.file.document import Key
+from tetlux.cases.file.documents.document import Key
 from tetlux.cases.file.schema.case import CaseSpec
 
 # The name of the part of the body that is outside of all regions.

@@ -1,21 +1,26 @@
 """`load_cases`: from a case file to its runs, with all that can be checked before meshing."""
 
+import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from tetlux.cases.compare.comparison import Comparison, comparison_for
 from tetlux.cases.file.body import CaseBody, read_body
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
 from tetlux.cases.file.channels import ALL, channel_names, check_unique_names
 from tetlux.cases.file.detectors import NamedDetector, build_detector
-from tetlux.cases.file.document import Document, Key, read_document
+from tetlux.cases.file.documents.base import read_with_base
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
-from tetlux.cases.file.reader import Reader
+from tetlux.cases.file.reader import FilesRead, Reader
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.sweep import LONGEST_NAME, expand_sweep
+from tetlux.cases.file.sweeps.expand import expand_sweep
+from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
 from tetlux.cases.picture.view import toward_camera
+from tetlux.cases.start import take_start_seconds
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.medium import Medium
@@ -24,8 +29,11 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 
+if TYPE_CHECKING:
+    from tetlux.cases.compare.comparison import Comparison
 
-def load_cases(path: Path) -> list[Case]:
+
+def load_cases(path: Path, files: FilesRead | None = None) -> list[Case]:
     """Read a case file and check all that can be checked before meshing.
 
     That is keys and values, surfaces, the size of the body in mean free paths, and that lights meet the body.
@@ -33,6 +41,8 @@ def load_cases(path: Path) -> list[Case]:
     Parameters
     ----------
     path : Path
+    files : FilesRead, optional
+        What other case files have read already; what this one reads is added to it.
 
     Returns
     -------
@@ -51,25 +61,27 @@ def load_cases(path: Path) -> list[Case]:
     >>> case.name, case.channel_names, case.surface.unit
     ('sphere', ('all',), 'mm')
     """
-    document = read_document(path)
+    start_seconds, started = take_start_seconds(), time.perf_counter()
+    document = read_with_base(path)
     spec = validate(document, document.data)
-    reader = Reader(path.parent)
+    reader = Reader(path.parent, files or FilesRead())
     cases = []
     for run in expand_sweep(document, spec):
-        of_run = document if run.label is None else Document(path, run.data, {**document.lines, **run.lines}, run.label)
+        of_run = document if run.label is None else Document(path, run.data, run.places, run.label)
         spec_of_run = spec if run.label is None else validate(of_run, run.data)
         name = spec_of_run.name or path.stem
         if name in (".", "..") or not name.isprintable() or len(name.encode(errors="replace")) > LONGEST_NAME:
             raise of_run.error(("name",), "this cannot be the name of a folder; give a short, printable name.")
         folder = name if run.label is None else f"{name}/{run.label}"
-        cases.append(_build_case(of_run, spec_of_run, folder, reader, run.values))
+        case = _build_case(of_run, spec_of_run, folder, reader, run.values)
+        # What several runs share is read for the first.
+        now = time.perf_counter()
+        cases.append(replace(case, start_seconds=start_seconds, reading_seconds=now - started))
+        start_seconds, started = 0.0, now
     return cases
 
 
-def _build_case(
-    document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, float | str]
-) -> Case:
-    reader.seconds = 0.0
+def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, values: Mapping[str, Any]) -> Case:
     channels = channel_names(document, spec)
     body = read_body(document, spec, len(channels), reader)
     if spec.model == "charges":
@@ -88,6 +100,8 @@ def _build_case(
         mesh=body.mesh,
         tolerance=spec.tolerances.exitance,
         detector_tolerance=spec.tolerances.detectors,
+        everywhere_tolerance=spec.tolerances.everywhere,
+        volume_tolerance=spec.tolerances.volume,
         outputs=tuple(dict.fromkeys(spec.outputs)),
         spec=spec,
         sweep_values=values,
@@ -95,14 +109,18 @@ def _build_case(
         camera=spec.camera.position if spec.camera else None,
         up=spec.up,
         toward=_direction_to_camera(document, spec, body.surface),
-        reading_seconds=reader.seconds,
         comparison=_build_comparison(document, spec, body, deposits),
     )
 
 
-def _build_comparison(document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]) -> Comparison | None:
+def _build_comparison(
+    document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]
+) -> "Comparison | None":
     if not spec.compare:
         return None
+    # Closed forms take a tenth of a second to import.
+    from tetlux.cases.compare.comparison import comparison_for  # noqa: PLC0415
+
     with document.at(("compare",)):
         if len(body.media) > 1 or body.regions or not isinstance(body.media[0], Medium):
             raise InputError("closed forms exist for one channel and one uniform medium only; leave compare out.")

@@ -1,7 +1,7 @@
 """Media of the case file, built as `Medium` or `VaryingMedium`."""
 
 from tetlux.cases.file.channels import value_in_channel
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.reader import Reader
 from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
 from tetlux.fem.media.coefficients import AnyMedium

@@ -1,6 +1,6 @@
-"""`Reader`: reads the files that a case names, each once for all runs of its sweep."""
+"""`Reader`: reads the files that cases name, each once for all runs."""
 
-import time
+import os
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -20,59 +20,70 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass
+class FilesRead:
+    """What has been read, by folder, file and options; several case files may share it.
+
+    Attributes
+    ----------
+    surfaces, meshes, fields, pixels : dict
+    """
+
+    surfaces: dict[object, Surface] = field(default_factory=dict)
+    meshes: dict[object, TetMesh] = field(default_factory=dict)
+    fields: dict[object, Field] = field(default_factory=dict)
+    pixels: dict[object, FloatArray] = field(default_factory=dict)
+
+
+@dataclass
 class Reader:
-    """Reads surfaces, meshes, fields and images, and keeps what it has read.
+    """Reads surfaces, meshes, fields and images, each once.
 
     Attributes
     ----------
     folder : Path
         The folder of the case file, to which file names are relative.
-    seconds : float
-        Time spent on reading and checking surfaces and meshes since this was last set to 0.
+    files : FilesRead
     """
 
     folder: Path
-    seconds: float = 0.0
-    _surfaces: dict[str, Surface] = field(default_factory=dict)
-    _meshes: dict[str, TetMesh] = field(default_factory=dict)
-    _fields: dict[str, Field] = field(default_factory=dict)
-    _pixels: dict[tuple[str, Encoding], FloatArray] = field(default_factory=dict)
+    files: FilesRead = field(default_factory=FilesRead)
 
     def surface(self, spec: SurfaceSpec, unit: str) -> Surface:
         """Read a surface file, or make a built-in shape."""
-        label = spec.model_dump_json() + unit
-        started = time.perf_counter()
-        if label not in self._surfaces:
-            self._surfaces[label] = replace(_surface(spec, unit, self.folder), crease_angle=spec.crease_angle)
-        self.seconds += time.perf_counter() - started
-        return self._surfaces[label]
+        # Built-in shapes are the same for case files in all folders.
+        label = (self._label() if spec.file else "", unit, spec.model_dump_json())
+        if label not in self.files.surfaces:
+            surface = _surface(spec, unit, self.folder)
+            self.files.surfaces[label] = replace(surface, crease_angle=spec.crease_angle)
+        return self.files.surfaces[label]
 
     def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
         """Read a volume mesh."""
-        label = f"{spec.file} {spec.scale!r} {spec.array} {unit}"
-        started = time.perf_counter()
-        if label not in self._meshes:
+        label = (self._label(), spec.file, spec.scale, spec.array, unit)
+        if label not in self.files.meshes:
             path = self.folder / spec.file
-            self._meshes[label] = read_mesh(path, unit=unit, scale=spec.scale, labels=spec.array)
-        self.seconds += time.perf_counter() - started
-        return self._meshes[label]
+            self.files.meshes[label] = read_mesh(path, unit=unit, scale=spec.scale, labels=spec.array)
+        return self.files.meshes[label]
 
     def field(self, spec: FieldSpec) -> Field:
         """Read a coefficient that varies in space."""
-        label = spec.model_dump_json()
-        if label not in self._fields:
-            self._fields[label] = _field(spec, self.folder)
-        return self._fields[label]
+        label = (self._label(), spec.model_dump_json())
+        if label not in self.files.fields:
+            self.files.fields[label] = _field(spec, self.folder)
+        return self.files.fields[label]
 
     def pixels(self, file: str, encoding: Encoding) -> FloatArray:
         """Read an image as linear light, (rows, columns, 3)."""
-        label = file, encoding
-        if label not in self._pixels:
+        label = (self._label(), file, encoding)
+        if label not in self.files.pixels:
             try:
-                self._pixels[label] = read_pixels(self.folder / file, encoding)
+                self.files.pixels[label] = read_pixels(self.folder / file, encoding)
             except InputError as error:
                 raise error.about("file") from error
-        return self._pixels[label]
+        return self.files.pixels[label]
+
+    def _label(self) -> str:
+        return os.path.abspath(self.folder)  # noqa: PTH100 - resolve() would ask the file system for each run
 
 
 def _surface(spec: SurfaceSpec, unit: str, folder: Path) -> Surface:

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tetlux.cases.file.document import Document, Key
+from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.parts import TAG
 from tetlux.cases.hints import did_you_mean
@@ -21,6 +21,7 @@ PLAIN = {
     "too_short": "give at least one",
     "too_long": "",
     "float_type": "expected a number",
+    "int_": "expected a whole number",
 }
 # How YAML writes values that Python writes differently.
 YAML_WORDS = {None: "nothing", True: "true", False: "false"}
@@ -66,10 +67,8 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance"):
+    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep"):
         return f"{text}."
-    if key[:1] == ("sweep",) and kind == "float_type":
-        text = "expected a number or a word"
     hint = ""
     if kind == "literal_error" and isinstance(given, str):
         text = did_you_mean(given, re.findall(r"'(.*?)'", message)) + text

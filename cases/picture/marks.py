@@ -2,29 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tetlux.cases.picture.rasterizer import nearest_triangles
+from tetlux.cases.picture.canvas import Canvas
+from tetlux.cases.picture.rasterizer import visible_triangles
+from tetlux.cases.picture.shading import SIZE, place_samples
 from tetlux.cases.picture.stage import OVERSAMPLING
-from tetlux.cases.picture.view import PANEL, Camera, in_view
+from tetlux.cases.picture.view import PANEL, Camera, caster_of, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 INK, PAPER = "#20242b", "#ffffff"
-# Size of the names: font, points; line height and mean width of a letter, pixels.
-FONT, LINE, LETTER = 11.5, 18.0, 9.6
+# Size of the names: font, line height and mean width of a letter, pixels.
+FONT, LINE, LETTER = 16.0, 18.0, 9.6
 # Pixels between a dot and its name.
 GAP = 10.0
 # Positions of a name relative to its dot (right, down), the best first.
 SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, 1), (1, 1), (-1, -1))
-# This many detectors are tested for being hidden; each costs a test of all triangles.
-MOST_TESTED = 200
-# Opacity of the tint of a region.
-TINT = 0.10
+# Opacity of the tint of a region; length of the dashes and of the gaps of its outline, pixels.
+TINT, DASH, SPACE = 0.10, 7.7, 3.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,25 +79,23 @@ def project_marks(
     Marks
     """
     places = np.array([place for _, place in detectors], dtype=float).reshape(-1, 3)
-    hidden = np.zeros(len(places), dtype=bool)
-    hidden[:MOST_TESTED] = ~in_view(corners, places[:MOST_TESTED], camera.toward, diagonal)
     return Marks(
         outlines=[(region.name, _coverage(camera, region)) for region in regions],
         names=[name for name, _ in detectors],
         dots=camera.project(places)[:, :2],
-        hidden=hidden,
+        hidden=~in_view(caster_of(corners), places, camera.toward, diagonal),
     )
 
 
 def _coverage(camera: Camera, region: RegionOutline) -> FloatArray:
     """The share of each pixel of the panel that a region covers, (h, w)."""
-    placed = camera.project(region.points)[region.triangles] * OVERSAMPLING
-    covered = nearest_triangles(placed, closed=len(placed))[0] >= 0
+    placed = place_samples(camera, region.points[region.triangles])
+    covered = visible_triangles(placed, SIZE, closed=True).owner >= 0
     n = OVERSAMPLING
     return np.asarray(covered.reshape(PANEL[1], n, PANEL[0], n).mean(axis=(1, 3)))
 
 
-def draw_marks(canvas: "Axes", marks: Marks, left: float, top: float) -> None:
+def draw_marks(canvas: Canvas, marks: Marks, left: int, top: int) -> None:
     """Draw marks on a canvas of pixels, on which the panel begins at `left` and `top`."""
     corner = np.array([left, top])
     boxes: list[tuple[float, float, float, float]] = [(x - 6, y - 6, x + 6, y + 6) for x, y in marks.dots + corner]
@@ -111,7 +105,7 @@ def draw_marks(canvas: "Axes", marks: Marks, left: float, top: float) -> None:
 
 
 def _draw_outline(
-    canvas: "Axes",
+    canvas: Canvas,
     name: str,
     coverage: FloatArray,
     corner: FloatArray,
@@ -119,27 +113,44 @@ def _draw_outline(
 ) -> None:
     if not (coverage > 0.5).any():
         return
-    x, y = np.arange(PANEL[0]) + 0.5 + corner[0], np.arange(PANEL[1]) + 0.5 + corner[1]
-    canvas.contourf(x, y, coverage, levels=[0.5, 2.0], colors=[PAPER], alpha=TINT, zorder=2)
-    canvas.contour(x, y, coverage, levels=[0.5], colors=[PAPER], linewidths=3.4, alpha=0.75, zorder=2.1)
-    canvas.contour(x, y, coverage, levels=[0.5], colors=[INK], linewidths=1.5, linestyles=["--"], zorder=2.2)
+    from contourpy import contour_generator  # noqa: PLC0415
+
+    left, top = corner.astype(int).tolist()
+    canvas.shade((coverage > 0.5).astype(float), left, top, PAPER, TINT)
+    # Closed where the panel ends, too.
+    rings = [np.asarray(ring) - 0.5 + corner for ring in contour_generator(z=np.pad(coverage, 1)).lines(0.5)]
+    canvas.lines(rings, 4.7, PAPER, opacity=0.75)
+    canvas.lines([dash for ring in rings for dash in cut_dashes(ring)], 2.1, INK)
     rows, columns = np.nonzero(coverage > 0.5)
     place = np.array([columns.mean(), rows.min()]) + corner
     _write_name(canvas, name, place, boxes, gap=4.0, sides=[(0, -1), (0, 1)])
 
 
 def _draw_detectors(
-    canvas: "Axes", marks: Marks, corner: FloatArray, boxes: list[tuple[float, float, float, float]]
+    canvas: Canvas, marks: Marks, corner: FloatArray, boxes: list[tuple[float, float, float, float]]
 ) -> None:
     for name, dot, hidden in zip(marks.names, marks.dots + corner, marks.hidden, strict=True):
-        face, alpha = ("none", 0.6) if hidden else (PAPER, 1.0)
-        canvas.plot(*dot, "o", markersize=8.5, color="none", markeredgecolor=PAPER, markeredgewidth=3.4, alpha=alpha)
-        canvas.plot(*dot, "o", markersize=8.0, color=face, markeredgecolor=INK, markeredgewidth=1.6, alpha=alpha)
+        opacity = 0.6 if hidden else 1.0
+        canvas.disc(dot.tolist(), 8.3, PAPER, hole=3.6, opacity=opacity)
+        canvas.disc(dot.tolist(), 6.7, INK, hole=4.4, opacity=opacity)
+        if not hidden:
+            canvas.disc(dot.tolist(), 4.4, PAPER)
         _write_name(canvas, name, dot, boxes, gap=GAP)
 
 
+def cut_dashes(line: FloatArray) -> list[FloatArray]:
+    """Cut a line through points (n, 2) into dashes."""
+    length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    dashes = []
+    for start in np.arange(0.0, length[-1], DASH + SPACE):
+        end = min(start + DASH, length[-1])
+        at = np.concatenate([[start], length[(length > start) & (length < end)], [end]])
+        dashes.append(np.column_stack([np.interp(at, length, column) for column in line.T]))
+    return dashes
+
+
 def _write_name(
-    canvas: "Axes",
+    canvas: Canvas,
     name: str,
     place: FloatArray,
     boxes: list[tuple[float, float, float, float]],
@@ -148,8 +159,6 @@ def _write_name(
     sides: Sequence[tuple[int, int]] = SIDES,
 ) -> None:
     """Write a name beside a place without overlapping other marks; leave it out if there is no room."""
-    from matplotlib.patheffects import withStroke  # noqa: PLC0415
-
     width, (x, y) = LETTER * len(name), place
     for across, down in sides:
         middle = x + across * (gap + 0.5 * width), y + down * (gap + 0.5 * LINE)
@@ -157,8 +166,5 @@ def _write_name(
         if any(box[0] < b[2] and b[0] < box[2] and box[1] < b[3] and b[1] < box[3] for b in boxes):
             continue
         boxes.append(box)
-        canvas.text(
-            *middle, name, size=FONT, color=INK, ha="center", va="center", parse_math=False, zorder=4,
-            path_effects=[withStroke(linewidth=3.0, foreground=PAPER)],
-        )  # fmt: skip
+        canvas.text(middle, name, FONT, INK, anchor="mm", outline=PAPER)
         return

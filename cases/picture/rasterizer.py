@@ -1,133 +1,131 @@
-"""A software rasterizer with a depth buffer, for machines where PyVista cannot render."""
+"""A rasterizer with a depth buffer: which triangle is visible at each sample of a picture.
+
+It is in double precision and takes as long as VTK needs to start: 0.1 s for 10,000 triangles, 0.4 s for 100,000.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.picture.stage import (
-    FULL,
-    LIGHT,
-    OVERSAMPLING,
-    SHADED,
-    Image,
-    Stage,
-    see_through,
-)
-from tetlux.cases.picture.view import PANEL
 from tetlux.meshing.arrays import FloatArray, IntArray
 
-# Pairs of pixel and triangle tested at a time, which bounds the memory to about 100 MB.
+# Pairs of sample and triangle that are processed at a time, which bounds the memory to about 100 MB.
 BATCH = 1_000_000
+# Samples this near to the outside of a triangle, in samples, belong to it, so that no gap opens along shared edges.
+SLACK = 1e-7
 
 
-def rasterize(stage: Stage) -> Image:
-    """Draw the body and the arrows, (h, w, 3) at `OVERSAMPLING` times the size of the panel."""
-    corners = np.concatenate([stage.corners, stage.arrows])
-    placed = stage.camera.project(corners.reshape(-1, 3)).reshape(-1, 3, 3) * OVERSAMPLING
-    body = len(stage.corners)
-    bare = nearest_triangles(placed[:body], closed=body)
-    under = _shade(stage, placed, bare[0])
-    if len(corners) == body:
-        return under
-    return see_through(
-        _shade(stage, placed, nearest_triangles(placed, closed=body, behind=bare)[0]), under, stage.background
-    )
+@dataclass(frozen=True, eq=False)
+class Visible:
+    """What is visible at each sample.
+
+    Attributes
+    ----------
+    owner : (h, w) ndarray
+        The triangle, -1 if there is none.
+    nearness : (h, w) ndarray
+        How near it is to the eye, samples; -inf if there is none.
+    """
+
+    owner: IntArray
+    nearness: FloatArray
 
 
-def _shade(stage: Stage, placed: FloatArray, owner: IntArray) -> Image:
-    """Colour each pixel by the triangle that is visible there (h, w), (h, w, 3)."""
-    body = len(stage.corners)
-    flat = owner.ravel()
-    pixels = np.flatnonzero(flat >= 0)
-    flat = flat[pixels]
-    width = owner.shape[1]
-    weights = _weights(placed[flat, :, :2], pixels % width + 0.5, pixels // width + 0.5)
-    colors = np.empty((len(pixels), 3))
-    lit = flat >= body
-    if stage.colours is None:
-        shares = np.einsum("ij,ij->i", weights[~lit], stage.shares[flat[~lit]])
-        colors[~lit] = stage.table[np.clip(shares * 256, 0, 255).astype(int)]
-    else:
-        colors[~lit] = np.einsum("ij,ijk->ik", weights[~lit], stage.colours[flat[~lit]])
-    colors[lit] = LIGHT
-    normals = np.concatenate([stage.normals, stage.arrow_normals])
-    lamp, eye = (
-        np.einsum("ij,ij->i", weights, (normals @ axis)[flat]) for axis in (stage.camera.lamp, stage.camera.toward)
-    )
-    # Like VTK, reverse a normal that points away from the eye.
-    cosine = np.clip(np.where(eye < 0, -lamp, lamp), 0.0, 1.0)
-    colors *= (SHADED + (FULL - SHADED) * cosine)[:, None]
-    image = np.tile(np.round(255 * np.asarray(stage.background)).astype(np.uint8), (owner.size, 1))
-    image[pixels] = np.round(255 * colors).astype(np.uint8)
-    return image.reshape(*owner.shape, 3)
-
-
-def nearest_triangles(
-    placed: FloatArray, closed: int, behind: tuple[IntArray, FloatArray] | None = None
-) -> tuple[IntArray, FloatArray]:
-    """Find the visible triangle of each pixel.
+def visible_triangles(
+    placed: FloatArray, size: tuple[int, int], *, closed: bool, before: FloatArray | None = None
+) -> Visible:
+    """Find the triangle that is visible at each sample.
 
     Parameters
     ----------
     placed : (m, 3, 3) ndarray
-        Corners of the triangles: column and row, in drawn pixels, and nearness.
-    closed : int
-        How many triangles, from the first, belong to a closed surface, of which only front faces are drawn.
-    behind : pair of (h, w) ndarray, optional
-        The result for these `closed` triangles alone, if known; they are then not drawn again.
+        Corners of the triangles: column, row and nearness, in samples, whose middles are at n + 1/2.
+    size : (int, int)
+        Samples in a row and in a column.
+    closed : bool
+        Whether the triangles are a closed surface, of which only front faces can be visible.
+    before : (h, w) ndarray, optional
+        Nearness of what may hide the triangles.
 
     Returns
     -------
-    owner, nearness : (h, w) ndarray
-        The triangle, -1 if none, and how near it is.
+    Visible
     """
-    size = np.array([OVERSAMPLING * n for n in PANEL])
-    a, b, c = (placed[:, i, :2] for i in range(3))
+    width, height = size
+    owner = np.full(width * height, -1, dtype=np.int64)
+    nearness = np.full(owner.shape, -np.inf) if before is None else before.ravel().copy()
+    area, slope_x, slope_y = _planes(placed)
     # Rows count downwards, so that front faces run clockwise.
+    drawn = np.flatnonzero(area < 0 if closed else area != 0)
+    triangle, row, left, right = _strips(placed, drawn, height)
+    first = np.maximum(np.ceil(left - 0.5 - SLACK).astype(np.int64), 0)
+    count = np.maximum(np.minimum(np.floor(right - 0.5 + SLACK).astype(np.int64), width - 1) - first + 1, 0)
+    corner, nearest = placed[:, 0], placed[:, :, 2].max(axis=1)
+    start = corner[triangle, 2] + slope_x[triangle] * (first + 0.5 - corner[triangle, 0])
+    start += slope_y[triangle] * (row + 0.5 - corner[triangle, 1])
+    ends = np.cumsum(count)
+    cuts = np.searchsorted(ends, np.arange(BATCH, int(count.sum()), BATCH))
+    for part in np.split(np.arange(len(count)), cuts):
+        strip, step = np.repeat(part, count[part]), _concatenate_ranges(count[part])
+        own = triangle[strip]
+        # Rounding must not bring a triangle seen edge-on to the front.
+        near = np.minimum(start[strip] + step * slope_x[own], nearest[own])
+        sample = (row * width + first)[strip] + step
+        np.maximum.at(nearness, sample, near)
+        wins = near == nearness[sample]
+        owner[sample[wins]] = own[wins]
+    return Visible(owner.reshape(height, width), nearness.reshape(height, width))
+
+
+def gradients(placed: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Change of values (m, 3) at the corners of triangles by column and by row, (m,) each; 0 where they are edge-on."""
+    a, b, c = (placed[:, i, :2] for i in range(3))
+    along, across = b - a, c - a
+    area = along[:, 0] * across[:, 1] - along[:, 1] * across[:, 0]
+    inverse = np.divide(1.0, area, out=np.zeros(len(area)), where=area != 0)
+    first, second = values[:, 1] - values[:, 0], values[:, 2] - values[:, 0]
+    by_column = (first * across[:, 1] - second * along[:, 1]) * inverse
+    by_row = (second * along[:, 0] - first * across[:, 0]) * inverse
+    return by_column, by_row
+
+
+def _planes(placed: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Twice the signed area of each triangle in the picture, and the change of nearness by column and by row."""
+    a, b, c = (placed[:, i, :2] for i in range(3))
     area = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    drawn = np.flatnonzero((area < 0) | ((area > 0) & (np.arange(len(placed)) >= closed)))
-    if behind is not None:
-        drawn = drawn[drawn >= closed]
-    # The pixels whose centres, at n + 1/2, lie within the bounding rectangle of a triangle.
-    low = np.maximum(np.ceil(placed[drawn, :, :2].min(axis=1) - 0.5).astype(int), 0)
-    high = np.minimum(np.floor(placed[drawn, :, :2].max(axis=1) - 0.5).astype(int), size - 1)
-    columns, rows = np.maximum(high - low + 1, 0).T
-    if behind is None:
-        owner = np.full((size[1], size[0]), -1, dtype=np.int64)
-        nearness = np.full(owner.shape, -np.inf)
-    else:
-        owner, nearness = (array.copy() for array in behind)
-    # One strip is one row of pixels of one triangle.
-    strip, row = np.repeat(np.arange(len(drawn)), rows), _concatenate_ranges(rows)
-    ends = np.cumsum(columns[strip])
-    cuts = np.searchsorted(ends, np.arange(BATCH, int(columns @ rows), BATCH))
-    for part in np.split(np.arange(len(strip)), cuts):
-        long = columns[strip[part]]
-        strips = np.repeat(part, long)
-        first = low[strip[strips]]
-        pixels = np.column_stack([first[:, 0] + _concatenate_ranges(long), first[:, 1] + row[strips]])
-        _keep_nearest(owner, nearness, placed, drawn[strip[strips]], pixels)
-    return owner, nearness
+    return area, *gradients(placed, placed[:, :, 2])
 
 
-def _keep_nearest(
-    owner: IntArray, nearness: FloatArray, placed: FloatArray, triangle: IntArray, pixels: IntArray
-) -> None:
-    """Give each pixel (column, row) to the nearest triangle that covers its centre; updates `owner` and `nearness`."""
-    weights = _weights(placed[triangle, :, :2], *(pixels.T + 0.5))
-    inside = (weights >= -1e-9).all(axis=1)
-    triangle, column, row = triangle[inside], *pixels[inside].T
-    near = np.einsum("ij,ij->i", weights[inside], placed[triangle, :, 2])
-    np.maximum.at(nearness, (row, column), near)
-    wins = near == nearness[row, column]
-    owner[row[wins], column[wins]] = triangle[wins]
+def _strips(placed: FloatArray, drawn: IntArray, height: int) -> tuple[IntArray, IntArray, FloatArray, FloatArray]:
+    """Cut triangles into rows of samples.
 
-
-def _weights(corners: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Barycentric coordinates (n, 3) of points in triangles of the plane (n, 3, 2), pair by pair."""
-    (ax, ay), (bx, by), (cx, cy) = (corners[:, i].T for i in range(3))
-    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / area
-    third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / area
-    return np.column_stack([1.0 - second - third, second, third])
+    Returns
+    -------
+    triangle, row : (s,) ndarray
+        Each row of each of the triangles `drawn`.
+    left, right : (s,) ndarray
+        Where the triangle begins and ends in the middle of that row.
+    """
+    rows = placed[drawn, :, 1]
+    top = np.maximum(np.ceil(rows.min(axis=1) - 0.5).astype(np.int64), 0)
+    count = np.maximum(np.minimum(np.floor(rows.max(axis=1) - 0.5).astype(np.int64), height - 1) - top + 1, 0)
+    triangle, row = np.repeat(drawn, count), np.repeat(top, count) + _concatenate_ranges(count)
+    middle = row + 0.5
+    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        # From the upper end down, so that triangles that share an edge compute the same crossing.
+        start, end = placed[:, i, :2], placed[:, j, :2]
+        swap = (start[:, 1] > end[:, 1])[:, None]
+        start, end = np.where(swap, end, start), np.where(swap, start, end)
+        fall = end[:, 1] - start[:, 1]
+        slope = np.divide(end[:, 0] - start[:, 0], fall, out=np.zeros(len(fall)), where=fall > 0)
+        top_y, low_y = start[triangle, 1], end[triangle, 1]
+        crossing = start[triangle, 0] + (middle - top_y) * slope[triangle]
+        meets = (top_y <= middle) & (middle <= low_y) & (low_y > top_y)
+        left = np.where(meets, np.minimum(left, crossing), left)
+        right = np.where(meets, np.maximum(right, crossing), right)
+    found = np.flatnonzero(left <= right)
+    return triangle[found], row[found], left[found], right[found]
 
 
 def _concatenate_ranges(lengths: IntArray) -> IntArray:

@@ -1,4 +1,4 @@
-"""`Stage`: the input of both renderers, a camera and triangles with normals and colours."""
+"""`Stage`: what is drawn of a body, a camera and triangles with normals and colours."""
 
 import math
 from dataclasses import dataclass
@@ -10,14 +10,22 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_ax
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
-# Both renderers draw 2 x 2 pixels for each of the picture, whose mean smooths edges.
+# A pixel has 2 x 2 samples, whose mean smooths edges.
 OVERSAMPLING = 2
 # The colour map spans at most this many decades below the maximum.
 DECADES = 6.0
 # The colour map spans at least this factor, since a narrower range would show rounding errors as a pattern.
 NARROWEST = 2.0
 # The darkest colours of the map are left out, in which no shape could be seen.
-COLOR_MAP, DARKEST = "inferno", 0.2
+DARKEST = 0.2
+# Every fifth colour of matplotlib's map "inferno" (CC0), which is linear between them within 0.005. Importing it from
+# matplotlib would take a quarter of a second.
+INFERNO = (
+    "000004 02020c 050417 0a0722 10092d 160b39 1e0c45 260c51 2f0a5b 380962 400a67 490b6a 510e6c 59106e 61136e 69166e "
+    "71196e 781c6d 801f6c 88226a 902568 982766 a02a63 a82e5f b0315b b73557 bf3952 c63d4d cc4248 d34743 d94d3d df5337 "
+    "e45a31 e9612b ed6925 f1711f f47918 f78212 f98b0b fa9407 fb9d07 fca60c fcb014 fbba1f fac42a f8cd37 f6d746 f4e156 "
+    "f2ea69 f2f27d f5f992 fcffa4"
+)
 BACKGROUND: Vector = (0.953, 0.957, 0.965)
 # Background of a body with colours of its own.
 DARK: Vector = (0.11, 0.12, 0.14)
@@ -96,9 +104,9 @@ def map_shares(exitance: FloatArray, ends: tuple[float, float] | None) -> FloatA
 
 def color_table() -> FloatArray:
     """The colour map at 256 steps, red, green and blue from 0 to 1, (256, 3)."""
-    from matplotlib import colormaps  # noqa: PLC0415
-
-    return np.asarray(colormaps[COLOR_MAP](np.linspace(DARKEST, 1.0, 256))[:, :3])
+    knots = np.array([list(bytes.fromhex(colour)) for colour in INFERNO.split()]) / 255.0
+    at = np.linspace(DARKEST, 1.0, 256) * (len(knots) - 1)
+    return np.column_stack([np.interp(at, np.arange(len(knots)), column) for column in knots.T])
 
 
 def build_stage(
@@ -141,27 +149,6 @@ def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:
     length = float(np.linalg.norm(back))
     drawn = min(max(length, SHORTEST_ARROW * diagonal), LONGEST_ARROW * diagonal)
     return tip + back * (drawn / length), tip
-
-
-def see_through(image: Image, under: Image, background: Vector) -> Image:
-    """Blend a picture with arrows and one without, so that arrows are translucent where the body is behind them.
-
-    Parameters
-    ----------
-    image, under : (h, w, 3) ndarray of uint8
-        The picture with and without arrows.
-    background : (3,) floats
-        Red, green and blue from 0 to 1.
-
-    Returns
-    -------
-    (h, w, 3) ndarray of uint8
-    """
-    ground = np.round(255 * np.asarray(background)).astype(np.uint8)
-    over = (image != under).any(axis=2) & (under != ground).any(axis=2)
-    mixed = image.copy()
-    mixed[over] = np.round(ARROW_OPACITY * image[over] + (1.0 - ARROW_OPACITY) * under[over]).astype(np.uint8)
-    return mixed
 
 
 def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:

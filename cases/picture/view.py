@@ -8,7 +8,7 @@ import numpy as np
 from tetlux.cases.file.schema.lights import CameraSpec
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.search.proximity import cross_segments
+from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
 
 # Pixels of the panel that shows the body.
@@ -17,7 +17,7 @@ PANEL = (1150, 880)
 LAMP = (-0.35, 0.5, 0.8)
 # Angles about the vertical between lit side and eye, degrees, the best first.
 TURNS = (50.0, -50.0, 25.0, -25.0, 80.0, -80.0, 0.0)
-# This many entry points are tested for visibility; each costs a test of all triangles.
+# This many entry points are tested for visibility.
 MOST_ENTRIES = 12
 # Margin around the body, as a share of the panel.
 MARGIN = 0.05
@@ -140,9 +140,10 @@ def choose_view(
     lit = _lit_side(corners, brightness, lights)
     entries = np.array([ray.end for ray in lights if not ray.is_point][:MOST_ENTRIES]).reshape(-1, 3)
     best, most = _oblique(lit, TURNS[0], up), -1
+    body = caster_of(corners)
     for turn in TURNS:
         view = _oblique(lit, turn, up)
-        visible = int(in_view(corners, entries, view, diagonal).sum())
+        visible = int(in_view(body, entries, view, diagonal).sum())
         if visible > most:
             best, most = view, visible
         if visible == len(entries):
@@ -172,16 +173,15 @@ def _oblique(lit: FloatArray, turn: float, up: Vector) -> FloatArray:
     return direction_of(azimuth + turn, 18.0 + (0.28 if height > 0 else 0.65) * height, up)
 
 
-def in_view(corners: FloatArray, places: FloatArray, toward: FloatArray, diagonal: float) -> BoolArray:
-    """Whether places (n, 3) on a body of triangles (m, 3, 3) are visible from the direction `toward`, (n,)."""
-    count = len(corners)
-    free = np.empty(len(places), dtype=bool)
-    for i, place in enumerate(places):
-        distance, _ = cross_segments(
-            np.broadcast_to(place, (count, 3)), np.broadcast_to(toward, (count, 3)), corners, slack=0.0
-        )
-        free[i] = not (distance > SKIN * diagonal).any()
-    return free
+def in_view(body: RayCaster, places: FloatArray, toward: FloatArray, diagonal: float) -> BoolArray:
+    """Whether places (n, 3) on a body are visible from the direction `toward`, (n,)."""
+    _, hit = body.first(places + SKIN * diagonal * toward, np.broadcast_to(toward, places.shape))
+    return hit < 0
+
+
+def caster_of(corners: FloatArray) -> RayCaster:
+    """Triangles (m, 3, 3), prepared for `in_view`."""
+    return RayCaster(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
 def camera_at(points: FloatArray, toward: FloatArray, up: Vector) -> Camera:

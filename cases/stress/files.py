@@ -15,7 +15,7 @@ from tetlux.cases.write.publish import replace_files
 FILES = ("stress.csv", "stress.md", "stress.png")
 COLUMNS = (
     *("panel", "x_name", "x", "y_name", "y", "method", "outcome", "message", "broken", "violation"),
-    *("lowest", "overshoot", "ledger", "residual", "iterations", "estimate", "tolerance", "error", "scaling"),
+    *("lowest", "overshoot", "ledger", "residual", "iterations", "estimate", "tolerance", "error", "bound", "scaling"),
     *("nodes", "seconds", "warnings"),
 )
 

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from tetlux.cases.stress import scenarios
+from tetlux.cases.stress import point_scenarios, scenarios
 from tetlux.cases.stress.bodies import BODIES
 from tetlux.cases.stress.panels import Axis, Panel
-from tetlux.cases.stress.variants import DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, SIGN_VARIANTS
+from tetlux.cases.stress.variants import CHARGES, DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, SIGN_VARIANTS
 
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
 ALBEDO_BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
@@ -134,5 +134,21 @@ PANELS = (
         Axis("", scenarios.SHAPE_LIGHTS, (scenarios.SHAPE_LIGHTS[0], scenarios.SHAPE_LIGHTS[3])),
         scenarios.body_by_shape_and_light,
         (DEFAULT, NOT_REFINED),
+    ),
+    Panel(
+        "charges",
+        "a point source, lengths in mean free paths; by charges alone, and by finite elements",
+        Axis("", point_scenarios.CHARGE_BODIES, point_scenarios.FEW_CHARGE_BODIES),
+        Axis("", tuple(point_scenarios.CHARGE_LIGHTS), point_scenarios.FEW_CHARGE_LIGHTS),
+        point_scenarios.charges_by_body_and_light,
+        (CHARGES, DEFAULT),
+    ),
+    Panel(
+        "readings",
+        "four detectors on each body, the source 1 mean free path deep; the colour is that of the worst reading",
+        Axis("", point_scenarios.READING_BODIES, point_scenarios.FEW_READING_BODIES),
+        Axis("", point_scenarios.PLACES, point_scenarios.FEW_PLACES),
+        point_scenarios.readings_by_body_and_place,
+        (CHARGES, DEFAULT),
     ),
 )

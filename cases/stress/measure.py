@@ -1,13 +1,15 @@
 """`measure`: solve a scenario with a variant of the solver, and compute what it is judged by."""
 
+import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tetlux.cases.chart.samples import relative_error
 from tetlux.cases.stress.scenarios import TOLERANCE, Scenario, Truth
-from tetlux.cases.stress.variants import Variant
+from tetlux.cases.stress.variants import CHARGES, Variant
+from tetlux.fem import ChargeSolution, PointDetector
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray
@@ -15,6 +17,7 @@ from tetlux.meshing.mesher.api import tetrahedralize
 
 # Limit of the adaptive runs, low since the map shows failures and not how fine a mesh can get.
 MOST_TETRAHEDRA = 30_000
+AnySolution = Solution | ChargeSolution
 
 
 @dataclass(frozen=True)
@@ -23,20 +26,24 @@ class Diagnostics:
 
     Attributes
     ----------
-    lowest : float
-        Smallest fluence at a node, as a share of the largest.
+    lowest : float or None
+        Smallest fluence at a node, as a share of the largest; None without nodes.
     overshoot : float or None
         Largest fluence at a node divided by the bound of the maximum principle, minus 1.
-    ledger : float
-        Missing power, as a share of the incident power.
-    residual : float
-        Largest relative residual of the linear systems on the last mesh, recomputed from their solutions.
+    ledger : float or None
+        Missing power, as a share of the incident power; None for charges, of which it is a measure of their error.
+    residual : float or None
+        Largest relative residual of the linear systems on the last mesh, recomputed from their solutions; None for
+        charges.
     iterations : int
         Most iterations of one of these systems.
     estimate : float
-        Estimated relative L2 error of the exitance.
+        Estimated relative L2 error of the exitance; of readings, the error bar of the worst, infinite if it has none.
     error : float or None
-        The true relative L2 error, if there is a closed form.
+        The true relative L2 error, if there is a closed form; of readings, that of the worst, which exceeds its
+        allowance, the larger of the tolerance and twice its bar, by the largest factor.
+    bound : float or None
+        What the relative L2 error may not exceed, if the method promises that.
     scaling : float or None
         Largest difference from the exitance of the same scenario at unit scale, as a share of the largest exitance.
     finite : bool
@@ -44,14 +51,17 @@ class Diagnostics:
     may_be_negative : bool
         Whether the exact solution itself may be negative.
     nodes : int
+        Or charges.
     seconds : float
     warnings : tuple of str
+    of_readings : bool
+        Whether error and estimate are those of a reading.
     """
 
-    lowest: float
+    lowest: float | None
     overshoot: float | None
-    ledger: float
-    residual: float
+    ledger: float | None
+    residual: float | None
     iterations: int
     estimate: float
     error: float | None
@@ -61,6 +71,8 @@ class Diagnostics:
     nodes: int
     seconds: float
     warnings: tuple[str, ...]
+    bound: float | None = None
+    of_readings: bool = False
 
 
 def measure(scenario: Scenario, variant: Variant) -> Diagnostics:
@@ -68,6 +80,19 @@ def measure(scenario: Scenario, variant: Variant) -> Diagnostics:
     started = time.perf_counter()
     solution = _solve(scenario, variant)
     seconds = time.perf_counter() - started
+    found = _of_charges(solution) if isinstance(solution, ChargeSolution) else _of_mesh(solution, scenario)
+    found = replace(found, seconds=seconds, warnings=tuple(solution.warnings), may_be_negative=scenario.may_be_negative)
+    if scenario.readings is not None:
+        error, bar = _worst_reading(solution, scenario.readings[1])
+        return replace(found, error=error, estimate=bar, bound=None, of_readings=True)
+    if scenario.truth is not None:
+        found = replace(found, error=_true_error(solution, scenario.truth))
+    if scenario.unit_scale is not None:
+        found = replace(found, scaling=_scaling_error(solution, _solve(scenario.unit_scale, variant)))
+    return found
+
+
+def _of_mesh(solution: Solution, scenario: Scenario) -> Diagnostics:
     highest = float(solution.fluence.max())
     return Diagnostics(
         lowest=float(solution.fluence.min()) / highest,
@@ -76,17 +101,56 @@ def measure(scenario: Scenario, variant: Variant) -> Diagnostics:
         residual=solution.residual,
         iterations=solution.iterations,
         estimate=solution.error_estimate,
-        error=None if scenario.truth is None else _true_error(solution, scenario.truth),
-        scaling=None if scenario.unit_scale is None else _scaling_error(solution, _solve(scenario.unit_scale, variant)),
+        error=None,
+        scaling=None,
         finite=bool(np.isfinite(solution.fluence).all() and np.isfinite(solution.exitance).all()),
-        may_be_negative=scenario.may_be_negative,
+        may_be_negative=False,
         nodes=len(solution.mesh.points),
-        seconds=seconds,
-        warnings=tuple(solution.warnings),
+        seconds=0.0,
+        warnings=(),
     )
 
 
-def _solve(scenario: Scenario, variant: Variant) -> Solution:
+def _of_charges(solution: ChargeSolution) -> Diagnostics:
+    return Diagnostics(
+        lowest=None,
+        overshoot=None,
+        ledger=None,
+        residual=None,
+        iterations=0,
+        estimate=solution.error_estimate,
+        error=None,
+        scaling=None,
+        finite=bool(np.isfinite(solution.exitance).all()),
+        may_be_negative=False,
+        nodes=solution.charges,
+        seconds=0.0,
+        warnings=(),
+        bound=solution.error_bound if np.isfinite(solution.error_bound) else None,
+    )
+
+
+def _worst_reading(solution: AnySolution, truth: FloatArray) -> tuple[float, float]:
+    """Error and bar of the reading that exceeds its allowance by most; a missing bar allows any error."""
+    errors = np.abs(np.array([reading.exitance for reading in solution.readings]) / truth - 1.0)
+    bars = np.array([math.inf if each.relative_error is None else each.relative_error for each in solution.readings])
+    worst = int(np.lexsort((errors, errors / np.maximum(TOLERANCE, 2.0 * bars)))[-1])
+    return float(errors[worst]), float(bars[worst])
+
+
+def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
+    places = [] if scenario.readings is None else scenario.readings[0].tolist()
+    detectors = [PointDetector((x, y, z)) for x, y, z in places]
+    if variant == CHARGES:
+        return solve(
+            scenario.surface,
+            scenario.medium,
+            [scenario.light],
+            regions=scenario.regions,
+            tolerance=TOLERANCE,
+            detectors=detectors,
+            model="charges",
+        )
     mesh = scenario.mesh
     if mesh is None and not variant.adaptive:
         mesh = tetrahedralize(scenario.surface, [region.surface for region in scenario.regions])
@@ -96,13 +160,15 @@ def _solve(scenario: Scenario, variant: Variant) -> Solution:
         [scenario.light],
         regions=scenario.regions,
         mesh=mesh,
-        tolerance=TOLERANCE,
+        tolerance=None if detectors else TOLERANCE,
+        detectors=detectors,
+        detector_tolerance=TOLERANCE if detectors else None,
         most_tetrahedra=MOST_TETRAHEDRA,
         **variant.options,
     )
 
 
-def _true_error(solution: Solution, truth: Truth) -> float:
+def _true_error(solution: AnySolution, truth: Truth) -> float:
     samples, exitance = truth
     # Scaled by the largest value: in an opaque body the square of the exitance would underflow.
     largest = float(exitance.max())
@@ -111,11 +177,12 @@ def _true_error(solution: Solution, truth: Truth) -> float:
         return relative_error(values / largest, exitance / largest, samples.weights)
 
 
-def _scaling_error(solution: Solution, unit_scale: Solution) -> float:
+def _scaling_error(solution: AnySolution, unit_scale: AnySolution) -> float:
     here, there = _dimensionless_exitance(solution), _dimensionless_exitance(unit_scale)
     return float(np.abs(here - there).max() / np.abs(there).max())
 
 
-def _dimensionless_exitance(solution: Solution) -> FloatArray:
+def _dimensionless_exitance(solution: AnySolution) -> FloatArray:
     """Exitance at the nodes divided by the mean exitance if all power left."""
-    return np.asarray(solution.exitance * (solution.mesh.area / solution.power.incident))
+    area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
+    return np.asarray(solution.exitance * (area / solution.power.incident))

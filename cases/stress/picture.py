@@ -32,7 +32,8 @@ NOTE = (
     "Colour: relative L2 error of the exitance over the surface, against a closed form; dotted cells have none and "
     "show the solver's own estimate. Values of all axes are drawn evenly spaced. A cross: fluence below -1e-12 of its "
     "maximum where the source has no first moment or above the maximum principle, a ledger off by 1e-9, a residual "
-    "above 1e-8, figures that change with the unit of length, or an error above the tolerance without a warning."
+    "above 1e-8, figures that change with the unit of length, an error above the tolerance without a warning, or above "
+    "the bound of charges. Readings: the error of the worst, a cross above the tolerance and twice its error bar."
 )
 
 
@@ -132,7 +133,7 @@ def _symbols(name: str) -> str:
 def _text(value: Value) -> str:
     """Format a value for the labels of an axis."""
     if isinstance(value, str):
-        return value
+        return _symbols(value)
     power = round(math.log10(abs(value))) if value else 0
     if abs(power) >= 3 and math.isclose(abs(value), 10.0**power):
         return f"$10^{{{power}}}$"

@@ -29,7 +29,7 @@ HEADS = (
 NOTE = (
     "Lowest fluence is relative to the largest, for sources without a first moment; overshoot is relative to the bound "
     "of the maximum principle, ledger to the incident power; largest error is the relative L2 error of the exitance "
-    "against a closed form; 0 iterations mean a direct solver."
+    "against a closed form, of readings that of the worst; 0 iterations mean a direct solver."
 )
 
 
@@ -70,7 +70,7 @@ def _row(group: list[Trial]) -> list[str]:
         values = [each for diagnostics in found if (each := value(diagnostics)) is not None]
         return format(max(values), form) if values else ""
 
-    lowest = [diagnostics.lowest for diagnostics in found if not diagnostics.may_be_negative]
+    lowest = [each.lowest for each in found if each.lowest is not None and not each.may_be_negative]
     errors = [diagnostics.error for diagnostics in found if diagnostics.error is not None]
     return [
         group[0].panel.name,
@@ -79,7 +79,7 @@ def _row(group: list[Trial]) -> list[str]:
         str(sum(map(is_warned, found))),
         f"{min(lowest):.1e}" if lowest else "",
         most(lambda d: d.overshoot),
-        most(lambda d: abs(d.ledger)),
+        most(lambda d: None if d.ledger is None else abs(d.ledger)),
         most(lambda d: d.residual),
         most(lambda d: d.iterations, "d"),
         f"{max(errors):.2g}" if errors else "",

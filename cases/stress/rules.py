@@ -14,6 +14,7 @@ DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8
 # Codes of warnings that explain an error of the discretisation; others explain errors of the model or the surface.
 REASONS = {
     "tolerance-missed",
+    "detector-tolerance-missed",
     "fluence-negative",
     "power-moved",
     "exitance-negative",
@@ -28,24 +29,33 @@ def broken_rules(trial: Trial) -> dict[str, str]:
     if trial.diagnostics is None:
         return {"failure": trial.message} if trial.outcome == "failed" else {}
     found = trial.diagnostics
-    if not found.finite or not all(map(math.isfinite, (found.lowest, found.ledger, found.residual, found.estimate))):
+    estimate = None if found.of_readings else found.estimate
+    figures = [each for each in (found.lowest, found.ledger, found.residual, estimate) if each is not None]
+    if not found.finite or not all(map(math.isfinite, figures)):
         return {"not a number": "in fluence, exitance or their sums"}
     return dict(_broken_by(found))
 
 
 def _broken_by(found: Diagnostics) -> Iterator[tuple[str, str]]:
-    if found.lowest < -DIP and not found.may_be_negative:
+    if found.lowest is not None and found.lowest < -DIP and not found.may_be_negative:
         yield "negative fluence", f"{found.lowest:.1e} of its maximum"
     if found.overshoot is not None and found.overshoot > OVERSHOOT:
         yield "maximum principle", f"fluence {found.overshoot:.1e} above its bound"
-    if abs(found.ledger) > LEDGER:
+    if found.ledger is not None and abs(found.ledger) > LEDGER:
         yield "ledger", f"{found.ledger:.1e} of the power is missing"
-    if found.residual > RESIDUAL:
+    if found.residual is not None and found.residual > RESIDUAL:
         yield "residual", f"{found.residual:.1e} of the load"
     if found.scaling is not None and found.scaling > SCALING:
         yield "scaling", f"{found.scaling:.1e} from the figures at scale 1"
-    if found.error is not None and not found.error <= TOLERANCE and not is_warned(found):
-        yield "silent error", f"{found.error:.2g} without a warning"
+    if found.error is not None and not found.error <= _allowance(found) and not is_warned(found):
+        yield "silent error", f"{found.error:.2g} without a warning, {found.estimate:.2g} by its own estimate"
+    if found.bound is not None and found.error is not None and found.error > found.bound:
+        yield "bound", f"an error of {found.error:.2g}, above its bound of {found.bound:.2g}"
+
+
+def _allowance(found: Diagnostics) -> float:
+    """The largest error that needs no warning: the tolerance, and of a reading twice its bar if that is more."""
+    return max(TOLERANCE, 2.0 * found.estimate) if found.of_readings else TOLERANCE
 
 
 def violations(trial: Trial) -> dict[str, str]:

@@ -50,6 +50,8 @@ class Scenario:
         Whether the exact fluence may be negative, since the source has a first moment.
     unit_scale : Scenario or None
         The same scenario with all lengths divided by its radius.
+    readings : ((d, 3), (d,) ndarray) or None
+        Positions of point detectors, and the exitance there in closed form; the run is then for them alone.
     """
 
     surface: Surface
@@ -61,6 +63,7 @@ class Scenario:
     bound: float | None = None
     may_be_negative: bool = False
     unit_scale: "Scenario | None" = None
+    readings: tuple[FloatArray, FloatArray] | None = None
 
 
 def medium_of_albedo(albedo: float, eta: float = INDEX, free_path: float = 1.0) -> Medium:

@@ -26,6 +26,7 @@ class Variant:
     counts: bool = False
 
 
+CHARGES = Variant("charges", {"model": "charges"}, counts=True)
 DEFAULT = Variant("default", counts=True)
 NOT_REFINED = Variant("default, not refined", adaptive=False, counts=True)
 NO_LIMITER = Variant("no limiter", {"limit": False})

@@ -173,6 +173,11 @@ def check_writable(out: Path) -> None:
             raise InputError(str(error)) from error
 
 
+def disk_is_full(error: BaseException) -> bool:
+    """Whether results cannot be written because there is no room."""
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
 def write_error(target: Path, error: OSError) -> RunError:
     """The error to raise when results cannot be written."""
     return RunError(

@@ -1,7 +1,7 @@
 """`Results`: the solutions of all channels of a run, and their exitance at the vertices of one surface."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
 import numpy as np
@@ -13,7 +13,8 @@ from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
-from tetlux.fem.outcome.radiance import radiance
+from tetlux.fem.outcome.extremes import extreme_places, vertices_of
+from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
@@ -42,6 +43,10 @@ class _ChannelSum:
         # The nearest of these points to any place belongs mostly to the channel that is resolved finest there.
         places, sizes = zip(*(channel.resolution for channel in self.channels), strict=True)
         return np.vstack(places), np.concatenate(sizes)
+
+    @property
+    def error_estimate(self) -> float:
+        return min(channel.error_estimate for channel in self.channels)
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
@@ -107,12 +112,35 @@ def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[st
 def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
     """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
     whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
-    surface, total = surface_exitance(whole)
     parts = {}
+    if not _shows_surface(case) and all(isinstance(solution, Solution) for solution in solutions):
+        surface, total = _extremes([solution for solution in solutions if isinstance(solution, Solution)])
+    else:
+        surface, total = surface_exitance(whole)
     for channel, solution in zip(case.channels, solutions, strict=True):
         for name, part in solutions_by_light(list(channel.lights), solution):
             parts[channel.name, name] = total if part is whole else part.exitance_on(surface.points)
     return Results(case, tuple(solutions), surface, parts)
+
+
+def _shows_surface(case: Case) -> bool:
+    """Whether the exitance is written or drawn, or an even preview of it needs vertices everywhere."""
+    return bool({"surface", "picture"} & set(case.outputs)) or case.channel_names == RGB
+
+
+def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
+    """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
+    first = solutions[0].surface
+    if len(solutions) == 1:
+        points = extreme_places(solutions[0])
+    else:
+        brightest = [extreme_places(solution)[len(first.points) :] for solution in solutions]
+        points = np.vstack([first.points, *brightest])
+    vertices = vertices_of(first)
+    total = sum(
+        np.concatenate([each.exitance_on(vertices), each.exitance_on(points[len(vertices) :])]) for each in solutions
+    )
+    return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
 
 
 def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
@@ -134,7 +162,11 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
             [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
         )
     if case.camera is not None:
-        radiances = [radiance(solution, results.surface.points, case.camera) for solution in results.solutions]
+        _, cosine = view_cosine(case.surface, results.surface.points, np.asarray(case.camera))
+        radiances = [
+            radiance_of(results.exitance(channel), cosine, solution.medium.eta)
+            for channel, solution in zip(channels, results.solutions, strict=True)
+        ]
         values["radiance"] = np.sum(radiances, axis=0)
         if len(channels) > 1:
             values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}

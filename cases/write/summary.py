@@ -17,23 +17,22 @@ from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
+from tetlux.meshing.notes import Note
 from tetlux.meshing.tets.mesh import TetMesh
 
+# Tolerances beside that of the exitance, by their name in a case.
+MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_tolerance")
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
-def summarize(
-    results: Results, readings: list[dict[str, Any]], seconds: dict[str, float], warnings: list[str]
-) -> dict[str, Any]:
-    """Summarize a run as plain data.
+def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[str]) -> dict[str, Any]:
+    """Summarize a run as plain data, but for its seconds.
 
     Parameters
     ----------
     results : Results
     readings : list of dict
         Rows of the detectors.
-    seconds : dict of str to float
-        By stage.
     warnings : list of str
 
     Returns
@@ -59,15 +58,15 @@ def summarize(
         "unit": case.surface.unit,
         "model": "fem" if mesh else "charges",
         "tolerance": case.tolerance,
-        **({"detector_tolerance": case.detector_tolerance} if case.detector_tolerance else {}),
+        **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
-        "seconds": {stage: round(value, 4) for stage, value in seconds.items()},
         "repairs": list(case.repairs),
         "warnings": warnings,
+        "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
     }
 
@@ -114,8 +113,10 @@ def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
     if isinstance(solution, ChargeSolution):
         # The fluence has a pole at each source, so there is no largest value.
         return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
+    of_fields = {"everywhere_error": solution.everywhere_error, "volume_error": solution.volume_error}
     return {
         "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
+        **{name: value for name, value in of_fields.items() if math.isfinite(value)},
         **({"validity": _validity(solution.validity)} if solution.validity else {}),
     }
 

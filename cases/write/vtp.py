@@ -2,8 +2,8 @@
 
 import sys
 from collections.abc import Mapping
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +37,7 @@ def write_vtp(
         arrays.append(np.ascontiguousarray(numbers))
         kind = TYPES[numbers.dtype.str[1:]]
         parts = f' NumberOfComponents="{numbers.shape[1]}"' if numbers.ndim > 1 else ""
-        return f'<DataArray type="{kind}" Name={quoteattr(name)}{parts} format="appended" offset="{offset}"/>'
+        return f'<DataArray type="{kind}" Name="{escape(name)}"{parts} format="appended" offset="{offset}"/>'
 
     head = [
         f'<VTKFile type="PolyData" version="1.0" byte_order="{_BYTE_ORDER}" header_type="UInt64">',
@@ -46,7 +46,7 @@ def write_vtp(
         *(_text(name, note) for name, note in notes.items()),
         "</FieldData>",
         f'<Piece NumberOfPoints="{len(surface.points)}" NumberOfPolys="{len(triangles)}">',
-        f"<PointData Scalars={quoteattr(next(iter(values)))}>",
+        f'<PointData Scalars="{escape(next(iter(values)))}">',
         *(array(name, column) for name, column in values.items()),
         "</PointData>",
         "<Points>",
@@ -74,4 +74,4 @@ _BYTE_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
 def _text(name: str, text: str) -> str:
     """A text as VTK stores it: the codes of its bytes, ending in zero."""
     codes = " ".join(map(str, (*text.encode(), 0)))
-    return f'<DataArray type="String" Name={quoteattr(name)} NumberOfTuples="1" format="ascii">{codes}</DataArray>'
+    return f'<DataArray type="String" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{codes}</DataArray>'

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tetlux.fem.ballistic.extinction import attenuate
-from tetlux.fem.ballistic.interface import reflect_and_exit
+from tetlux.fem.ballistic.interface import reflect_and_exit, refract_in
 from tetlux.fem.ballistic.rays import NO_CELLS, Rays, join_rays
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.sources.deposit import Deposit
@@ -23,6 +23,37 @@ NEGLIGIBLE_POWER = 1e-10
 NEGLIGIBLE_REFLECTION = 1e-6
 # After this many facets the remainder is deposited at the last one.
 MOST_FACETS = 64
+
+
+def refract_and_follow(
+    mesh: TetMesh,
+    coefficients: Coefficients,
+    arriving: Rays,
+    normals: FloatArray,
+    facet_normals: FloatArray | None = None,
+) -> Deposit:
+    """Refract rays that arrive at a mesh from outside, and follow them inside.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    coefficients : Coefficients
+    arriving : Rays
+        They start on the boundary of the mesh, each with the power that arrives there.
+    normals : (r, 3) ndarray
+        Outward unit normals of the facets that they start on, or of the curved surface that these stand for.
+    facet_normals : (r, 3) ndarray, optional
+        Those of the facets, if `normals` are of the curved surface.
+
+    Returns
+    -------
+    Deposit
+        Its ledger holds all of the incident power.
+    """
+    refracted, specular = refract_in(arriving, normals, coefficients.outer.eta, facet_normals)
+    deposit = follow(mesh, coefficients, refracted)
+    outside = Ledger(incident=float(arriving.powers.sum()), specular=specular)
+    return replace(deposit, ledger=Ledger.merge([outside, deposit.ledger]))
 
 
 def follow(mesh: TetMesh, coefficients: Coefficients, rays: Rays) -> Deposit:

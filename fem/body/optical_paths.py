@@ -9,15 +9,15 @@ import numpy as np
 from tetlux.fem.body.partition import Pieces
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
-# A coefficient that varies is integrated over each piece by Simpson's rule on halves. Pieces are halved, at most so
-# often, until the range of the coefficient over a piece, as an optical depth and weighted by the transmitted share of
-# the light, is less than this. An optical depth then has a relative error of 6e-4 where coefficients are linear or
-# exponential along the path, and of 1e-3 behind a step from 0.4 to 2 (measured against closed forms).
+# A coefficient that varies is integrated over each piece by Simpson's rule on halves. Pieces are halved until the range
+# of the coefficient over a piece, as an optical depth and weighted by the transmitted share of the light, is less than
+# LARGEST_RANGE, at most MOST_HALVINGS times. An optical depth then has a relative error of 6e-4 where coefficients are
+# linear or exponential along the path, and of 1e-3 behind a step from 0.4 to 2 (measured against closed forms).
 LARGEST_RANGE = 2e-3
 MOST_HALVINGS = 24
 # Pieces are not halved beyond this number in all.
 MOST_PIECES = 2_000_000
-# Initial pieces: their lengths double this often along the path, with so many of each length.
+# Initial pieces: their lengths double OCTAVES times along the path, with STEPS pieces of each length.
 OCTAVES, STEPS = 8, 8
 # Weights of the values at the ends and quarters of a piece.
 _SIMPSON = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0

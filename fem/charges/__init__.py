@@ -9,7 +9,7 @@ not harm the sum.
 
     kernel      the fluence and flux of charges
     samples     points on a surface at a variable spacing
-    places      positions of charges and of equations
+    placement   positions of charges and of equations
     fit         strengths by least squares
     check       a bound and an estimate of the error
     adapt       more charges where the residual is large

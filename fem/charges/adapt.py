@@ -10,13 +10,13 @@ from tetlux.fem.charges.check import ErrorEstimates, estimate_errors
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import LeastSquaresFactors, factorise
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.places import (
+from tetlux.fem.charges.placement import (
     EQUATION_REFINEMENT,
     HEIGHT_ROUGH,
     HEIGHT_SMOOTH,
-    Places,
+    ChargePlacement,
     distance_from,
-    places_for,
+    place_charges,
 )
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -42,10 +42,13 @@ NOISE_FACTOR = 2.0
 # Number of nearest points over which the residual and the spacing are averaged.
 AVERAGED_NEIGHBOURS = 12
 # Number of nearest old points from which the spacing at a new point is interpolated.
-INTERPOLATED_NEIGHBOURS = 6
+INTERPOLATED_NEIGHBOURS = 3
 # Where finite elements solve for the remainder, fitting ends when the estimated error of the charges alone is this
-# share of the tolerance.
-FIT_TOLERANCE_SHARE = 0.6
+# multiple of the tolerance: of their residual a third to a half is left then. Processor seconds (hare's side, its ear)
+# at a tolerance of .02 for .6 / 1: .34, .68 / .24, .35.
+FIT_TOLERANCE_SHARE = 1.0
+# It also ends when the estimate falls by less than this power of the number of charges, as on rough scans.
+LEAST_RATE = 0.5
 # Where finite elements solve for the remainder, fitting ends at this number of charges, which takes .2 s.
 MOST_CHARGES_WITH_FEM = 600
 # The estimate is assumed to fall with this power of the number of charges, which gives the number of the next fit.
@@ -87,7 +90,7 @@ class FittedCharges:
     field : ChargeField
         The sources, then the fitted charges; a column of strengths for each light.
     lights : LightSources
-    places : Places
+    placement : ChargePlacement
     factors : LeastSquaresFactors
         Of the matrix of the weighted equations; they serve other lights with the same charges.
     errors : ErrorEstimates
@@ -98,7 +101,7 @@ class FittedCharges:
 
     field: ChargeField
     lights: LightSources
-    places: Places
+    placement: ChargePlacement
     factors: LeastSquaresFactors
     errors: ErrorEstimates
     residual: NumberArray
@@ -139,11 +142,11 @@ def fit_sequence(
     height = HEIGHT_ROUGH
     for step in range(steps + 1):
         count = round(most * (FEWEST_CHARGES / most) ** ((steps - step) / max(steps, 1)))
-        places = places_for(surface, spacing, distance, count, height)
-        fitted = fit_at_places(places, equation, lights)
+        placement = place_charges(surface, spacing, distance, count, height)
+        fitted = fit_placed_charges(placement, equation, lights)
         yield fitted
         height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(places.checked, np.abs(fitted.residual) * places.checked.spacing)
+        spacing = _refine_spacing(placement.checked, np.abs(fitted.residual) * placement.checked.spacing)
 
 
 def fit_for_remainder(
@@ -167,35 +170,39 @@ def fit_for_remainder(
     spacing = distance = distance_from(surface, lights.points)
     best, count, height = None, FEWEST_CHARGES, HEIGHT_ROUGH
     while True:
-        fitted = fit_at_places(places_for(surface, spacing, distance, count, height), equation, lights)
-        estimate = fitted.errors.estimate
+        fitted = fit_placed_charges(place_charges(surface, spacing, distance, count, height), equation, lights)
+        estimate, slow = fitted.errors.estimate, False
+        if best is not None:
+            growth = len(fitted.placement.charges) / len(best.placement.charges)
+            slow = estimate * growth**LEAST_RATE > best.errors.estimate
         if best is None or estimate < best.errors.estimate:
             best = fitted
         excess = best.errors.estimate / (FIT_TOLERANCE_SHARE * tolerance)
-        if excess <= 1.0 or LEAST_GROWTH * count > MOST_CHARGES_WITH_FEM:
+        if excess <= 1.0 or slow or LEAST_GROWTH * count > MOST_CHARGES_WITH_FEM:
             return best if best.errors.estimate <= LARGEST_USEFUL_ESTIMATE else None
         count = min(
             round(count * np.clip(excess ** (1.0 / ASSUMED_RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_CHARGES_WITH_FEM
         )
         height = HEIGHT_SMOOTH if estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(fitted.places.checked, np.abs(fitted.residual) * fitted.places.checked.spacing)
+        checked = fitted.placement.checked
+        spacing = _refine_spacing(checked, np.abs(fitted.residual) * checked.spacing)
 
 
-def fit_at_places(places: Places, equation: Equation, lights: LightSources) -> FittedCharges:
+def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: LightSources) -> FittedCharges:
     """Fit the strengths of charges at given positions."""
-    samples, checked = places.fitted, places.checked
-    weights = places.weights[:, None]
-    factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, places.charges))
+    samples, checked = placement.fitted, placement.checked
+    weights = placement.weights[:, None]
+    factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, placement.charges))
     right = (
         lights.boundary_source
         - equation.residual_of_each(samples.points, samples.normals, lights.points) @ lights.powers
     )
     strengths = factors.solve(weights * right)
-    field = ChargeField(equation, np.vstack([lights.points, places.charges]), np.vstack([lights.powers, strengths]))
+    field = ChargeField(equation, np.vstack([lights.points, placement.charges]), np.vstack([lights.powers, strengths]))
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation = (residual - lights.boundary_source).sum(axis=1)
     errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)
-    return FittedCharges(field, lights, places, factors, errors, violation)
+    return FittedCharges(field, lights, placement, factors, errors, violation)
 
 
 def _refine_spacing(samples: Samples, effects: FloatArray) -> Spacing:

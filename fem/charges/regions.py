@@ -15,16 +15,16 @@ from tetlux.fem.charges.check import ErrorEstimates, exitance_error, norm, resid
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import factorise
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.places import (
+from tetlux.fem.charges.placement import (
     EQUATION_REFINEMENT,
     HEIGHT_ROUGH,
     HEIGHT_SMOOTH,
-    Places,
+    ChargePlacement,
     distance_from,
-    fitting_cells,
     place_above_surface,
-    places_at,
+    place_charges_at,
     scaled,
+    spacing_scale,
 )
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
@@ -61,20 +61,20 @@ class Interface:
 
 
 @dataclass(frozen=True, eq=False)
-class InterfacePlaces:
+class InterfacePlacement:
     """Positions of charges on both sides of an interface.
 
     Attributes
     ----------
     interface : Interface
-    places : Places
+    placement : ChargePlacement
         Of charges of the region inside, which lie outside the interface.
     charges_inside : (c, 3) ndarray
         Charges of the region outside, which lie inside the interface.
     """
 
     interface: Interface
-    places: Places
+    placement: ChargePlacement
     charges_inside: FloatArray
 
 
@@ -95,18 +95,18 @@ class FittedRegions:
     ----------
     fields : tuple of ChargeField
         Of the region around all others, then of regions 1, 2, ...: sources, then charges.
-    places : tuple of InterfacePlaces
+    placements : tuple of InterfacePlacement
     errors : ErrorEstimates
     """
 
     fields: tuple[ChargeField, ...]
-    places: tuple[InterfacePlaces, ...]
+    placements: tuple[InterfacePlacement, ...]
     errors: ErrorEstimates
 
 
-def interface_places(
+def place_at_interfaces(
     interfaces: Sequence[Interface], light: RegionSources, count: int, height: float = HEIGHT_ROUGH
-) -> list[InterfacePlaces]:
+) -> list[InterfacePlacement]:
     """Positions of about `count` charges of all regions together."""
     rng = np.random.default_rng(0)
     spacings = [distance_from(interface.surface, light.points) for interface in interfaces]
@@ -114,17 +114,17 @@ def interface_places(
     # An inner interface has charges on both sides.
     share = len(interfaces) / (len(interfaces) + inner)
     surfaces = [interface.surface for interface in interfaces]
-    all_cells, scale = fitting_cells(surfaces, spacings, share * count)
+    scale = spacing_scale(surfaces, spacings, share * count)
     found = []
-    for interface, cells, spacing in zip(interfaces, all_cells, spacings, strict=True):
-        places = places_at(interface.surface, cells, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT)
+    for interface, spacing in zip(interfaces, spacings, strict=True):
+        placement = place_charges_at(interface.surface, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT)
         charges_inside = np.zeros((0, 3))
         if interface.outside is not None:
             turned = replace(interface.surface, faces=interface.surface.faces[:, ::-1])
-            feet = replace(places.feet, normals=-places.feet.normals)
+            feet = replace(placement.feet, normals=-placement.feet.normals)
             inward, clear = place_above_surface(turned, feet, EQUATION_REFINEMENT * feet.spacing, height)
             charges_inside = inward[clear]
-        found.append(InterfacePlaces(interface, places, charges_inside))
+        found.append(InterfacePlacement(interface, placement, charges_inside))
     return found
 
 
@@ -176,28 +176,28 @@ def fit_regions(
         Approximate number of charges at which fitting ends in any case.
     """
     count = min(FEWEST_CHARGES * (2 * len(interfaces) - 1), most)
-    best = fit_regions_at(interface_places(interfaces, light, count), equations, light)
+    best = fit_regions_at(place_at_interfaces(interfaces, light, count), equations, light)
     while best.errors.estimate > tolerance and LEAST_LAST_FACTOR * count <= most:
         count = min(round(COUNT_FACTOR * count), most)
         height = HEIGHT_SMOOTH if best.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        fitted = fit_regions_at(interface_places(interfaces, light, count, height), equations, light)
+        fitted = fit_regions_at(place_at_interfaces(interfaces, light, count, height), equations, light)
         if fitted.errors.estimate < best.errors.estimate:
             best = fitted
     return best
 
 
 def fit_regions_at(
-    places: Sequence[InterfacePlaces], equations: Sequence[Equation], light: RegionSources
+    placements: Sequence[InterfacePlacement], equations: Sequence[Equation], light: RegionSources
 ) -> FittedRegions:
     """Fit the strengths of charges of all regions at given positions."""
     regions = range(len(equations))
-    charges = [np.vstack([np.zeros((0, 3)), *(_charges_at(each, region) for each in places)]) for region in regions]
+    charges = [np.vstack([np.zeros((0, 3)), *(_charges_at(each, region) for each in placements)]) for region in regions]
     mine = [light.regions == region for region in regions]
     sources, powers = [light.points[own] for own in mine], [light.powers[own] for own in mine]
     matrix, right = [], []
-    for each in places:
-        samples = each.places.fitted
-        scale = np.tile(each.places.weights, 1 if each.interface.outside is None else 2)[:, None]
+    for each in placements:
+        samples = each.placement.fitted
+        scale = np.tile(each.placement.weights, 1 if each.interface.outside is None else 2)[:, None]
         matrix.append(scale * np.hstack(boundary_equations(each.interface, samples, equations, charges)))
         given = boundary_equations(each.interface, samples, equations, sources)
         right.append(-scale * sum(some @ power for some, power in zip(given, powers, strict=True)))
@@ -207,28 +207,28 @@ def fit_regions_at(
         ChargeField(equation, np.vstack([points, some]), np.vstack([power, part]))
         for equation, points, some, power, part in zip(equations, sources, charges, powers, parts, strict=True)
     )
-    return FittedRegions(fields, tuple(places), _estimate_errors(fields, places))
+    return FittedRegions(fields, tuple(placements), _estimate_errors(fields, placements))
 
 
-def _charges_at(each: InterfacePlaces, region: int) -> FloatArray:
+def _charges_at(each: InterfacePlacement, region: int) -> FloatArray:
     """Charges of a region at an interface, (c, 3)."""
     if region == each.interface.inside:
-        return each.places.charges
+        return each.placement.charges
     return each.charges_inside if region == each.interface.outside else np.zeros((0, 3))
 
 
-def _estimate_errors(fields: Sequence[ChargeField], places: Sequence[InterfacePlaces]) -> ErrorEstimates:
+def _estimate_errors(fields: Sequence[ChargeField], placements: Sequence[InterfacePlacement]) -> ErrorEstimates:
     """No bound, and an estimate from the residuals at points that were not fitted.
 
     A jump of phi across an inner interface changes phi by half of the jump on either side. A jump of the flux changes
     phi as a sheet of charges does, by ``1/(2 D q)`` of the jump for a wave number q. Both fade as ``exp(-q l)`` on the
     way to the body's surface, a distance l away.
     """
-    body = places[0]
+    body = placements[0]
     outer = fields[0].equation
     total, size = 0.0, 0.0
-    for each in places:
-        samples, interface = each.places.checked, each.interface
+    for each in placements:
+        samples, interface = each.placement.checked, each.interface
         spacing = EQUATION_REFINEMENT * samples.spacing
         if interface.outside is None:
             exitance, residual = fields[0].exitance_and_residual(samples.points, samples.normals)
@@ -242,7 +242,7 @@ def _estimate_errors(fields: Sequence[ChargeField], places: Sequence[InterfacePl
             step = (inside[0] - outside[0]).sum(axis=1)
             flux = (inside[1] - outside[1]).sum(axis=1) - step
             ripple = residual_wave_number(outer, INNER_RIPPLE_FACTOR * spacing)
-            depth = np.linalg.norm(body.interface.surface.project(samples.points)[0] - samples.points, axis=1)
+            depth = body.interface.surface.distances(samples.points)
             sheet = outer.robin / (2.0 * fields[interface.outside].equation.diffusion * ripple)
             errors = np.exp(-ripple * depth) * np.hypot(0.5 * np.abs(step), np.abs(flux) * sheet)
         total = float(np.hypot(total, norm(samples.areas, errors)))

@@ -8,12 +8,13 @@ plate, whose normals point away from each other, do not thin each other.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
-from tetlux.meshing.surface.subdivide import quarter_triangles
+from tetlux.meshing.surface.groups import bisect
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
@@ -25,7 +26,7 @@ LEAST_SEPARATION = 0.8
 CHECKED_NEIGHBOURS = 20
 # Longest side of a cell, over the spacing in its middle.
 LARGEST_CELL = 1.5
-_MOST_CUTS = 40
+_MOST_CUTS = 80
 
 # The wanted distance between points (n, 3) of the surface, (n,), unit.
 Spacing = Callable[[FloatArray], FloatArray]
@@ -50,6 +51,11 @@ class Samples:
     areas: FloatArray
     spacing: FloatArray
 
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Of the points."""
+        return cKDTree(self.points)
+
     def __getitem__(self, some: BoolArray | IntArray) -> "Samples":
         return Samples(self.points[some], self.normals[some], self.areas[some], self.spacing[some])
 
@@ -59,69 +65,126 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Parts of a surface's triangles.
+    """Parts of a surface: pieces of its triangles, cut where they are large, and groups of them where they are small.
 
     Attributes
     ----------
-    faces : (m,) ndarray
-        The triangle of each.
+    surface : Surface
+    starts, ends : (m,) ndarray
+        The pieces of `surface.groups` that each holds.
     corners : (m, 3, 3) ndarray
+        Of a cell that is a part of one piece.
+    centroids : (m, 3) ndarray
+    areas : (m,) ndarray
+        Of the smooth surface, unit².
     spacing : (m,) ndarray
         Wanted distance between points there, unit.
     """
 
-    faces: IntArray
+    surface: Surface
+    starts: IntArray
+    ends: IntArray
     corners: FloatArray
+    centroids: FloatArray
+    areas: FloatArray
     spacing: FloatArray
 
     @property
-    def areas(self) -> FloatArray:
-        """Their areas (m,), unit²."""
-        first, second = (self.corners[:, i] - self.corners[:, 0] for i in (1, 2))
-        return np.asarray(0.5 * np.linalg.norm(np.cross(first, second), axis=1))
+    def is_group(self) -> BoolArray:
+        """Whether each holds several pieces, (m,)."""
+        return self.ends > self.starts + 1
+
+    @property
+    def faces(self) -> IntArray:
+        """The triangle of each, (m,); one of several of a group."""
+        return self.surface.groups.faces[self.starts]
 
     @property
     def sample_count(self) -> float:
         """Number of points: squares of the spacing that fit into the cells."""
         return float((self.areas / self.spacing**2).sum())
 
-    def scaled(self, scale: float) -> "Cells":
-        """The same cells for a spacing times a factor."""
-        return replace(self, spacing=scale * self.spacing)
 
-    def cut(self, spacing: Spacing, size: float = LARGEST_CELL) -> "Cells":
-        """Cut cells in four until none is longer than `size` times the spacing in its middle."""
-        faces, corners, wanted = self.faces, self.corners, self.spacing
-        done: list[tuple[IntArray, FloatArray, FloatArray]] = []
-        for cut in range(_MOST_CUTS + 1):
-            small = (longest_sides(corners) <= size * wanted) | (cut == _MOST_CUTS)
-            done.append((faces[small], corners[small], wanted[small]))
-            if small.all():
-                break
-            faces, corners = np.repeat(faces[~small], 4), quarter_triangles(corners[~small])
-            wanted = spacing(corners.mean(axis=1))
-        faces, corners, wanted = (np.concatenate(part) for part in zip(*done, strict=True))
-        # Parts of one triangle become neighbours, so that stratified drawing covers each triangle evenly.
-        order = np.argsort(faces, kind="stable")
-        return Cells(faces[order], corners[order], wanted[order])
+def cells_of(surface: Surface, spacing: Spacing, size: float = LARGEST_CELL, piece_size: float | None = None) -> Cells:
+    """Cells of a surface, by spacings in their middles.
+
+    Parameters
+    ----------
+    surface : Surface
+    spacing : callable
+    size : float
+        Largest size of a group of triangles, in spacings.
+    piece_size : float, optional
+        Longest side of a part of one triangle, in spacings; `size` if not given.
+    """
+    groups = surface.groups
+    starts, ends, centroids, wanted = [], [], [], []
+    some = np.arange(len(groups.levels[0].starts))
+    for level in groups.levels:
+        own = level.centroids[some]
+        apart = spacing(own)
+        done = (level.sizes[some] <= size * apart) | (level.ends[some] == level.starts[some] + 1)
+        starts.append(level.starts[some[done]])
+        ends.append(level.ends[some[done]])
+        centroids.append(own[done])
+        wanted.append(apart[done])
+        some = some[~done]
+        if len(some) == 0:
+            break
+        first, count = level.children[some], level.children[some + 1] - level.children[some]
+        some = np.repeat(first - np.cumsum(count) + count, count) + np.arange(count.sum())
+    first, last = np.concatenate(starts), np.concatenate(ends)
+    return _cut_pieces(
+        Cells(
+            surface,
+            first,
+            last,
+            groups.corners[first],
+            np.concatenate(centroids),
+            groups.total_areas[last] - groups.total_areas[first],
+            np.concatenate(wanted),
+        ),
+        spacing,
+        size if piece_size is None else piece_size,
+    )
 
 
-def cells_of(surface: Surface, spacing: Spacing) -> Cells:
-    """The triangles of a surface."""
-    corners = surface.points[surface.faces]
-    return Cells(np.arange(len(corners)), corners, spacing(corners.mean(axis=1)))
+def _cut_pieces(cells: Cells, spacing: Spacing, size: float) -> Cells:
+    """Cut cells that are parts of one piece in two until none is longer than `size` times the spacing."""
+    done: list[tuple[FloatArray | IntArray, ...]] = []
+    whole = cells.is_group
+    rest = (cells.starts, cells.ends, cells.corners, cells.centroids, cells.areas, cells.spacing)
+    for cut in range(_MOST_CUTS + 1):
+        small = whole | (longest_sides(rest[2]) <= size * rest[5]) | (cut == _MOST_CUTS)
+        done.append(tuple(part[small] for part in rest))
+        if small.all():
+            break
+        corners = bisect(rest[2][~small])
+        first, last, areas = (np.repeat(part[~small], 2) for part in (rest[0], rest[1], 0.5 * rest[4]))
+        middles = corners.mean(axis=1)
+        rest = (first, last, corners, middles, areas, spacing(middles))
+        whole = np.zeros(len(corners), dtype=bool)
+    parts = [np.concatenate(part) for part in zip(*done, strict=True)]
+    # Neighbours follow each other, so that stratified drawing covers the surface evenly.
+    order = np.argsort(parts[0], kind="stable")
+    return Cells(cells.surface, *(part[order] for part in parts))
 
 
-def draw(surface: Surface, cells: Cells, rng: np.random.Generator) -> Samples:
+def draw(cells: Cells, rng: np.random.Generator) -> Samples:
     """Draw `CANDIDATES_PER_SQUARE` points from each square of the spacing."""
     squares = cells.areas / cells.spacing**2
     drawn = np.diff(np.floor(np.cumsum(squares) * CANDIDATES_PER_SQUARE + rng.random()), prepend=0.0)
     own = np.repeat(np.arange(len(squares)), drawn.astype(np.int64))
-    first, second = rng.random((2, len(own)))
+    first, second, third = rng.random((3, len(own)))
     root = np.sqrt(first)
     weights = np.column_stack([1.0 - root, root * (1.0 - second), root * second])
-    flat = np.einsum("qi,qij->qj", weights, cells.corners[own])
-    points, normals = surface.on_curve(cells.faces[own], flat)
+    corners, faces = cells.corners[own], cells.faces[own]
+    grouped, groups = np.flatnonzero(cells.is_group[own]), cells.surface.groups
+    inside = own[grouped]
+    at = groups.total_areas[cells.starts[inside]] + third[grouped] * cells.areas[inside]
+    piece = np.clip(np.searchsorted(groups.total_areas, at) - 1, cells.starts[inside], cells.ends[inside] - 1)
+    corners[grouped], faces[grouped] = groups.corners[piece], groups.faces[piece]
+    points, normals = cells.surface.on_curve(faces, np.einsum("qi,qij->qj", weights, corners))
     wanted = cells.spacing[own]
     return Samples(points, normals, wanted**2 / CANDIDATES_PER_SQUARE, wanted)
 
@@ -153,9 +216,9 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     return kept
 
 
-def spread(surface: Surface, cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
+def spread(cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
     """Points about a spacing apart, in random order, and the candidates that were removed."""
-    drawn = draw(surface, cells, rng)
+    drawn = draw(cells, rng)
     drawn = drawn[rng.permutation(len(drawn))]
     kept = thin(drawn, LEAST_SEPARATION * drawn.spacing)
     chosen = drawn[kept]

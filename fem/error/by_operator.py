@@ -53,6 +53,7 @@ def estimate_by_operator(
     return Estimate(
         np.sum([each.exitance_indicators for each in estimates], axis=0),
         np.sum([each.power_indicators for each in estimates], axis=0),
+        np.max([each.splits for each in estimates], axis=0),
     )
 
 

@@ -56,10 +56,13 @@ class Estimate:
     ----------
     exitance_indicators, power_indicators : (m,) ndarray
         Indicators of the tetrahedra; they sum to the relative errors of the exitance and of the total exited power.
+    splits : (m,) ndarray of int
+        How often a tetrahedron has to be split at once for its error in the exitance to become less.
     """
 
     exitance_indicators: FloatArray
     power_indicators: FloatArray
+    splits: IntArray
 
     @property
     def error(self) -> float:
@@ -68,10 +71,12 @@ class Estimate:
 
     def sum_by(self, parents: IntArray) -> "Estimate":
         """Add up the indicators of tetrahedra that have a common parent (m,)."""
-        count = int(parents.max()) + 1
-        return Estimate(
-            sum_by_index(parents, self.exitance_indicators, count), sum_by_index(parents, self.power_indicators, count)
+        splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
+        np.maximum.at(splits, parents, self.splits)
+        exitance, power = (
+            sum_by_index(parents, each, len(splits)) for each in (self.exitance_indicators, self.power_indicators)
         )
+        return Estimate(exitance, power, splits)
 
     __repr__ = one_line
 
@@ -118,7 +123,8 @@ def estimate_error(
     norm, total = float(np.sqrt(areas @ whole.exitance**2)), float(areas @ np.abs(whole.exitance))
     if total <= ROUNDING * whole.power.incident:
         # Where no light leaves, the exitance has no error.
-        return Estimate(np.zeros(len(mesh.tetrahedra)), np.zeros(len(mesh.tetrahedra)))
+        count = len(mesh.tetrahedra)
+        return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64))
     duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
     mean = nodal_averaging(mesh)
     smooth, difference = subtract_patches(solution, mean)
@@ -150,8 +156,10 @@ def estimate_error(
         )
 
     indicators, power_indicators = map_in_threads(indicators_for_dual, list(duals.T))
-    indicators += ripple_indicators(mesh, coefficients, load, norm) + _unresolved_indicators(solution, norm)
-    return Estimate(indicators, power_indicators)
+    indicators += ripple_indicators(mesh, coefficients, load, norm)
+    unresolved = _unresolved_indicators(solution, norm)
+    splits = np.where(unresolved > indicators, _splits_to_resolve(solution), 1)
+    return Estimate(indicators + unresolved, power_indicators, splits)
 
 
 def _dual_loads(
@@ -195,6 +203,16 @@ def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
     indicators = np.bincount(mesh.boundary_cells, square, minlength=len(mesh.tetrahedra))
     total = float(np.sqrt(indicators.sum()))
     return np.asarray(indicators / (total * norm if total > 0 else 1.0), dtype=np.float64)
+
+
+def _splits_to_resolve(solution: Solution) -> IntArray:
+    """How often tetrahedra have to be split until their facets resolve the residuals of fitted charges, (m,)."""
+    mesh = solution.mesh
+    splits = np.ones(len(mesh.tetrahedra), dtype=np.int64)
+    for patch in solution.patches:
+        if isinstance(patch, FittedPatch):
+            np.maximum.at(splits, mesh.boundary_cells, patch.splits_to_see())
+    return splits
 
 
 def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:

@@ -119,5 +119,5 @@ def _interface_distances(middles: FloatArray, owner: IntArray, inner: Sequence[S
     distances = np.zeros(len(middles))
     for region in np.unique(owner):
         own = owner == region
-        distances[own] = np.linalg.norm(inner[region - 1].project(middles[own])[0] - middles[own], axis=1)
+        distances[own] = inner[region - 1].distances(middles[own])
     return distances

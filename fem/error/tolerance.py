@@ -5,8 +5,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
-from tetlux.fem.quadratic.error import ReadingError
-from tetlux.meshing.arrays import BoolArray, IntArray
+from tetlux.fem.quadratic.reading_error import ReadingError
+from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.errors import InputError
 
 # Share of their error that splitting tetrahedra is assumed to remove.
@@ -24,6 +24,9 @@ REFINE_ABOVE = 1.05
 # The estimated error of a reading that refinement aims at, as a share of the tolerance; it leaves room for true errors
 # above the estimate.
 READING_AIM_SHARE = 0.5
+# A band of the surface or the volume, whose error is that of its worst points, is refined above the first of these
+# shares of the tolerance, to the second: with less between them, the last steps are many.
+FIELD_REFINE_SHARE, FIELD_AIM_SHARE = 0.95, 0.6
 # Share of the square of a tetrahedron's error in a reading that one split is assumed to leave; squares add up to that
 # of the reading.
 SQUARE_LEFT_AFTER_SPLIT = 0.15
@@ -42,44 +45,58 @@ def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
         raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
-def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> BoolArray:
-    """Whether to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims."""
+def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
+    """How often to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims."""
     wanted = [
         aim
         for estimate in estimates
         for aim in (
-            (estimate.exitance_indicators, AIM_SHARE * tolerance),
-            (estimate.power_indicators, POWER_AIM_SHARE * tolerance),
+            (estimate.exitance_indicators, AIM_SHARE * tolerance, np.minimum(estimate.splits, MOST_SPLITS)),
+            (estimate.power_indicators, POWER_AIM_SHARE * tolerance, np.ones_like(estimate.splits)),
         )
     ]
-    marked = np.zeros(len(wanted[0][0]), dtype=bool)
-    for indicators, aim in wanted:
+    splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
+    for indicators, aim, often in wanted:
         error = float(indicators.sum())
         if error <= REFINE_ABOVE * aim:
             continue
         part = float(np.clip((1.0 - aim / error) / ERROR_REMOVED_SHARE, LEAST_SPLIT_SHARE, LARGEST_SPLIT_SHARE))
         order = np.argsort(-indicators)
         reached = np.cumsum(indicators[order])
-        marked[order[: int(np.searchsorted(reached, part * reached[-1])) + 1]] = True
-    return marked
+        chosen = order[: int(np.searchsorted(reached, part * reached[-1])) + 1]
+        splits[chosen] = np.maximum(splits[chosen], often[chosen])
+    return splits
 
 
 def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
-    """How often to split each of `cells` tetrahedra, (m,), to bring every reading to its aim.
+    """How often to split each of `cells` tetrahedra, (m,), to bring every reading to its aim."""
+    return _splits(readings, cells, REFINE_ABOVE * READING_AIM_SHARE * tolerance, READING_AIM_SHARE * tolerance)
 
-    A common level bounds the square of each tetrahedron's error. It is chosen so that the bounded squares sum to the
-    square of the aim, and tetrahedra above it are split until they are below.
+
+def splits_for_fields(bands: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
+    """The same for bands of the surface or the volume."""
+    return _splits(bands, cells, FIELD_REFINE_SHARE * tolerance, FIELD_AIM_SHARE * tolerance)
+
+
+def _splits(readings: Iterable[ReadingError], cells: int, largest: float, aim: float) -> IntArray:
+    """How often to split each of `cells` tetrahedra, (m,), to bring relative errors above the largest to the aim.
+
+    A common level bounds the square of each tetrahedron's error. It is chosen so that the bounded squares sum to
+    what the aim leaves of them, and tetrahedra above it are split until they are below.
     """
     splits = np.zeros(cells, dtype=np.int64)
     for reading in readings:
-        aim = READING_AIM_SHARE * tolerance * abs(reading.value)
-        if not reading.error > REFINE_ABOVE * aim:
+        if not reading.error > largest * abs(reading.value):
+            continue
+        # Splits are assumed to reduce the sum of signed contributions as they reduce that of squares.
+        wanted = float(reading.squares.sum()) * (aim * abs(reading.value) / reading.error) ** 2
+        if wanted == 0.0:
             continue
         ascending = np.sort(reading.squares)
         # The sum of the bounded squares for a level equal to each tetrahedron's square in turn.
         sums = np.cumsum(ascending) + ascending * np.arange(cells - 1, -1, -1)
-        level = ascending[max(int(np.searchsorted(sums, aim**2)) - 1, 0)]
-        level = max(float(level), aim**2 / cells)
+        level = ascending[max(int(np.searchsorted(sums, wanted)) - 1, 0)]
+        level = max(float(level), wanted / cells)
         over = np.maximum(reading.squares / level, 1.0)
         splits = np.maximum(splits, np.ceil(np.log(over) / np.log(1.0 / SQUARE_LEFT_AFTER_SPLIT)).astype(np.int64))
     return np.minimum(splits, MOST_SPLITS)

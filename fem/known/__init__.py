@@ -11,7 +11,7 @@ It solves the diffusion equation inside the body whatever the strengths of the c
 few points, or leaving out charges that would lie in another part of the body, therefore adds no error: G is then only a
 poorer guess of the fluence.
 
-Finite elements solve for the rest. G is used on a patch of tetrahedra only, those where it is a good guess. There the
+Finite elements solve for the rest. G is used on a patch of tetrahedra only, where it is close to the fluence. There the
 fluence is ``phi_h = u_h + (G - I_h G)``, with ``I_h G`` the linear interpolant of G: u_h is the fluence at the nodes,
 and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G - I_h G, v)``. By Gauss's theorem
 ``a(G, v)`` is the load of the source and integrals over the faces of the patch.
@@ -19,9 +19,9 @@ and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G 
 A beam without width is a sum of such sources too, some of them negative.
 
     charges          screened point charges and their field
-    fitted           charges fitted to one light on the true surface, and what they violate there
+    fitted           charges fitted to one light on the true surface, and their residual there
     fitted_patch     these on a mesh: the load of what is missing, and what the mesh does not see of it
-    kept             their places, kept with a mesh
+    kept_fits        fits kept with a mesh
     images           the charges of a point source: itself and its images
     patch            the tetrahedra on which charges are subtracted
     patch_terms      what a patch adds to the load and to the ledger

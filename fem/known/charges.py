@@ -33,6 +33,8 @@ class Charges:
         The region that the sources lie in, if the body has several media.
     field : VaryingMedium, optional
         The medium of that region if it varies; `medium` is what it is at the sources.
+    name : str
+        Of their light, by which their patch is kept with a mesh: see `tetlux.fem.known.kept_patches`.
     """
 
     positions: FloatArray
@@ -42,10 +44,11 @@ class Charges:
     medium: Medium
     region: int | None = None
     field: VaryingMedium | None = None
+    name: str = ""
 
     @property
-    def dips(self) -> bool:
-        """Whether a source is negative, as those of a first moment are: the fluence may be below zero beside it."""
+    def has_negative_source(self) -> bool:
+        """Whether a source is negative, as those of a first moment are: fluence beside it may be below zero."""
         return bool((self.strengths[: self.sources] < 0).any())
 
     def fluence(self, points: FloatArray) -> FloatArray:

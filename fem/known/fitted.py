@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_at_places, fit_for_remainder
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_for_remainder, fit_placed_charges
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import EQUATION_REFINEMENT, Places
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
@@ -34,9 +34,8 @@ from tetlux.meshing.surface.surface import Surface
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Surfaces of more triangles than this are not fitted. On a scan of 100,000 a fit takes 4 s, and all of the half-space's
-# solution .5 s; on one of 20,000 .9 and .6 s, with half of its error.
-MOST_TRIANGLES = 40_000
+# Points that differ by less than this share of their coordinates are the same, if their normals are.
+SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
 # The power that flows out is corrected where less than this share of all is absorbed.
@@ -48,28 +47,28 @@ ACCURATE, AVERAGED = 0.3, 12
 
 
 @dataclass(frozen=True, eq=False)
-class Violation:
-    """What charges violate on the true surface.
+class BoundaryResidual:
+    """The residual of the boundary condition that charges leave on the true surface.
 
     Attributes
     ----------
     points : Samples
         The q points at which it is integrated; their `spacing` is that of charges, unit.
-    exitance, residual : (q,) ndarray
-        ``G/(2A)`` and ``D dG/dn + G/(2A)``, W/unit².
+    exitance, values : (q,) ndarray
+        ``G/(2A)`` and the residual ``D dG/dn + G/(2A)``, W/unit².
     missed : float
         What the sum of ``-D dG/dn`` over the points misses of its integral, W; 0 where that hardly matters.
     """
 
     points: Samples
     exitance: FloatArray
-    residual: FloatArray
+    values: FloatArray
     missed: float
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Of the points."""
-        return cKDTree(self.points.points)
+        """The search tree of the points."""
+        return self.points.tree
 
     __repr__ = one_line
 
@@ -81,30 +80,30 @@ class FittedLight:
     Attributes
     ----------
     charges : Charges
-    violation : Violation
-    places : Places
+    residual : BoundaryResidual
+    placement : ChargePlacement
         Where charges were put and fitted; for the same light in other coefficients.
     accurate : (q,) ndarray of bool
-        Whether the charges are accurate at each point of `violation`.
+        Whether the charges are accurate at each point of `residual`.
     surface : Surface
         What they were fitted to.
     """
 
     charges: Charges
-    violation: Violation
-    places: Places
+    residual: BoundaryResidual
+    placement: ChargePlacement
     accurate: BoolArray
     surface: Surface
 
     def accurate_at(self, points: FloatArray) -> BoolArray:
-        """Whether the charges are accurate at the point of `violation` nearest to each of some points (n, 3), (n,)."""
+        """Whether the charges are accurate at the point of `residual` nearest to each of some points (n, 3), (n,)."""
         if self.accurate.all():
             return np.ones(len(points), dtype=bool)
-        return np.asarray(self.accurate[self.violation.tree.query(points)[1]])
+        return np.asarray(self.accurate[self.residual.tree.query(points)[1]])
 
-    def violation_within(self, wanted: Spacing) -> Violation:
-        """The violation at points as far apart as wanted at most, where a mesh is finer than its own points."""
-        return violation_of(self.charges, self.places.fitted, self.surface, wanted)
+    def points_within(self, wanted: Spacing) -> Samples:
+        """Points as far apart as wanted at most, where a mesh is finer than those of the residual."""
+        return _residual_points(self.placement, self.surface, wanted)
 
     __repr__ = one_line
 
@@ -139,57 +138,78 @@ def fit_light(
         if fitted is None:
             return None
     else:
-        fitted = fit_at_places(like.places, equation, lights)
+        fitted = fit_placed_charges(like.placement, equation, lights)
     charges = _charges(fitted, surface, medium)
-    violation = violation_of(charges, fitted.places.fitted, surface)
-    accurate = like.accurate if like is not None else _accurate(violation, medium)
-    return FittedLight(charges, violation, fitted.places, accurate, surface)
+    if like is not None and like.surface is surface:
+        residual = residual_at(like.residual.points, charges)
+    else:
+        residual = residual_at(_residual_points(fitted.placement, surface), charges)
+    accurate = like.accurate if like is not None else _accurate(residual, medium)
+    return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
 
-def _accurate(violation: Violation, medium: Medium) -> BoolArray:
+def _accurate(residual: BoundaryResidual, medium: Medium) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
-    points = violation.points
-    nearest = violation.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
-    errors = exitance_error(equation_of(medium), violation.residual, points.spacing)
-    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(violation.exitance[nearest]).mean(axis=1)
+    points = residual.points
+    nearest = residual.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
+    errors = exitance_error(equation_of(medium), residual.values, points.spacing)
+    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(residual.exitance[nearest]).mean(axis=1)
     return np.asarray(error <= ACCURATE * exitance)
 
 
 def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     """Whether the light is a few points well inside a simple body."""
     terms = deposit.terms
-    if surface.overlaps or len(surface.faces) > MOST_TRIANGLES:
+    if surface.overlaps:
         return False
     if not 0 < len(terms.points) <= MOST_SOURCES or len(terms.segments) > 0:
         return False
     if np.any(terms.irradiance) or np.any(terms.emission) or deposit.on_mesh is not None:
         return False
-    depths = np.linalg.norm(surface.project(terms.points)[0] - terms.points, axis=1)
+    depths = surface.distances(terms.points)
     return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(terms.points).all())
 
 
 def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:
     """Sources and charges as one sum."""
     field, sources = fitted.field, fitted.lights.points
-    depths = np.linalg.norm(surface.project(sources)[0] - sources, axis=1)
-    heights = np.asarray(cKDTree(fitted.places.fitted.points).query(fitted.places.charges)[0])
+    depths = surface.distances(sources)
+    heights = np.asarray(cKDTree(fitted.placement.fitted.points).query(fitted.placement.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
     return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
 
 
-def violation_of(charges: Charges, samples: Samples, surface: Surface, wanted: Spacing | None = None) -> Violation:
-    """What charges violate on the true surface, at points that follow from samples where they were fitted."""
-    tree = cKDTree(samples.points)
+def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spacing | None = None) -> Samples:
+    """Points at which a residual is integrated; they do not depend on the coefficients."""
+    samples = placement.fitted
 
     def spacing(queries: FloatArray) -> FloatArray:
-        own = EQUATION_REFINEMENT * samples.spacing[tree.query(queries)[1]]
+        own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
         return own if wanted is None else np.minimum(own, wanted(queries))
 
-    points, equation = quadrature(surface, spacing), equation_of(charges.medium)
-    fluence, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
-    exitance = equation.robin * fluence
-    apart = replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[tree.query(points.points)[1]])
-    return Violation(apart, exitance, flux + exitance, _missed(charges, points, -float(points.areas @ flux)))
+    points = quadrature(surface, spacing, len(placement.charges))
+    # Many runs may have these points on one mesh, which then finds them once.
+    points.points.setflags(write=False)
+    return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
+
+
+def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | None = None) -> BoundaryResidual:
+    """The residual of charges at points of the true surface, some of which may be those where it is known."""
+    exitance, values = np.empty(len(points)), np.empty(len(points))
+    new = np.arange(len(points))
+    if known is not None:
+        distance, nearest = known.tree.query(points.points)
+        same = distance <= SAME * float(np.abs(points.points).max())
+        # Two triangles may have a point in common and not its normal.
+        same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
+        exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
+        new = new[~same]
+    equation = equation_of(charges.medium)
+    fluence, flux = equation.traces(points.points[new], points.normals[new], charges.positions, charges.strengths)
+    exitance[new] = equation.robin * fluence
+    values[new] = flux + exitance[new]
+    outflow = float(points.areas @ (exitance - values))
+    return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
 
 
 def _missed(charges: Charges, points: Samples, outflow: float) -> float:

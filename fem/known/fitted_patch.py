@@ -1,14 +1,16 @@
-"""`FittedPatch`: fitted charges on one mesh, what they leave to it, and what of that it does not see."""
+"""`FittedPatch`: fitted charges on one mesh, their residual as a load, and the part that the mesh does not resolve."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.known.fitted import FittedLight, Violation
+from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.models.boundary import boundary_condition_of
@@ -19,8 +21,14 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
 SHORTER = 0.65
-# Facets shorter than this times the distance of the points at which the violation is integrated have more points.
+# Facets shorter than this times the distance of the points at which the residual is integrated have more points.
 FINE = 0.7
+# The points are then so many times as far apart as the facets are long, so that these may be split once.
+FINER = 0.7
+# Points are chosen anew if this share of the small facets has too few.
+MOST_SMALL = 0.1
+# A part of the surface is as fine as the smallest of so many facets around its middle asks for.
+BESIDE = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,15 +37,15 @@ class FittedPatch(Patch):
 
     Parameters
     ----------
-    violation : Violation
-        Of the charges, on the true surface.
+    residual : BoundaryResidual
+        Of the boundary condition, on the true surface.
     facets : (q,) ndarray
         The boundary triangle nearest to each of its points.
     weights : (q, 3) ndarray
         Barycentric coordinates of the points there.
     """
 
-    violation: Violation
+    residual: BoundaryResidual
     facets: IntArray
     weights: FloatArray
 
@@ -53,13 +61,13 @@ class FittedPatch(Patch):
     @cached_property
     def areas(self) -> FloatArray:
         """The areas that points of the surface stand for, (q,), unit²; 0 where they are not of the patch."""
-        areas = self.violation.points.areas
+        areas = self.residual.points.areas
         return areas if self.is_whole else areas * self.cells[self.mesh.boundary_cells[self.facets]]
 
     @cached_property
     def load(self) -> FloatArray:
         """``-∮ r v`` over the surface of the patch, (n,), W."""
-        return self._at_nodes(-self.areas * self.violation.residual)
+        return self._at_nodes(-self.areas * self.residual.values)
 
     @cached_property
     def residual_at_nodes(self) -> FloatArray:
@@ -76,10 +84,18 @@ class FittedPatch(Patch):
         corners = self.mesh.boundary_faces[self.facets]
         seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
-        length = SHORTER * np.minimum(self.violation.points.spacing, sides[self.facets])
-        missed = exitance_error(equation_of(self.charges.medium), self.violation.residual - seen, length)
+        length = SHORTER * np.minimum(self.residual.points.spacing, sides[self.facets])
+        missed = exitance_error(equation_of(self.charges.medium), self.residual.values - seen, length)
         square = self.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
+
+    def splits_to_see(self) -> IntArray:
+        """How often each boundary triangle has to be halved until it is as short as charges are apart, (f,)."""
+        sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
+        apart = np.full(len(sides), np.inf)
+        np.minimum.at(apart, self.facets, self.residual.points.spacing)
+        # Two halve its sides.
+        return np.asarray(np.ceil(2.0 * np.log2(np.maximum(sides / apart, 1.0))), dtype=np.int64)
 
     def _at_nodes(self, values: FloatArray) -> FloatArray:
         """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
@@ -89,30 +105,54 @@ class FittedPatch(Patch):
 
 def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None = None) -> FittedPatch:
     """A light's charges on a mesh; `coarse` is the same on one that this is a refinement of."""
-    points = light.violation.points
     if coarse is None:
         at_nodes = light.charges.fluence(mesh.points)
     else:
         # Nodes of the coarse mesh come first.
         new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
         at_nodes = np.concatenate([coarse.at_nodes, new])
-    if coarse is None or coarse.violation is not light.violation:
-        _, facets, weights = mesh.closest_boundary(points.points)
+    residual = light.residual if coarse is None else coarse.residual
+    small = _are_small(mesh, light.residual)
+    anew = bool((small & _are_small(mesh, residual)).sum() > MOST_SMALL * small.sum())
+    if anew:
+        residual = residual_at(_finer_points(mesh, light, small), light.charges, light.residual)
+    if coarse is None or anew:
+        _, facets, weights = mesh.closest_boundary(residual.points.points)
     else:
         facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
         others = np.flatnonzero(facets < 0)
-        _, facets[others], weights[others] = mesh.closest_boundary(points.points[others])
-    violation = light.violation
-    corners = mesh.points[mesh.boundary_faces]
-    sides, apart = longest_sides(corners), np.sqrt(2.0 * points.areas)
-    nearest = apart[light.violation.tree.query(corners.mean(axis=1))[1]]
-    if (sides < FINE * nearest).any():
-        limits, tree = np.where(sides < FINE * nearest, sides, np.inf), cKDTree(corners.mean(axis=1))
-        violation = light.violation_within(lambda queries: limits[tree.query(queries)[1]])
-        _, facets, weights = mesh.closest_boundary(violation.points.points)
+        _, facets[others], weights[others] = mesh.closest_boundary(residual.points.points[others])
     cells: BoolArray = np.asarray(light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1))
-    patch = FittedPatch(mesh, light.charges, cells, at_nodes, violation, facets, weights)
+    patch = FittedPatch(mesh, light.charges, cells, at_nodes, residual, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
+
+
+def _are_small(mesh: TetMesh, residual: BoundaryResidual) -> BoolArray:
+    """Whether boundary triangles are smaller than the points of a residual are apart there, (f,)."""
+    corners = mesh.points[mesh.boundary_faces]
+    apart = np.sqrt(2.0 * residual.points.areas)[residual.tree.query(corners.mean(axis=1))[1]]
+    return np.asarray(longest_sides(corners) < FINE * apart)
+
+
+def _spacing_of(mesh: TetMesh, small: BoolArray) -> Spacing:
+    """The spacing of points that small boundary triangles need, of a mask (f,)."""
+    corners = mesh.points[mesh.boundary_faces]
+    limits, tree = np.where(small, FINER * longest_sides(corners), np.inf), cKDTree(corners.mean(axis=1))
+    near = min(BESIDE, len(limits))
+    return lambda queries: limits[tree.query(queries, k=near)[1].reshape(len(queries), near)].min(axis=1)
+
+
+# Points by those of a residual that they take the place of: on one mesh they are the same for all coefficients.
+_FINER: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Samples, Samples]] = WeakKeyDictionary()
+
+
+def _finer_points(mesh: TetMesh, light: FittedLight, small: BoolArray) -> Samples:
+    """Points that are as close together as small boundary triangles need, of a mask (f,)."""
+    of_mesh = _FINER.setdefault(mesh, WeakKeyDictionary())
+    known = light.residual.points
+    if known not in of_mesh:
+        of_mesh[known] = light.points_within(_spacing_of(mesh, small))
+    return of_mesh[known]
 
 
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:
@@ -143,14 +183,15 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> Pa
     PatchTerms
         Where the patch is whole, its load is that of ``u = phi - G``, not of the fluence itself.
     """
-    mesh, charges, violation = patch.mesh, patch.charges, patch.violation
+    mesh, charges, residual = patch.mesh, patch.charges, patch.residual
     areas = patch.areas
     if not patch.is_whole:
-        leaving = areas @ violation.exitance
-        through = areas @ (violation.residual - violation.exitance)
+        # Sums over points miss power near the light, which is in the patch.
+        leaving = areas @ residual.exitance + residual.missed
+        through = areas @ (residual.values - residual.exitance) - residual.missed
         return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
-    exited = float(areas @ violation.exitance) + violation.missed
-    inflow = float(areas @ (violation.residual - violation.exitance)) - violation.missed
+    exited = float(areas @ residual.exitance) + residual.missed
+    inflow = float(areas @ (residual.values - residual.exitance)) - residual.missed
     robin = boundary_condition_of(charges.medium).robin
     at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
     # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.

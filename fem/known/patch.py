@@ -1,4 +1,4 @@
-"""`Patch`: the tetrahedra on which charges are subtracted, where they are a good guess of the fluence."""
+"""`Patch`: the tetrahedra on which charges are subtracted, where they are close to the fluence."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,8 +23,8 @@ RESOLVED = 3e-4
 # Longest edge of an inner face of a patch, over its distance from the charges: across such faces the fluence jumps by
 # the error of linear interpolation.
 COARSEST_INNER = 1.5
-# The charges are a good guess where they differ from the fluence by at most this share of themselves.
-GOOD_GUESS = 0.5
+# Charges are accurate where they differ from the fluence by at most this share of themselves.
+ACCURATE = 0.5
 # Coefficients of a medium that varies are those at the source if they differ by less than this share.
 SAME = 1e-9
 
@@ -70,26 +70,26 @@ class Patch:
     __repr__ = one_line
 
 
-def good_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
-    """Whether the charges are a good guess of the fluence (n,) at each node, (n,)."""
-    good = np.abs(fluence - patch.at_nodes) <= GOOD_GUESS * np.abs(patch.at_nodes)
+def find_accurate_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
+    """Whether the charges are close to the fluence (n,) at each node, (n,)."""
+    accurate = np.abs(fluence - patch.at_nodes) <= ACCURATE * np.abs(patch.at_nodes)
     charges = patch.charges
     negative = charges.positions[: charges.sources][charges.strengths[: charges.sources] < 0]
     if len(negative):
         # Around negative sources the fluence of the charges crosses zero, where a relative difference says nothing.
-        good |= cKDTree(negative).query(patch.mesh.points)[0] <= charges.medium.mean_free_path
-    return np.asarray(good)
+        accurate |= cKDTree(negative).query(patch.mesh.points)[0] <= charges.medium.mean_free_path
+    return np.asarray(accurate)
 
 
-def patch_of(mesh: TetMesh, charges: Charges, good: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
-    """The patch of the tetrahedra whose four nodes are good (n,); an empty patch if its face integrals would fail."""
-    cells: BoolArray = np.asarray(good[mesh.tetrahedra].all(axis=1))
+def patch_of(mesh: TetMesh, charges: Charges, accurate: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
+    """The patch of the tetrahedra whose nodes are all accurate (n,); empty if integrals over its faces would fail."""
+    cells: BoolArray = np.asarray(accurate[mesh.tetrahedra].all(axis=1))
     if charges.region is not None:
         cells &= mesh.regions == charges.region
     if charges.field is not None:
         cells[cells] = _has_medium(mesh.points[mesh.tetrahedra[cells]], charges.medium, charges.field)
     patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
-    return patch if _is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
+    return patch if is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
 
 
 def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> BoolArray:
@@ -104,11 +104,11 @@ def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> Bo
     return np.asarray(same.reshape(-1, 4).all(axis=1))
 
 
-def _is_sound(patch: Patch) -> bool:
+def is_sound(patch: Patch) -> bool:
     """Whether the integrals over the faces of a patch can be trusted, so that Gauss's theorem holds.
 
     The sources must lie inside the patch, the images outside it, and neither too close to its faces. The ledger does
-    not reveal a violation, since it is made of the same integrals.
+    not show when they fail, since it is made of the same integrals.
     """
     mesh, charges, cells = patch.mesh, patch.charges, patch.cells
     places = charges.positions[: charges.sources]
@@ -183,9 +183,9 @@ def _any_inside(patch: Patch, places: FloatArray) -> bool:
     return bool(patch.cells[found[found >= 0]].any())
 
 
-def inherit_good_nodes(good: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
-    """Good nodes of a refined mesh: old nodes `points` (n, 3) keep their value, a new one takes the nearest's."""
+def inherit_accurate_nodes(accurate: BoolArray, points: FloatArray, finer: TetMesh) -> BoolArray:
+    """Accurate nodes of a refined mesh: its old nodes, `points` (n, 3), keep theirs, a new one has its neighbour's."""
     new = finer.points[len(points) :]
-    if good.all() or len(new) == 0:
-        return np.concatenate([good, np.ones(len(new), dtype=bool)])
-    return np.concatenate([good, good[cKDTree(points).query(new)[1]]])
+    if accurate.all() or len(new) == 0:
+        return np.concatenate([accurate, np.ones(len(new), dtype=bool)])
+    return np.concatenate([accurate, accurate[cKDTree(points).query(new)[1]]])

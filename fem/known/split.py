@@ -1,4 +1,4 @@
-"""What the lights of a scene put into a body: what is known in closed form, and what is left to the mesh."""
+"""`SplitLights`: the lights of a scene, split into what is known in closed form and what finite elements solve for."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -7,11 +7,12 @@ from typing import Literal, get_args
 import numpy as np
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight, fit_light
 from tetlux.fem.known.images import MOST_CHARGES, charges_of
-from tetlux.fem.known.kept import KeptPlaces
+from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
@@ -30,19 +31,19 @@ MOST_FITTED = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class Sources:
-    """Lights, as a mesh needs them.
+class SplitLights:
+    """Lights, split into what charges give in closed form and the right-hand side for finite elements.
 
     Attributes
     ----------
     deposits : tuple of Deposit
-        What each light leaves in the body; beams without width as points, where these are subtracted.
+        What each light deposits in the body; beams without width as points, where these are subtracted.
     charges : tuple of Charges
-        The points among that, where these are subtracted near by.
+        Subtracted on patches of the mesh: points of the deposits with their images.
     owners : tuple of int
-        The light of each of these.
+        The number of the light that each of `charges` belongs to.
     fitted : mapping of int to FittedLight
-        Lights from which charges are subtracted that were fitted to the surface.
+        Charges fitted to the surface, by the number of the light that they are subtracted from.
     remaining : tuple of Deposit
         What of each light is not subtracted: the right-hand side on the mesh.
     """
@@ -59,26 +60,27 @@ class Sources:
         return [warning for deposit in self.deposits for warning in deposit.warnings]
 
     def deposits_if(self, *, fitted: bool) -> list[Deposit]:
-        """Of the lights that charges are fitted to, or of the others."""
+        """The deposits of lights that charges are fitted to, or those of all other lights."""
         return [deposit for light, deposit in enumerate(self.deposits) if (light in self.fitted) == fitted]
 
     @property
-    def dips(self) -> bool:
-        """Whether the equation itself may have a fluence below zero: that of a source of a first moment may."""
-        return any(charges.dips for charges in self.charges)
+    def has_negative_source(self) -> bool:
+        """Whether charges have a negative source, so that the exact fluence of the equation may be below zero."""
+        return any(charges.has_negative_source for charges in self.charges)
 
     __repr__ = one_line
 
 
-def sources_of(
+def split_lights(
     lights: Sequence[Light],
     body: Body,
     subtract: Subtract,
     *,
-    tolerance: float = 0.02,
-    kept: KeptPlaces | None = None,
-) -> Sources:
-    """Let lights fall into a body.
+    tolerance: float = DEFAULT_TOLERANCE,
+    kept: KeptFits | None = None,
+    scene: int = 0,
+) -> SplitLights:
+    """Split the lights of a scene into what is subtracted and what is left to finite elements.
 
     Parameters
     ----------
@@ -88,8 +90,10 @@ def sources_of(
         "fitted" is for a body whose surface is the true one; what cannot be fitted has "half-space".
     tolerance : float
         Relative L2 error of the exitance, of what is fitted and the mesh together.
-    kept : KeptPlaces, optional
-        Choices to follow, and to add to.
+    kept : KeptFits, optional
+        Fits of earlier solutions, which are followed; new ones are added.
+    scene : int
+        The number of the scene, by which patches are kept.
 
     Raises
     ------
@@ -98,7 +102,7 @@ def sources_of(
     """
     if subtract not in get_args(Subtract):
         raise InputError(f'subtract is "{subtract}"; it is "fitted", "half-space", "free-space" or "nothing".')
-    check_list(lights)
+    check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     deposits: list[Deposit] = []
@@ -111,7 +115,7 @@ def sources_of(
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
         if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
-            found_fit = _fitted(light, deposit, body, tolerance, kept)
+            found_fit = _fit(light, deposit, body, tolerance, kept)
             if found_fit is not None:
                 fitted[number] = found_fit
                 deposits.append(deposit)
@@ -124,17 +128,15 @@ def sources_of(
         else:
             known, rest, found = _charges_in_several(deposit, body, images=images, most=left)
         left -= sum(len(some.positions) for some in found)
-        charges += found
+        charges += [replace(each, name=f"{scene}: {number}.{k} {light!r}") for k, each in enumerate(found)]
         owners += [number] * len(found)
         deposits.append(known)
         remaining.append(rest)
-    return Sources(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(remaining))
+    return SplitLights(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(remaining))
 
 
-def _fitted(
-    light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptPlaces | None
-) -> FittedLight | None:
-    """Charges fitted to a light, at places that are kept if there are any; None if they would not do."""
+def _fit(light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptFits | None) -> FittedLight | None:
+    """Fit charges to a light, placed as in its kept fit if there is one; None if charges would not do."""
     medium = body.only_medium
     if medium is None or len(deposit.terms.points) == 0:
         return None
@@ -149,13 +151,13 @@ def _fitted(
     return found
 
 
-def without_fit(subtract: Subtract) -> Subtract:
-    """What to subtract in place of fitted charges where no true surface is known."""
+def replace_fitted(subtract: Subtract) -> Subtract:
+    """Subtract the half-space in place of fitted charges, where no true surface is known."""
     return "half-space" if subtract == "fitted" else subtract
 
 
-def check_list(lights: Sequence[Light]) -> None:
-    """Refuse what is no list of lights.
+def check_lights(lights: Sequence[Light]) -> None:
+    """Refuse anything but a list of lights.
 
     Raises
     ------
@@ -172,7 +174,7 @@ def check_list(lights: Sequence[Light]) -> None:
 
 
 def check_scenes(scenes: Sequence[Sequence[Light]]) -> None:
-    """Refuse what is no list of lists of lights, or an empty list.
+    """Refuse anything but a list of lists of lights, and an empty one.
 
     Raises
     ------
@@ -181,7 +183,7 @@ def check_scenes(scenes: Sequence[Sequence[Light]]) -> None:
     if not isinstance(scenes, Sequence):
         raise InputError("scenes are given in a list, and the lights of each in a list; write [[light], [another]].")
     for lights in scenes:
-        check_list(lights)
+        check_lights(lights)
     if len(scenes) == 0:
         raise InputError("there is no scene; give the lights of at least one.")
 

@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight
 from tetlux.fem.known.fitted_patch import FittedPatch, fitted_patch, fitted_terms
+from tetlux.fem.known.kept_patches import kept_patch
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.known.patch_terms import PatchTerms, patch_terms
 from tetlux.fem.operators.assembly import Lumping
@@ -31,16 +32,19 @@ class Subtraction:
         What that adds to the load vector and to the ledger.
     mass : {"lumped", "consistent"}
         As in the system matrix.
+    is_kept : bool
+        Whether the patch is that of an earlier solution on the mesh.
     """
 
     light: int
     patch: Patch
     terms: PatchTerms
     mass: Lumping
+    is_kept: bool = False
 
-    def shrink_to(self, good: BoolArray) -> "Subtraction":
-        """The same on the tetrahedra whose four nodes are good, (n,), alone."""
-        patch = patch_of(self.patch.mesh, self.patch.charges, good, self.patch.at_nodes)
+    def shrink_to(self, accurate: BoolArray) -> "Subtraction":
+        """The same on the tetrahedra whose four nodes are accurate, (n,), alone."""
+        patch = patch_of(self.patch.mesh, self.patch.charges, accurate, self.patch.at_nodes)
         return replace(self, patch=patch, terms=patch_terms(patch, self.mass))
 
     def fluence_of(self, solution: NumberArray) -> NumberArray:
@@ -52,11 +56,19 @@ class Subtraction:
 
 
 def subtract_on(
-    mesh: TetMesh, light: int, charges: Charges, mass: Lumping, good: BoolArray | None = None
+    mesh: TetMesh, light: int, charges: Charges, mass: Lumping, accurate: BoolArray | None = None
 ) -> Subtraction:
-    """Subtract charges of a light where they are a good guess at all nodes (n,), or everywhere if that is not known."""
-    patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if good is None else good)
+    """Subtract charges of a light at accurate nodes (n,), or everywhere if these are not known."""
+    patch = patch_of(mesh, charges, np.ones(len(mesh.points), dtype=bool) if accurate is None else accurate)
     return Subtraction(light, patch, patch_terms(patch, mass), mass)
+
+
+def subtract_as_before(mesh: TetMesh, light: int, charges: Charges, mass: Lumping) -> Subtraction:
+    """Subtract charges of a light where they were subtracted on the mesh before; everywhere if they were not."""
+    patch = kept_patch(mesh, charges, charges.fluence(mesh.points), "linear")
+    if patch is None:
+        return subtract_on(mesh, light, charges, mass)
+    return Subtraction(light, patch, patch_terms(patch, mass), mass, is_kept=True)
 
 
 def subtract_fitted(

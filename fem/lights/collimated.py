@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.ballistic.follow import follow
-from tetlux.fem.ballistic.interface import refract_in
+from tetlux.fem.ballistic.follow import refract_and_follow
 from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import check_positive, unit_vector
@@ -17,7 +16,6 @@ from tetlux.fem.lights.spots.triangles import area_vectors, sample_spot, split_f
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
-from tetlux.fem.sources.ledger import Ledger
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
 from tetlux.meshing.boundary.curved_facets import CurvedFacets
 from tetlux.meshing.describe import as_text
@@ -142,11 +140,8 @@ class CollimatedBeam:
             rays, normals, facets = mesh.cache.get(key, lambda: self._incident_rays(mesh))
         else:
             rays, normals, facets = self._incident_rays(mesh)
-        rays = replace(rays, powers=self.irradiance * rays.powers)
-        refracted, specular = refract_in(rays, normals, coefficients.outer.eta, mesh.surface.normals[facets])
-        deposit = follow(mesh, coefficients, refracted)
-        outside = Ledger(incident=float(rays.powers.sum()), specular=specular)
-        return replace(deposit, ledger=Ledger.merge([outside, deposit.ledger]))
+        arriving = replace(rays, powers=self.irradiance * rays.powers)
+        return refract_and_follow(mesh, coefficients, arriving, normals, mesh.surface.normals[facets])
 
     def _incident_rays(self, mesh: TetMesh) -> tuple[Rays, FloatArray, IntArray]:
         """Up to three rays for each illuminated facet of a mesh, with power at an irradiance of 1.

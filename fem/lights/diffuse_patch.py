@@ -27,8 +27,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Samples of the patch near which the mesh is fine.
 PLACES = 200
-# Facets across the rim are split in four until they are smaller than this share of the radius, at most so often, and
-# each piece is sampled at so many points: the illuminated area of a flat face is right to 0.1 %.
+# Facets across the rim are split in four until they are smaller than RIM_SHARE of the radius, at most MOST_SPLITS
+# times. Each piece is sampled at SAMPLES points: the illuminated area of a flat face is right to 0.1 %.
 RIM_SHARE, MOST_SPLITS, SAMPLES = 1.0 / 8.0, 16, 64
 
 

@@ -1,5 +1,9 @@
 """Where parallel rays from outside enter a body."""
 
+from collections.abc import Callable
+from typing import TypeVar
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
@@ -8,6 +12,36 @@ from tetlux.meshing.surface.surface import Surface
 # Where the sine of the angle between ray and surface is less than this, a ray enters at the flat triangle, and not at
 # the curved surface that the triangle approximates.
 GRAZING = 0.1
+# What is asked of a surface for single beams, which the runs of a sweep share; so many answers are kept.
+_ANSWERS: WeakKeyDictionary[Surface, dict[bytes, object]] = WeakKeyDictionary()
+MOST_KEPT = 10_000
+Answer = TypeVar("Answer")
+
+
+def contains_point(surface: Surface, point: FloatArray) -> bool:
+    """Whether a point (3,) is inside of a surface; the answer is kept with the surface."""
+    return _kept(surface, b"in" + point.tobytes(), lambda: bool(surface.contains(point[None])[0]))
+
+
+def find_entry(surface: Surface, origin: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """`find_entries` of one ray; the answer is kept with the surface."""
+
+    def find() -> tuple[FloatArray, FloatArray]:
+        points, normals = find_entries(surface, origin[None], direction)
+        points.setflags(write=False)
+        normals.setflags(write=False)
+        return points, normals
+
+    return _kept(surface, b"at" + origin.tobytes() + direction.tobytes(), find)
+
+
+def _kept(surface: Surface, key: bytes, ask: Callable[[], Answer]) -> Answer:
+    answers = _ANSWERS.setdefault(surface, {})
+    if key not in answers:
+        if len(answers) >= MOST_KEPT:
+            answers.clear()
+        answers[key] = ask()
+    return answers[key]  # type: ignore[return-value]
 
 
 def find_entries(

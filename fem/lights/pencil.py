@@ -12,7 +12,7 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import as_vector, check_positive, unit_vector
 from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.collimated import CollimatedBeam
-from tetlux.fem.lights.entries import find_entries
+from tetlux.fem.lights.entries import contains_point, find_entries, find_entry
 from tetlux.fem.lights.illumination import ENTRY_RAYS
 from tetlux.fem.lights.spots import Disc
 from tetlux.fem.lights.spots.plane import sunflower
@@ -146,8 +146,11 @@ class PencilBeam:
     def _thin_beams(self, body: Body, count: int) -> "_ThinBeams":
         """Thin beams that represent this one, and where they enter the body."""
         origin, direction = as_vector(self.origin, "origin"), unit_vector(self.direction, "direction")
-        origins = origin + (sunflower(count, self.radius, direction) if count > 1 else np.zeros((1, 3)))
-        points, normals = find_entries(body.surface, origins, direction)
+        if count == 1:
+            points, normals = find_entry(body.surface, origin, direction)
+        else:
+            origins = origin + sunflower(count, self.radius, direction)
+            points, normals = find_entries(body.surface, origins, direction)
         if len(points) == 0:
             raise self._miss(body.surface)
         arriving = Rays(points, np.broadcast_to(direction, points.shape), np.full(len(points), self.power / count))
@@ -190,7 +193,7 @@ class PencilBeam:
         return replace(beam.deposit_in(body), warnings=(_missed_note(missed),) if missed > 0 else ())
 
     def _check_outside(self, surface: Surface, origin: FloatArray) -> None:
-        if surface.contains(origin[None])[0]:
+        if contains_point(surface, origin):
             raise InputError(
                 f"the beam starts inside the body, at {as_text(self.origin)}; move its origin outside, "
                 "or use a point source."

@@ -17,8 +17,8 @@ from tetlux.meshing.host.blocks import THREADS, map_in_threads
 # Relative residual at which the iteration stops.
 STOP_RESIDUAL = 1e-11
 ITERATIONS = 1000
-# Right-hand sides that share one iteration where every core has so many: each pass over the matrix then serves all of
-# them. Fewer are quicker one by one, since SciPy's products with two or three columns are slow.
+# Right-hand sides that share one iteration, where there are as many for every core: each pass over the matrix then
+# serves all of them. Fewer are quicker one by one, since SciPy's products with two or three columns are slow.
 GROUP = 8
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000

@@ -130,13 +130,14 @@ def check_labels(mesh: TetMesh, labels: Iterable[int]) -> None:
     if without:
         several = len(without) > 1
         raise InputError(
-            f"the mesh's {'labels' if several else 'label'} {mesh.named(without)} {'have' if several else 'has'} no "
-            "medium; give one for each."
+            f"the mesh's {'labels' if several else 'label'} {mesh.label_text(without)} {'have' if several else 'has'} "
+            "no medium; give one for each."
         )
     none = [label for label in given if label not in mesh.region_volumes]
     if none:
         raise InputError(
-            f"the mesh has no label {' and '.join(map(str, none))}; its labels are {mesh.named(mesh.region_volumes)}."
+            f"the mesh has no label {' and '.join(map(str, none))}; its labels are "
+            f"{mesh.label_text(mesh.region_volumes)}."
         )
 
 

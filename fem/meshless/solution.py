@@ -12,11 +12,13 @@ from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
 from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import EQUATION_REFINEMENT
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.reading_error import LEAST_RELATIVE_ERROR, reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
@@ -114,6 +116,13 @@ class ChargeSolution:
     def exitance_on(self, queries: FloatArray) -> FloatArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
+
+    def errors_on(self, queries: FloatArray) -> FloatArray:
+        """Estimated relative errors of the exitance at points (q, 3) on the surface, (q,)."""
+        source = float(boundary_condition_of(self.medium).inflow(sum(ledger.transmitted for ledger in self.ledgers)))
+        errors = reading_errors(self.surface, self._sums[0], self.samples[0], source, queries)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(errors / np.abs(self.exitance_on(queries)) + LEAST_RELATIVE_ERROR)
 
     def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
@@ -226,7 +235,7 @@ def charge_solution(
     ledgers: Sequence[LightLedger],
     *,
     inner: Sequence[tuple[Surface, Medium]] = (),
-    tolerance: float = 0.02,
+    tolerance: float = DEFAULT_TOLERANCE,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for point sources and diffuse light in a body of homogeneous regions.
@@ -259,7 +268,7 @@ def charge_solution(
         boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
         lights = LightSources(points, powers, boundary_source)
         fitted = fit_charges(surface, equation_of(medium), lights, tolerance=tolerance, most=most)
-        samples, interface = fitted.places.fitted, Interface(surface, 0, None)
+        samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         return ChargeSolution(
             surface, medium, (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         )
@@ -270,7 +279,7 @@ def charge_solution(
     light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
     fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
-    fitted_at = tuple(each.places.fitted for each in fit.places)
+    fitted_at = tuple(each.placement.fitted for each in fit.placements)
     return ChargeSolution(
         surface, medium, tuple(interfaces), fit.fields, fitted_at, sources, tuple(ledgers), fit.errors
     )

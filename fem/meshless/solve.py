@@ -9,7 +9,8 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST_CHARGES
 from tetlux.fem.error.tolerance import check_tolerance
-from tetlux.fem.known.split import check_list
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
+from tetlux.fem.known.split import check_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
@@ -41,7 +42,7 @@ def solve_with_charges(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float = 0.02,
+    tolerance: float = DEFAULT_TOLERANCE,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for lights in a body of homogeneous regions, without a mesh.
@@ -82,7 +83,7 @@ def solve_with_charges(
     if not isinstance(medium, AnyMedium):
         raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
     check_tolerance(tolerance)
-    check_list(lights)
+    check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
     watch = Stopwatch()
@@ -108,8 +109,12 @@ def solve_with_charges(
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     if not solution.error_estimate <= tolerance:
         warnings.append(
-            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} with "
-            f"{solution.charges} charges; {_INSTEAD}"
+            Note(
+                "tolerance-missed",
+                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
+                f"with {solution.charges} charges; {_INSTEAD}",
+                value=solution.error_estimate,
+            )
         )
     warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
@@ -156,7 +161,7 @@ def check_simple(surface: Surface) -> None:
 def _check_apart(points: FloatArray, medium: Medium, inner: Sequence[Surface]) -> None:
     """Refuse sources on the surfaces of regions, where fluence has a pole on both sides."""
     for number, surface in enumerate(inner, 1):
-        away = np.linalg.norm(surface.project(points)[0] - points, axis=1)
+        away = surface.distances(points)
         if (away < LEAST_DISTANCE_TO_INTERFACE * medium.mean_free_path).any():
             place = ", ".join(f"{x:.4g}" for x in points[away.argmin()])
             raise InputError(

@@ -75,5 +75,8 @@ class PartialCurrent:
 
 
 def boundary_condition_of(medium: Medium) -> BoundaryCondition:
-    """The boundary condition of a body whose outer medium is given; a further kind is chosen here."""
+    """The boundary condition of a body whose outer medium is given.
+
+    A further kind of `Medium.boundary` is chosen here; "exact" and "classic" are one kind, with different factors A.
+    """
     return PartialCurrent(medium)

@@ -34,7 +34,8 @@ class Model(Protocol):
     """What a model says of itself; `tetlux.fem.models.diffusion.Diffusion` is one.
 
     Its weak form is a sum of `Block` over equations i and unknowns j. Each block becomes the `Terms` of one matrix
-    (`Assembly.terms`), all of one pattern and real. `operator_of` combines them with `shift`.
+    (`Assembly.terms`), all of one pattern and real. `operator_of` combines them with `shift`. A model is given to
+    `tetlux.fem.system.System` as `model_of`; `tetlux.fem.scenes.Scenes.system_on` makes those of `solve`.
 
     `CONTRIBUTING.md` lists what modulated light and SP3 have to add.
     """

@@ -111,7 +111,9 @@ def mass_term(mesh: TetMesh, sigma_a: float | FloatArray, lumping: Lumping, scal
     if lumping == "lumped":
         return Term(None, lumped)
     slots = mesh.tetrahedron_edges.T.reshape(-1)
-    return _consistent(mesh, sum_by_index(slots, np.tile(sigma_a * mesh.volumes / 20.0, 6), len(mesh.edges)), lumped)
+    return _consistent_term(
+        mesh, sum_by_index(slots, np.tile(sigma_a * mesh.volumes / 20.0, 6), len(mesh.edges)), lumped
+    )
 
 
 def boundary_term(mesh: TetMesh, robin: float | FloatArray, lumping: Lumping) -> Term:
@@ -121,10 +123,10 @@ def boundary_term(mesh: TetMesh, robin: float | FloatArray, lumping: Lumping) ->
     if lumping == "lumped":
         return Term(None, lumped)
     across = np.repeat(robin * mesh.boundary_areas / 12.0, 3)
-    return _consistent(mesh, sum_by_index(mesh.boundary_edges, across, len(mesh.edges)), lumped)
+    return _consistent_term(mesh, sum_by_index(mesh.boundary_edges, across, len(mesh.edges)), lumped)
 
 
-def _consistent(mesh: TetMesh, edges: FloatArray, lumped: FloatArray) -> Term:
+def _consistent_term(mesh: TetMesh, edges: FloatArray, lumped: FloatArray) -> Term:
     """The term of given entries along the edges (e,), whose rows sum to the diagonal of the lumped term (n,)."""
     return Term(edges, lumped - to_ends(mesh, edges))
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
-from tetlux.fem.outcome.exitance_field import ExitanceField
+from tetlux.fem.outcome.exitance_field import ExitanceField, FieldWithErrors
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.quadratic.error import ReadingError, read_with_error
+from tetlux.fem.quadratic.error import read_with_error
 from tetlux.fem.quadratic.measurement import Measurement
+from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
@@ -136,13 +137,16 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
         If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
         radius; or if the surface is not flat enough for the disc, or ends under it.
     """
-    placed = place_detector(detector, solution)
-    error = model = None
+    return read_all([detector], solution)[0]
+
+
+def _read(placed: "PlacedDetector", solution: ExitanceField, error: float | None = None) -> Reading:
+    model = None
     if isinstance(solution, Solution) and is_quadratic(solution):
         found = estimate_reading(solution, placed.measurement)
         exitance, error = found.value, found.relative
     else:
-        exitance = float(placed.measurement.weights @ solution.exitance_on(placed.measurement.points))
+        exitance = (placed.measurement.weights @ solution.exitance_on(placed.measurement.points)).item()
     if isinstance(solution, Solution) and solution.validity is not None:
         model = float(placed.measurement.weights @ (1.0 - solution.valid_on(placed.measurement.points)))
     power = None if placed.area is None else placed.share * exitance * placed.area
@@ -162,23 +166,31 @@ def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingErr
     quadratic = solution.quadratic
     assert quadratic is not None
     found = read_with_error(quadratic, measurement)
-    if not quadratic.has_thin_layers(measurement):
+    if not quadratic.thin_layers.any():
+        return found
+    cells = quadratic.operator.discretise(measurement).cells
+    if not quadratic.thin_layers[cells].any():
         return found
     if len(solution.of_lights) > 1:
         parts = [estimate_reading(part, measurement) for part in solution.of_lights]
         return ReadingError.add(parts)
     value = float(measurement.weights @ solution.exitance_on(measurement.points))
     squares = np.zeros(len(found.squares))
-    squares[quadratic.operator.discretise(measurement).cells[0]] = (value - found.value) ** 2
+    squares[cells[0]] = (value - found.value) ** 2
     return ReadingError(value, squares, 0.0, 0.0)
 
 
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors; this is faster than reading one after another."""
-    if isinstance(solution, Solution) and is_quadratic(solution):
-        assert solution.quadratic is not None
-        solution.quadratic.operator.duals([place_detector(detector, solution).measurement for detector in detectors])
-    return tuple(read(detector, solution) for detector in detectors)
+    placed = [place_detector(detector, solution) for detector in detectors]
+    if isinstance(solution, FieldWithErrors) and placed:
+        errors = solution.errors_on(np.array([each.position for each in placed])).tolist()
+        return tuple(_read(each, solution, error) for each, error in zip(placed, errors, strict=True))
+    if not (isinstance(solution, Solution) and is_quadratic(solution)):
+        return tuple(_read(each, solution) for each in placed)
+    assert solution.quadratic is not None
+    parts, rest = solution.quadratic.prepare([each.measurement for each in placed]), iter(placed)
+    return tuple(_read(next(rest), solution) for some in parts for _ in some)
 
 
 @dataclass(frozen=True, eq=False)

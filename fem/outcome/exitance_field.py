@@ -1,7 +1,7 @@
 """Exitance as a field over a surface, however it was found: what detectors, radiance and charts need of a solution."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -36,6 +36,20 @@ class ResolvedField(ExitanceField, Protocol):
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
         """Points of the surface (n, 3), and how much space the exitance needs to change there, (n,), unit."""
+        ...
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated relative L2 error of the exitance; nan if it is unknown."""
+        ...
+
+
+@runtime_checkable
+class FieldWithErrors(Protocol):
+    """An exitance that knows its own errors at single points without a mesh."""
+
+    def errors_on(self, queries: FloatArray) -> FloatArray:
+        """Estimated relative errors (q,) of the exitance at points (q, 3) that lie on the surface."""
         ...
 
 

@@ -10,12 +10,12 @@ from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.surface.surface import Surface
 
 
 def solution_of_light(
-    load: Load, fluence: FloatArray, subtractions: Sequence[Subtraction], surface: Surface, *, limit: bool
+    load: Load, fluence: NumberArray, subtractions: Sequence[Subtraction], surface: Surface, *, limit: bool
 ) -> Solution:
     """The solution of one light.
 
@@ -23,7 +23,7 @@ def solution_of_light(
     ----------
     load : Load
         Of the light.
-    fluence : (n,) ndarray
+    fluence : (n,) ndarray, real or complex
         The solution of its linear systems, W/unit².
     subtractions : sequence of Subtraction
         The charges of this light that are subtracted.
@@ -38,19 +38,20 @@ def solution_of_light(
     """
     known, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
     mesh, limited_power = operator.mesh, 0.0
-    dips = load.has_first_moment or any(each.patch.charges.dips for each in subtractions)
-    if limit and operator.model.nonnegative and not dips:
+    may_be_negative = load.has_first_moment or any(each.patch.charges.has_negative_source for each in subtractions)
+    if limit and operator.model.nonnegative and not may_be_negative:
         fluence, limited_power = limit_to_nonnegative(fluence, mesh.edges, operator.loss_weights)
     outside = mesh.boundary_node_areas * terms.irradiance
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
     emitted = float((mesh.volumes * terms.emission).sum())
-    absorbed = float((operator.absorption_weights * fluence).sum())
+    absorbed = (operator.absorption_weights * fluence).sum().item()
     ledger = Power(
         incident=known.incident + float(outside.sum()) + emitted,
         specular=known.specular + float((outside - transmitted).sum()),
         absorbed=known.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
         exited=0.0,
         ballistic=known.ballistic,
+        stored=operator.model.shift * (mesh.node_volumes @ fluence).item(),
     )
     solution = Solution(
         mesh,
@@ -62,7 +63,7 @@ def solution_of_light(
         terms.transmitted_irradiance,
         limited_power=limited_power,
     )
-    exited = float(mesh.boundary_node_areas @ solution.exitance) + sum(each.terms.exited for each in subtractions)
+    exited = (mesh.boundary_node_areas @ solution.exitance).item() + sum(each.terms.exited for each in subtractions)
     return replace(solution, power=replace(ledger, exited=exited))
 
 

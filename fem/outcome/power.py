@@ -2,33 +2,41 @@
 
 from dataclasses import dataclass
 
+from tetlux.meshing.arrays import Number
+
 
 @dataclass(frozen=True)
 class Power:
-    """The ledger of a run: ``incident = specular + absorbed + exited + ballistic``, all in W.
+    """The ledger of a run: ``incident = specular + absorbed + exited + ballistic + stored``, all in W.
+
+    Real for steady light. For light modulated at one frequency these are complex amplitudes.
 
     Attributes
     ----------
-    incident : float
+    incident : float or complex
         Power that meets the body, or that sources inside it emit.
-    specular : float
+    specular : float or complex
         Reflected at the surface at once.
-    absorbed : float
+    absorbed : float or complex
         Turned to heat inside.
-    exited : float
+    exited : float or complex
         Left through the surface after having been scattered: the integral of the exitance.
-    ballistic : float
+    ballistic : float or complex
         Passed through without having been scattered.
+    stored : float or complex
+        Taken by the shift of the model, ``shift ∫ phi`` (see `tetlux.fem.models.model.Model`): 0 for steady light;
+        for modulated light the amplitude of the rate at which the energy of the light in the body grows.
     """
 
-    incident: float
-    specular: float
-    absorbed: float
-    exited: float
-    ballistic: float
+    incident: Number
+    specular: Number
+    absorbed: Number
+    exited: Number
+    ballistic: Number
+    stored: Number = 0.0
 
     @property
-    def balance_error(self) -> float:
+    def balance_error(self) -> Number:
         """What the ledger lacks, as a share of the incident power."""
-        out = self.specular + self.absorbed + self.exited + self.ballistic
+        out = self.specular + self.absorbed + self.exited + self.ballistic + self.stored
         return (self.incident - out) / self.incident

@@ -13,6 +13,7 @@ from tetlux.fem.media.fresnel import reflectance
 from tetlux.fem.outcome.exitance_field import ExitanceField
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface.surface import Surface
 
 
 def radiance(solution: ExitanceField, points: npt.ArrayLike, viewer: npt.ArrayLike) -> FloatArray:
@@ -43,12 +44,36 @@ def radiance(solution: ExitanceField, points: npt.ArrayLike, viewer: npt.ArrayLi
         raise InputError("points must be finite coordinates (n, 3).")
     if eye.shape not in ((3,), wanted.shape) or not np.isfinite(eye).all():
         raise InputError("viewer must be three finite coordinates, or three for each point.")
-    places, normals = solution.surface.project(wanted)
-    towards = eye - places
+    places, cosine = view_cosine(solution.surface, wanted, eye)
+    return radiance_of(solution.exitance_on(places), cosine, solution.medium.eta)
+
+
+def view_cosine(surface: Surface, points: FloatArray, viewer: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Cosine between the surface's normal and the direction to a viewer.
+
+    Parameters
+    ----------
+    surface : Surface
+    points : (n, 3) ndarray
+    viewer : (3,) or (n, 3) ndarray
+
+    Returns
+    -------
+    places : (n, 3) ndarray
+        The points of the surface nearest to `points`.
+    cosine : (n,) ndarray
+        There; 0 at the viewer itself.
+    """
+    places, normals = surface.project(points)
+    towards = viewer - places
     distance = np.linalg.norm(towards, axis=1)
-    cosine = np.einsum("ij,ij->i", towards, normals) / np.where(distance > 0, distance, 1.0)
-    seen = (1.0 - reflectance(cosine, 1.0 / solution.medium.eta)) * (cosine > 0)
-    return np.asarray(seen * solution.exitance_on(places) / np.pi)
+    return places, np.einsum("ij,ij->i", towards, normals) / np.where(distance > 0, distance, 1.0)
+
+
+def radiance_of(exitance: FloatArray, cosine: FloatArray, eta: float) -> FloatArray:
+    """Radiance (n,), W/(unit² sr), of an exitance (n,) in directions of the given cosines (n,); 0 where negative."""
+    seen = (1.0 - reflectance(cosine, 1.0 / eta)) * (cosine > 0)
+    return np.asarray(seen * exitance / np.pi)
 
 
 def collected_share(eta: float, numerical_aperture: float) -> float:

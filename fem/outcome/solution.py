@@ -62,6 +62,13 @@ class Solution:
         What the detectors read that were given to `tetlux.fem.solve`, in their order.
     quadratic : QuadraticSolution, optional
         The same in quadratic elements, which detectors are read by: see `tetlux.fem.quadratic`.
+    is_quadratic : bool
+        Whether exitance and fluence are those of quadratic elements too, as under a tolerance of either everywhere:
+        see `tetlux.fem.outcome.fields`. The power is always that of linear elements.
+    everywhere_error, volume_error : float
+        Relative errors that the exitance is within at some 95 % of the surface, and the fluence inside, in each range
+        of brightness down to a millionth of the largest: see `tetlux.fem.quadratic.field_error`. nan where there is no
+        tolerance of these.
     """
 
     mesh: TetMesh
@@ -81,6 +88,9 @@ class Solution:
     iterations: int = 0
     readings: tuple[Reading, ...] = ()
     quadratic: QuadraticSolution | None = None
+    is_quadratic: bool = False
+    everywhere_error: float = np.nan
+    volume_error: float = np.nan
 
     @cached_property
     def exitance(self) -> NumberArray:
@@ -123,7 +133,11 @@ class Solution:
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        return self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        linear = self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        if not self.is_quadratic:
+            return linear
+        assert self.quadratic is not None
+        return self.quadratic.exitance_on(queries, linear)
 
     @property
     def resolution(self) -> tuple[FloatArray, FloatArray]:
@@ -132,7 +146,7 @@ class Solution:
         Middles of boundary facets and their longest sides, and where charges were fitted, how far these are apart.
         """
         facets = self.mesh.points[self.mesh.boundary_faces]
-        fitted = [patch.violation.points for patch in self.patches if isinstance(patch, FittedPatch)]
+        fitted = [patch.residual.points for patch in self.patches if isinstance(patch, FittedPatch)]
         places = np.vstack([facets.mean(axis=1), *(each.points for each in fitted)])
         return places, np.concatenate([longest_sides(facets), *(each.spacing for each in fitted)])
 
@@ -215,6 +229,10 @@ class Solution:
         weights[below] = np.maximum(weights[below], 0.0)
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
+        if self.is_quadratic:
+            assert self.quadratic is not None
+            inside = np.flatnonzero(cells >= 0)
+            fluence[inside] = self.quadratic.fluence_inside(queries[inside], fluence[inside])
         return fluence
 
     def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -241,11 +259,13 @@ class Solution:
         return found[0], found[1]
 
     def __repr__(self) -> str:
-        low, high = self.exitance.real.min(), self.exitance.real.max()
+        modulated = np.iscomplexobj(self.exitance)
+        exitance = np.abs(self.exitance) if modulated else self.exitance
+        exited = abs(self.power.exited) if modulated else self.power.exited
         facts = [
             count(len(self.mesh.points), "node"),
-            f"exitance {low:.3g} to {high:.3g} W/{self.mesh.unit}²",
-            f"{self.power.exited:.4g} of {self.power.incident:.4g} W exited",
+            f"exitance {exitance.min():.3g} to {exitance.max():.3g} W/{self.mesh.unit}²",
+            f"{exited:.4g} of {self.power.incident:.4g} W exited",
         ]
         if np.isfinite(self.error_estimate):
             facts.append(f"estimated error {self.error_estimate:.2%}")

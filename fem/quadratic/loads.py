@@ -18,6 +18,7 @@ from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.topology import FACES
 
@@ -27,13 +28,32 @@ BEAM_RULE = np.polynomial.legendre.leggauss(4)
 FACE_DEGREES = ((0.2, 4), (0.6, 6), (2.0, 10))
 
 
-def quadratic_load(space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms) -> FloatArray:
-    """Load of source terms, as they are on the mesh of a space, (size,)."""
-    mesh, load = space.mesh, np.zeros(space.size)
-    if len(terms.points) or len(terms.segments):
-        lines, points, powers = line_load(space, coefficients, terms.segments)
-        load += lines
-        points, powers = np.vstack([terms.points, points]), np.concatenate([terms.powers, powers])
+@dataclass(frozen=True, eq=False)
+class LineLoad:
+    """Load of attenuated beams.
+
+    Attributes
+    ----------
+    load : (size,) ndarray
+        W.
+    points, powers : (p, 3), (p,) ndarray
+        What stands for their parts outside the mesh, unit and W.
+    """
+
+    load: FloatArray
+    points: FloatArray
+    powers: FloatArray
+
+    __repr__ = one_line
+
+
+def quadratic_load(
+    space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms, lines: LineLoad
+) -> FloatArray:
+    """Load of source terms, as they are on the mesh of a space, and of their beams, (size,)."""
+    mesh, load = space.mesh, lines.load.copy()
+    points, powers = np.vstack([terms.points, lines.points]), np.concatenate([terms.powers, lines.powers])
+    if len(points):
         load += _point_load(space, points, powers)
     if np.any(terms.transmitted_irradiance):
         entering = np.zeros(len(mesh.points))
@@ -60,13 +80,8 @@ def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -
     return load
 
 
-def line_load(
-    space: QuadraticSpace, coefficients: Coefficients, segments: Segments
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Load of attenuated beams, (size,); points and powers of their parts outside the mesh.
-
-    The beams are integrated by Gauss points in every tetrahedron.
-    """
+def line_load(space: QuadraticSpace, coefficients: Coefficients, segments: Segments) -> LineLoad:
+    """Integrate attenuated beams by Gauss points in every tetrahedron."""
     mesh, load = space.mesh, np.zeros(space.size)
     points, powers = [np.zeros((0, 3))], [np.zeros(0)]
     for part in march(mesh, segments.starts, segments.directions, segments.lengths, segments.cells):
@@ -89,7 +104,7 @@ def line_load(
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
         points.append(segments.starts[paths] + middle[:, None] * segments.directions[paths])
         powers.append(lost[outside])
-    return load, np.concatenate(points), np.concatenate(powers)
+    return LineLoad(load, np.concatenate(points), np.concatenate(powers))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +139,10 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     space, coefficients = operator.space, coefficients_of(patch.charges.medium)
     mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
-        sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
-        return QuadraticPatch(patch, np.zeros(space.size), quadratic_load(space, coefficients, sources))
+        count = charges.sources
+        return QuadraticPatch(
+            patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count])
+        )
     interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
     cell, face, on_boundary = patch.outer

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, dots
 from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
@@ -22,13 +23,16 @@ from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Relative residual at which the iteration stops, for solutions and duals. A reading is corrected by the residual of the
-# solution times the dual, so that its relative error is about the square of this.
-STOP_RESIDUAL = 1e-7
+# Relative residuals at which the iteration stops. A reading is corrected by the residual of the solution times the
+# dual, so that its relative error is about the product of the two. Most columns are duals, which therefore are the
+# rougher ones.
+STOP_RESIDUAL, STOP_RESIDUAL_OF_DUALS = 1e-10, 1e-5
 # Number of right-hand sides that are iterated together.
 COLUMNS_PER_GROUP = 4
 # Number of right-hand sides for which the solver of the linear part is chosen.
 EXPECTED_RIGHT_HAND_SIDES = 10
+# Memory for dual solutions that are kept for measurements that come again; the oldest are dropped.
+BYTES_OF_KEPT_DUALS = 2**28
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +54,6 @@ class QuadraticOperator:
     inner: Sequence[Surface]
     coefficients: Coefficients
     _duals: dict[Measurement, FloatArray] = field(default_factory=dict)
-    _discretised: dict[Measurement, DiscreteMeasurement] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
@@ -92,11 +95,11 @@ class QuadraticOperator:
 
         return precondition
 
-    def solve(self, loads: FloatArray) -> FloatArray:
-        """Solutions (size, k) for loads (size, k), to relative residuals of about 1e-7."""
+    def solve(self, loads: FloatArray, stop_residual: float = STOP_RESIDUAL) -> FloatArray:
+        """Solutions (size, k) for loads (size, k), to about a relative residual."""
         product, precondition = self._product, self._precondition
-        # Loads are scaled so that the iteration stops at STOP_RESIDUAL.
-        size = np.sqrt(dots(loads, loads)) * STOP_RESIDUAL / krylov.STOP_RESIDUAL
+        # Loads are scaled so that the iteration stops at this residual.
+        size = np.sqrt(dots(loads, loads)) * stop_residual / krylov.STOP_RESIDUAL
         size[size == 0] = 1.0
         scaled = loads / size
         groups = [
@@ -107,17 +110,28 @@ class QuadraticOperator:
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
 
     def discretise(self, measurement: Measurement) -> DiscreteMeasurement:
-        """A measurement on the mesh; each is made once."""
-        if measurement not in self._discretised:
-            self._discretised[measurement] = measurement.discretise(self.space, self.coefficients)
-        return self._discretised[measurement]
+        """A measurement on the mesh."""
+        return measurement.discretise(self.space, self.coefficients)
+
+    @property
+    def robin(self) -> float:
+        """Ratio of exitance to fluence at the surface."""
+        return boundary_condition_of(self.coefficients.outer).robin
+
+    @property
+    def most_duals(self) -> int:
+        """Number of dual solutions that are kept."""
+        return max(BYTES_OF_KEPT_DUALS // (8 * self.space.size), COLUMNS_PER_GROUP)
 
     def duals(self, measurements: Sequence[Measurement]) -> list[FloatArray]:
-        """Dual solutions (size,) of measurements; each is solved for once."""
+        """Dual solutions (size,) of measurements; the last `most_duals` are kept."""
         new = [measurement for measurement in dict.fromkeys(measurements) if measurement not in self._duals]
         if new:
             loads = np.column_stack([self.discretise(measurement).load for measurement in new])
-            self._duals.update(zip(new, self.solve(loads).T.copy(), strict=True))
-        return [self._duals[measurement] for measurement in measurements]
+            self._duals.update(zip(new, self.solve(loads, STOP_RESIDUAL_OF_DUALS).T.copy(), strict=True))
+        found = [self._duals[measurement] for measurement in measurements]
+        for oldest in list(self._duals)[: max(len(self._duals) - self.most_duals, 0)]:
+            del self._duals[oldest]
+        return found
 
     __repr__ = one_line

@@ -1,20 +1,23 @@
 """`QuadraticSolution`: the fluence of lights in quadratic elements, and measurements of it."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from tetlux.fem.known.fitted_patch import FittedPatch
+from tetlux.fem.known.kept_patches import keep_or_choose
 from tetlux.fem.known.patch import Patch, patch_of
-from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
-from tetlux.fem.quadratic.loads import QuadraticPatch, line_load, quadratic_load, quadratic_patch
+from tetlux.fem.quadratic.loads import LineLoad, QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.describe import one_line
 
 # Charges are subtracted where their fluence is at most this many times the fluence itself.
@@ -23,6 +26,9 @@ LARGEST_BRIGHTNESS_RATIO = 4.0
 LEAST_RAYS_OF_BROAD_BEAM = 16
 # Layers with a larger k h are thin. Under diffuse light the error of quadratic elements is .1 % at 1.4 and 200 % at 9.
 LARGEST_RESOLVED_KH = 2.0
+
+
+Where = Literal["surface", "inside"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,20 +63,28 @@ class QuadraticScene:
     def loads(self) -> FloatArray:
         """The load of each light, (size, k), W."""
         space, coefficients = self.operator.space, self.operator.coefficients
-        loads = [quadratic_load(space, coefficients, deposit.terms) for deposit in self.deposits]
+        loads = [
+            quadratic_load(space, coefficients, deposit.terms, lines)
+            for deposit, lines in zip(self.deposits, self.lines, strict=True)
+        ]
         return np.column_stack(
             [load + sum(each.load for each in own) for load, own in zip(loads, self.patches, strict=True)]
         )
 
     @cached_property
+    def lines(self) -> list[LineLoad]:
+        """The load of the beams of each light."""
+        space, coefficients = self.operator.space, self.operator.coefficients
+        return [line_load(space, coefficients, deposit.terms.segments) for deposit in self.deposits]
+
+    @cached_property
     def broad_beams(self) -> FloatArray:
         """Load of the rays of broad beams on bubbles, for each light, (size, k), W."""
-        space, coefficients = self.operator.space, self.operator.coefficients
-        found = np.zeros((space.size, len(self.deposits)))
-        for light, deposit in enumerate(self.deposits):
+        found = np.zeros((self.operator.space.size, len(self.deposits)))
+        for light, (deposit, lines) in enumerate(zip(self.deposits, self.lines, strict=True)):
             if len(deposit.terms.segments) >= LEAST_RAYS_OF_BROAD_BEAM:
-                found[:, light], *_ = line_load(space, coefficients, deposit.terms.segments)
-        found[: len(space.mesh.points)] = 0.0
+                found[:, light] = lines.load
+        found[: len(self.operator.mesh.points)] = 0.0
         return found
 
     @cached_property
@@ -96,7 +110,10 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
     The residual of fitted charges is integrated over the bent facets. With the quadrature points of linear elements, a
     reading of a thousandth of the largest had an error of 4 %.
     """
-    return quadratic_patch(operator, patch if isinstance(patch, FittedPatch) else _widen(patch, fluence))
+    if isinstance(patch, FittedPatch):
+        return quadratic_patch(operator, patch)
+    wide = keep_or_choose(patch.mesh, patch.charges, patch.at_nodes, "quadratic", lambda: _widen(patch, fluence))
+    return quadratic_patch(operator, wide)
 
 
 def _widen(patch: Patch, fluence: FloatArray) -> Patch:
@@ -118,10 +135,16 @@ class QuadraticSolution:
     ----------
     scene : QuadraticScene
     lights : tuple of int
+    errors : dict
+        The readings that were made, and their errors.
+    bands : dict
+        The errors of bands of the surface and of the volume: see `tetlux.fem.quadratic.field_error`.
     """
 
     scene: QuadraticScene
     lights: tuple[int, ...]
+    errors: dict[Measurement, ReadingError] = field(default_factory=dict)
+    bands: dict[Where, list[ReadingError]] = field(default_factory=dict)
 
     @property
     def operator(self) -> QuadraticOperator:
@@ -133,22 +156,22 @@ class QuadraticSolution:
         """Fluence (size,), W/unit²."""
         return np.asarray(self.scene.fluence[:, self.lights].sum(axis=1))
 
-    def has_thin_layers(self, measurement: Measurement) -> bool:
-        """Whether distributed light decays within a tetrahedron there.
+    @cached_property
+    def thin_layers(self) -> BoolArray:
+        """Whether distributed light decays within each tetrahedron, (m,).
 
         Quadratic elements then overshoot, while linear ones are fitted to such layers: see
         `tetlux.fem.operators.fitting`.
         """
+        mesh, coefficients = self.operator.mesh, self.operator.coefficients
         if not any(
             self.scene.deposits[light].terms.is_distributed and not self.scene.linear_patches[light]
             for light in self.lights
         ):
-            return False
-        cells, coefficients = self.operator.discretise(measurement).cells, self.operator.coefficients
-        diffusion, sigma_a = (at_cells(each, cells) for each in (coefficients.diffusion, coefficients.sigma_a))
+            return np.zeros(len(mesh.tetrahedra), dtype=bool)
         # The edge of a regular tetrahedron of this volume.
-        edges = (6.0 * np.sqrt(2.0) * self.operator.mesh.volumes[cells]) ** (1.0 / 3.0)
-        return bool((np.sqrt(sigma_a / diffusion) * edges > LARGEST_RESOLVED_KH).any())
+        edges = (6.0 * np.sqrt(2.0) * mesh.volumes) ** (1.0 / 3.0)
+        return np.asarray(np.sqrt(coefficients.sigma_a / coefficients.diffusion) * edges > LARGEST_RESOLVED_KH)
 
     @property
     def patches(self) -> list[QuadraticPatch]:
@@ -165,7 +188,7 @@ class QuadraticSolution:
             difference[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
         return difference
 
-    @property
+    @cached_property
     def broad_beams(self) -> FloatArray:
         """Load of the rays of broad beams on bubbles, (size,), W."""
         return np.asarray(self.scene.broad_beams[:, self.lights].sum(axis=1))
@@ -176,14 +199,22 @@ class QuadraticSolution:
         load = self.scene.loads[:, self.lights].sum(axis=1)
         return np.asarray(load - self.operator.matrix @ self.fluence)
 
-    def read(self, measurement: Measurement) -> float:
-        """The value of a measurement: exitance, or fluence inside, W/unit²."""
-        discrete = self.operator.discretise(measurement)
-        dual = self.operator.duals([measurement])[0]
+    def prepare(self, measurements: Sequence[Measurement]) -> Iterator[Sequence[Measurement]]:
+        """Parts of measurements, as many as have their dual solutions kept; those of each part are found together."""
+        most = self.operator.most_duals
+        for start in range(0, len(measurements), most):
+            some = measurements[start : start + most]
+            self.operator.duals([measurement for measurement in some if measurement not in self.errors])
+            yield some
+
+    def values_at(self, discrete: DiscreteMeasurement) -> FloatArray:
+        """What is measured at the points of a measurement, (q,): exitance, or fluence inside, W/unit²."""
         values = discrete.scale * self.fluence_at(discrete)
-        if not measurement.inside:
-            values += self._unscattered(discrete)
-        return float(measurement.weights @ values + self.residual @ dual)
+        return values if discrete.measurement.inside else values + self._unscattered(discrete)
+
+    def read(self, discrete: DiscreteMeasurement, dual: FloatArray) -> float:
+        """The value of a measurement with its dual solution (size,), W/unit²."""
+        return float(discrete.measurement.weights @ self.values_at(discrete) + self.residual @ dual)
 
     def fluence_at(self, discrete: DiscreteMeasurement) -> FloatArray:
         """Fluence at the points of a measurement, (q,), W/unit²."""
@@ -196,15 +227,41 @@ class QuadraticSolution:
                 )
         return fluence
 
-    def _unscattered(self, discrete: DiscreteMeasurement) -> FloatArray:
-        """Exitance in addition to ``phi/(2A)`` under diffuse light, (q,), as in `Solution.exitance`."""
+    def exitance_on(self, points: FloatArray, linear: FloatArray) -> FloatArray:
+        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit².
+
+        Where there is hardly any light it may be below zero; there it is that of linear elements (q,), which is not.
+        """
+        values = self.values_at(self.operator.discretise(Measurement(points, np.zeros(len(points)))))
+        return np.where(values > 0, values, linear)
+
+    def fluence_inside(self, points: FloatArray, linear: FloatArray) -> FloatArray:
+        """Fluence at points (q, 3) of the body, (q,), W/unit²; likewise."""
+        values = self.values_at(self.operator.discretise(Measurement(points, np.zeros(len(points)), inside=True)))
+        return np.where(values > 0, values, linear)
+
+    @property
+    def linear_fluence(self) -> FloatArray:
+        """Fluence of linear elements at the nodes, (n,), W/unit²."""
+        return np.asarray(np.sum([self.scene.linear_fluences[light] for light in self.lights], axis=0))
+
+    @property
+    def exitance_at_nodes(self) -> FloatArray:
+        """Exitance at the boundary nodes, (b,), W/unit²."""
+        nodes = self.operator.mesh.boundary_nodes
+        return np.asarray(self.operator.robin * self.fluence[nodes] + self._unscattered_at_nodes[nodes])
+
+    @cached_property
+    def _unscattered_at_nodes(self) -> FloatArray:
+        """Exitance in addition to ``phi/(2A)`` under diffuse light at all nodes, (n,), as in `Solution.exitance`."""
         mesh = self.operator.mesh
+        found = np.zeros(len(mesh.points))
         given = sum(self.scene.deposits[light].terms.transmitted_irradiance for light in self.lights)
-        if not np.any(given):
-            return np.zeros(len(discrete.cells))
-        transmitted = np.zeros(len(mesh.points))
-        transmitted[mesh.boundary_nodes] = given
-        share = boundary_condition_of(self.operator.coefficients.outer).exitance_offset(1.0)
-        return np.asarray(share * (transmitted[discrete.dofs[:, :3]] * discrete.shape_values[:, :3]).sum(axis=1))
+        found[mesh.boundary_nodes] = boundary_condition_of(self.operator.coefficients.outer).exitance_offset(given)
+        return found
+
+    def _unscattered(self, discrete: DiscreteMeasurement) -> FloatArray:
+        at_corners = self._unscattered_at_nodes[discrete.dofs[:, :3]]
+        return np.asarray((at_corners * discrete.shape_values[:, :3]).sum(axis=1))
 
     __repr__ = one_line

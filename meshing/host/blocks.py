@@ -19,7 +19,10 @@ MOST_KEY_PARTS = 8
 _Item = TypeVar("_Item")
 _Result = TypeVar("_Result")
 
-THREADS = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+# Cores that this process may use, and threads that it does use: workers beside each other use one each.
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+THREADS_VARIABLE = "TETLUX_THREADS"
+THREADS = int(os.environ.get(THREADS_VARIABLE, CORES))
 
 
 def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.mesher.deviation import surface_deviation
+from tetlux.meshing.mesher.deviation import two_sided_distance
 from tetlux.meshing.mesher.shells import Shell
 from tetlux.meshing.repair.pinches import parts_of
 from tetlux.meshing.repair.topology import bodies, compact
@@ -22,7 +22,8 @@ class NotTheBodyError(RunError):
 
 def has_lost_part(mesh: TetMesh, shell: Shell) -> bool:
     """Whether the mesh is so far from the surface of a shell, at some place, that it must lack a part."""
-    return surface_deviation(part_of(mesh, shell), shell.surface, PART_SAMPLES) > LOST_PART * shell.deviation
+    part = part_of(mesh, shell)
+    return two_sided_distance(part.surface, shell.surface, PART_SAMPLES) > LOST_PART * shell.deviation
 
 
 def part_of(mesh: TetMesh, shell: Shell) -> TetMesh:

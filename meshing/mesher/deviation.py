@@ -1,5 +1,7 @@
 """Sampled distances between two surfaces, and between a mesh's boundary and a surface."""
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, spread_indices
@@ -24,9 +26,16 @@ def two_sided_distance(first: Surface, second: Surface, samples: int = DISTANCE_
     return max(_farthest(first, second, samples), _farthest(second, first, samples))
 
 
-def surface_deviation(mesh: TetMesh, surface: Surface, samples: int = DISTANCE_SAMPLES) -> float:
-    """Two-sided distance between a mesh's boundary and a surface, unit."""
-    return two_sided_distance(mesh.surface, surface, samples)
+# Many runs may be solved on one mesh.
+_DEVIATIONS: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Surface, float]] = WeakKeyDictionary()
+
+
+def surface_deviation(mesh: TetMesh, surface: Surface) -> float:
+    """Two-sided distance between a mesh's boundary and a surface, unit; it is computed once."""
+    of_mesh = _DEVIATIONS.setdefault(mesh, WeakKeyDictionary())
+    if surface not in of_mesh:
+        of_mesh[surface] = two_sided_distance(mesh.surface, surface)
+    return of_mesh[surface]
 
 
 def _farthest(source: Surface, target: Surface, samples: int) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.repair.merge import without_collapsed
+from tetlux.meshing.repair.merge import drop_collapsed
 from tetlux.meshing.repair.topology import Edges
 
 # Of longer rims one in k vertices is triangulated first, since time grows with the cube (.3 s at this length).
@@ -51,7 +51,7 @@ def cap(points: FloatArray, loop: IntArray, first: int) -> tuple[FloatArray, Int
     faces = triangulate_polygon(points[loop])[:, ::-1]
     # A loop through several rims contains the ends of its bridge twice. Merged, the bridge is an inner edge.
     names, place = np.unique(loop, return_inverse=True)
-    faces, rim = without_collapsed(place.reshape(-1)[faces])[0], points[names]
+    faces, rim = drop_collapsed(place.reshape(-1)[faces])[0], points[names]
     inner, faces = _refine(rim, _spacing(points, loop, names), faces) if len(loop) > 4 else (rim[:0], faces)
     inner = _relax(rim, inner, faces)
     return inner, np.concatenate([names, first + np.arange(len(inner))])[faces]

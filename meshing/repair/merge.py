@@ -19,13 +19,13 @@ def merge_vertices(points: FloatArray, faces: IntArray, repairs: list[str]) -> t
         if len(points) != 3 * len(faces):
             repairs.append(f"merged {len(points) - len(first)} vertices that coincide with another.")
         points, faces = points[first], kind[faces]
-    faces, collapsed = without_collapsed(faces)
+    faces, collapsed = drop_collapsed(faces)
     if collapsed:
         repairs.append(f"removed {collapsed} triangles without area.")
     return compact(points, faces)
 
 
-def without_collapsed(faces: IntArray) -> tuple[IntArray, int]:
+def drop_collapsed(faces: IntArray) -> tuple[IntArray, int]:
     """The triangles with three different corners, and the number of others."""
     distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return faces[distinct], int((~distinct).sum())

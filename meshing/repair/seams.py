@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.repair.merge import near_pairs, without_collapsed
+from tetlux.meshing.repair.merge import drop_collapsed, near_pairs
 from tetlux.meshing.repair.topology import Edges, compact, components
 from tetlux.meshing.search.proximity import overlapping_boxes
 
@@ -41,7 +41,7 @@ def stitch(points: FloatArray, faces: IntArray, repairs: list[str]) -> tuple[Flo
     stitched, inserted, joined = faces, 0, 0
     for _ in range(ROUNDS):
         same = _merge_rims(points, Edges(stitched), tolerance)
-        stitched = _without_slivers(points, without_collapsed(same[stitched])[0], SLIVER / ON_EDGE * tolerance)
+        stitched = _without_slivers(points, drop_collapsed(same[stitched])[0], SLIVER / ON_EDGE * tolerance)
         stitched, added = _with_vertices_on_edges(points, stitched, tolerance)
         merged = int((same != np.arange(len(points))).sum())
         inserted, joined = inserted + added, joined + merged

@@ -8,7 +8,8 @@ import numpy as np
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.repair.orient import flips_of
 from tetlux.meshing.repair.topology import Edges, compact, components, distinct_rows
-from tetlux.meshing.search.proximity import ClosestPoint, winding_number
+from tetlux.meshing.search.closest import ClosestPoint
+from tetlux.meshing.search.proximity import winding_number
 from tetlux.meshing.surface.triangles import signed_volume, triangle_areas
 
 # A sheet is the other side of a finer one if its vertices lie within the first share of the diagonal of it (text of six
@@ -42,7 +43,7 @@ def drop_second_sides(points: FloatArray, faces: IntArray, repairs: list[str]) -
     count = int(sheet.max(initial=0)) + 1
     if not 2 <= count <= MOST_SHEETS:
         return points, faces
-    copied = _copied(faces)
+    copied = _find_copies(faces)
     parts = [np.flatnonzero(sheet == i) for i in range(count)]
     # Of sheets of equally many triangles the later one is dropped.
     parts.sort(key=lambda part: (len(part), -part[0]))
@@ -68,7 +69,7 @@ def drop_second_sides(points: FloatArray, faces: IntArray, repairs: list[str]) -
     return compact(points, faces[~dropped])
 
 
-def _copied(faces: IntArray) -> BoolArray:
+def _find_copies(faces: IntArray) -> BoolArray:
     """Whether each triangle is given more than once, in either orientation."""
     _, kind = distinct_rows(np.sort(faces, axis=1))
     return np.asarray(np.bincount(kind)[kind] > 1)

@@ -4,19 +4,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.corners import dot, face_normals, run_on_corners
+from tetlux.meshing.search.box_tree import BoxTree
 
 # A path whose barycentric coordinates are above minus this lies inside the tetrahedron.
 SLACK = 1e-9
 # The same for single points: rounding in thin tetrahedra is of this size.
 POINT_SLACK = 1e-6
-# Children per box of the tree, and pairs of a path and a box that are processed at once (some megabytes).
-CHILDREN = 8
-PAIRS_AT_ONCE = 1 << 13
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,24 +64,9 @@ class CellTree:
             low[:, block], high[:, block] = corners.min(axis=0), corners.max(axis=0)
 
         run_on_corners(fill, points, tetrahedra)
-        # The leaf order of a k-d tree keeps neighbours together, also in graded meshes.
-        leaves = cKDTree((0.5 * (low + high)).T, balanced_tree=False, compact_nodes=False)
-        self._order = np.asarray(leaves.indices, dtype=np.int64)
         # Covers rounding of box centres and of intersections.
         margin = 16.0 * np.finfo(float).eps * np.abs(points).max()
-        low, high = (low - margin).take(self._order, axis=1), (high + margin).take(self._order, axis=1)
-        # From tetrahedra up to the root: centres and half sides (boxes, 6, CHILDREN) of each box's children.
-        self._levels: list[FloatArray] = []
-        while not self._levels or len(self._levels[-1]) > 1:
-            # Padded with empty boxes.
-            padding = ((0, 0), (0, -low.shape[1] % CHILDREN))
-            low = np.pad(low, padding, constant_values=1e100).reshape(3, -1, CHILDREN)
-            high = np.pad(high, padding, constant_values=-1e100).reshape(3, -1, CHILDREN)
-            boxes = np.concatenate([0.5 * (low + high), 0.5 * (high - low)])
-            self._levels.append(np.ascontiguousarray(boxes.swapaxes(0, 1)))
-            # NumPy is slow along short axes, so loop over them.
-            low = np.minimum.reduce([low[:, :, part] for part in range(CHILDREN)])
-            high = np.maximum.reduce([high[:, :, part] for part in range(CHILDREN)])
+        self._boxes = BoxTree(low - margin, high + margin)
 
     def cut(self, starts: FloatArray, directions: FloatArray, lengths: FloatArray) -> Iterator[PathSegments]:
         """Cut paths into segments, one per tetrahedron.
@@ -160,26 +142,17 @@ class CellTree:
         """Slices of paths, with the pairs (paths, cells) whose boxes intersect, in ascending order of paths."""
         # A path perpendicular to an axis is inside a box's interval on that axis everywhere or nowhere.
         per_length = 1.0 / np.where(np.abs(directions) < 1e-20, 1e-20, directions)
-        everything = np.arange(len(starts))
-        todo = [(0, len(starts), len(self._levels) - 1, everything, np.zeros_like(everything))]
-        while todo:
-            first, last, level, paths, boxes = todo.pop()
-            if len(paths) > PAIRS_AT_ONCE and last - first > 1:
-                middle = (first + last) // 2
-                half = int(np.searchsorted(paths, middle))
-                todo.append((middle, last, level, paths[half:], boxes[half:]))
-                todo.append((first, middle, level, paths[:half], boxes[:half]))
-            elif level < 0:
-                yield slice(first, last), paths, self._order[boxes]
-            else:
-                parts, start, inverse = self._levels[level][boxes], starts[paths], per_length[paths]
-                enter, leave = np.zeros((len(paths), 1)), lengths[paths, None]
-                for axis in range(3):
-                    centre = (parts[:, axis] - start[:, axis, None]) * inverse[:, axis, None]
-                    reach = parts[:, 3 + axis] * np.abs(inverse[:, axis, None])
-                    enter, leave = np.maximum(enter, centre - reach), np.minimum(leave, centre + reach)
-                pair, part = np.nonzero(enter <= leave)
-                todo.append((first, last, level - 1, paths[pair], boxes[pair] * CHILDREN + part))
+
+        def meets(paths: IntArray, boxes: FloatArray) -> BoolArray:
+            start, inverse = starts[paths], per_length[paths]
+            enter, leave = np.zeros((len(paths), 1)), lengths[paths, None]
+            for axis in range(3):
+                centre = (boxes[:, axis] - start[:, axis, None]) * inverse[:, axis, None]
+                reach = boxes[:, 3 + axis] * np.abs(inverse[:, axis, None])
+                enter, leave = np.maximum(enter, centre - reach), np.minimum(leave, centre + reach)
+            return np.asarray(enter <= leave)
+
+        return self._boxes.pairs(len(starts), meets)
 
     def _lines(self, cells: IntArray, starts: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Barycentric coordinates at the start of lines, and their derivatives along the lines.

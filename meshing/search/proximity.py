@@ -1,92 +1,15 @@
-"""Closest points, overlapping boxes, winding numbers and line intersections of triangles."""
+"""Overlapping boxes, winding numbers and line intersections of triangles."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 
 # A line whose angle to a triangle's plane has a sine below this is parallel to it.
 PARALLEL = 1e-9
 # Pairs of boxes processed at once (tens of megabytes).
 BOX_PAIRS_AT_ONCE = 1 << 18
-
-
-class ClosestPoint:
-    """Closest points of a set of triangles, by VTK's static cell locator (about 10 µs per query).
-
-    Parameters
-    ----------
-    points : (n, 3) ndarray
-    faces : (m, 3) ndarray
-    """
-
-    def __init__(self, points: FloatArray, faces: IntArray) -> None:
-        self._triangles = points, faces
-        self._locator = cell_locator(points, faces)
-
-    def __reduce__(self) -> tuple[type["ClosestPoint"], tuple[FloatArray, IntArray]]:
-        """VTK's locator cannot be pickled; it is built anew."""
-        return ClosestPoint, self._triangles
-
-    def __call__(self, queries: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Closest points (q, 3) of the triangles to queries (q, 3), and the triangle of each, (q,)."""
-        from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
-
-        nearest = np.empty((len(queries), 3))
-        faces = np.empty(len(queries), dtype=np.int64)
-        point = [0.0, 0.0, 0.0]
-        face: Any = reference(0)
-        sub: Any = reference(0)
-        distance2: Any = reference(0.0)
-        for i, query in enumerate(np.asarray(queries, dtype=float).tolist()):
-            self._locator.FindClosestPoint(query, point, face, sub, distance2)
-            nearest[i] = point
-            faces[i] = int(face)
-        return nearest, faces
-
-    def within(self, queries: FloatArray, distance: float) -> BoolArray:
-        """Whether each query (q, 3) is within a distance of the triangles; fast for short distances."""
-        from vtkmodules.vtkCommonCore import reference  # noqa: PLC0415
-        from vtkmodules.vtkCommonDataModel import vtkGenericCell  # noqa: PLC0415
-
-        point, cell = [0.0, 0.0, 0.0], vtkGenericCell()
-        face: Any = reference(0)
-        sub: Any = reference(0)
-        distance2: Any = reference(0.0)
-        find = self._locator.FindClosestPointWithinRadius
-        return np.array(
-            [find(query, distance, point, cell, face, sub, distance2) > 0 for query in queries.tolist()], dtype=bool
-        )
-
-
-def cell_locator(points: FloatArray, faces: IntArray, per_bucket: int = 10) -> Any:
-    """VTK's static cell locator of triangles ``points[faces]``, with about `per_bucket` in each bucket."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray  # noqa: PLC0415
-    from vtkmodules.vtkCommonCore import vtkPoints  # noqa: PLC0415
-    from vtkmodules.vtkCommonDataModel import (  # noqa: PLC0415
-        vtkCellArray,
-        vtkPolyData,
-        vtkStaticCellLocator,
-    )
-
-    vertices = vtkPoints()
-    vertices.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    cells = vtkCellArray()
-    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
-    cells.SetData(
-        numpy_to_vtkIdTypeArray(offsets, deep=True),
-        numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
-    )
-    data = vtkPolyData()
-    data.SetPoints(vertices)
-    data.SetPolys(cells)
-    locator = vtkStaticCellLocator()
-    locator.SetDataSet(data)
-    locator.SetNumberOfCellsPerNode(per_bucket)
-    locator.BuildLocator()
-    return locator
 
 
 def overlapping_boxes(low: FloatArray, high: FloatArray) -> Iterator[tuple[IntArray, IntArray]]:

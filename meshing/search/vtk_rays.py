@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
-from tetlux.meshing.search.proximity import cell_locator
 
 # A ray within this distance of a triangle hits it. With 0, one in fifty rays aimed at an edge or a vertex of a sphere
 # passes between its triangles.
@@ -29,7 +28,7 @@ class RayLocator:
 
     def __init__(self, corners: FloatArray) -> None:
         triangles = np.arange(3 * len(corners)).reshape(-1, 3)
-        self._locator = cell_locator(corners.reshape(-1, 3), triangles, PER_BUCKET)
+        self._locator = _cell_locator(corners.reshape(-1, 3), triangles, PER_BUCKET)
 
     def __call__(self, starts: FloatArray, directions: FloatArray) -> tuple[IntArray, FloatArray]:
         """The first triangle that each ray (q, 3) hits, -1 for none, and the distance."""
@@ -48,3 +47,31 @@ class RayLocator:
             if intersect(start, end, HIT_TOLERANCE, parameter, point, weights, sub, face):
                 faces[ray], distances[ray] = int(face), RAY_LENGTH * float(parameter)
         return faces, distances
+
+
+def _cell_locator(points: FloatArray, faces: IntArray, per_bucket: int) -> Any:
+    """VTK's static cell locator of triangles ``points[faces]``, with about `per_bucket` in each bucket."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray  # noqa: PLC0415
+    from vtkmodules.vtkCommonCore import vtkPoints  # noqa: PLC0415
+    from vtkmodules.vtkCommonDataModel import (  # noqa: PLC0415
+        vtkCellArray,
+        vtkPolyData,
+        vtkStaticCellLocator,
+    )
+
+    vertices = vtkPoints()
+    vertices.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
+    cells = vtkCellArray()
+    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=np.int64)
+    cells.SetData(
+        numpy_to_vtkIdTypeArray(offsets, deep=True),
+        numpy_to_vtkIdTypeArray(np.ascontiguousarray(faces, dtype=np.int64).ravel(), deep=True),
+    )
+    data = vtkPolyData()
+    data.SetPoints(vertices)
+    data.SetPolys(cells)
+    locator = vtkStaticCellLocator()
+    locator.SetDataSet(data)
+    locator.SetNumberOfCellsPerNode(per_bucket)
+    locator.BuildLocator()
+    return locator

@@ -37,8 +37,11 @@ class CurvedPatches:
         # The tolerance makes all edges of a regular twelve-sided prism (30 degrees) equal despite rounding.
         self._least_cosine = np.cos(np.radians(crease_angle)) + 1e-6
 
-    def __call__(self, faces: IntArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Points (q, 3) and unit normals (q, 3) at barycentric weights (q, 3) of faces (q,)."""
+    def __call__(self, faces: IntArray, weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points (q, 3), unit normals (q, 3) and areas (q,) at barycentric weights (q, 3) of faces (q,).
+
+        The area is that of the patch if its metric were the same throughout.
+        """
         distinct, index = np.unique(faces, return_inverse=True)
         corners, along, middle = (part[index] for part in self._control_points(distinct))
         w = weights[:, :, None]
@@ -56,7 +59,7 @@ class CurvedPatches:
         flat = self._normals[faces]
         # Where a patch folds over its triangle, use the triangle's normal.
         folded = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
-        return position, np.where(folded, flat, normal / np.where(length > 0, length, 1.0))
+        return position, np.where(folded, flat, normal / np.where(length > 0, length, 1.0)), 0.5 * length[:, 0]
 
     def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Control points of faces (f,): corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""

@@ -7,9 +7,11 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import count, size
-from tetlux.meshing.search.proximity import ClosestPoint, cross_segments, winding_number
+from tetlux.meshing.search.closest import ClosestPoint
+from tetlux.meshing.search.proximity import cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.curved import CurvedPatches
+from tetlux.meshing.surface.groups import TriangleGroups, cut_long_triangles, group_triangles
 from tetlux.meshing.surface.solids import Shape, lies_on
 from tetlux.meshing.surface.triangles import barycentric_on_triangles, signed_volume, triangle_areas
 
@@ -152,7 +154,26 @@ class Surface:
         """
         if self.crease_angle <= 0 or len(faces) == 0:
             return points, self.normals[faces]
-        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))
+        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))[:2]
+
+    @cached_property
+    def groups(self) -> TriangleGroups:
+        """Groups of neighbouring triangles."""
+        faces, corners = cut_long_triangles(self.points[self.faces])
+        sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return group_triangles(faces, corners, 0.5 * np.linalg.norm(sides, axis=1) * self._stretch[faces])
+
+    @cached_property
+    def _stretch(self) -> FloatArray:
+        """The area of the smooth surface over each triangle, divided by that of the triangle, (m,)."""
+        if self.crease_angle <= 0:
+            return np.ones(len(self.faces))
+        flat = triangle_areas(self.points, self.faces)[1]
+        # The middles of the sides integrate quadratics exactly.
+        middles = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
+        every = np.arange(len(self.faces))
+        curved = sum(self._patches(every, np.tile(middle, (len(every), 1)))[2] for middle in middles) / 3.0
+        return np.divide(curved, flat, out=np.ones(len(flat)), where=flat > 0)
 
     @cached_property
     def bulge(self) -> float:
@@ -186,6 +207,10 @@ class Surface:
         """
         nearest, faces = self.closest(queries)
         return self.on_curve(faces, nearest)
+
+    def distances(self, queries: FloatArray) -> FloatArray:
+        """Distances of query points (q, 3) from their projections on the smooth surface, (q,), unit."""
+        return np.asarray(np.linalg.norm(self.project(queries)[0] - queries, axis=1))
 
     def contains(self, queries: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
         """Whether each query point (q, 3) lies inside, (q,), by the winding number."""

@@ -273,7 +273,7 @@ class TetMesh:
             cells[outside] = self.boundary_cells[self.closest_boundary(queries[outside])[1]]
         return np.asarray(self.regions[cells])
 
-    def named(self, labels: Iterable[int]) -> str:
+    def label_text(self, labels: Iterable[int]) -> str:
         """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
         texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
         shown = (

@@ -6,7 +6,7 @@ Without arguments: a pencil beam as a point on each body, with 100, 300 and 800 
 
 `--fitted` prints what finite elements do with fitted charges subtracted, beside the half-space: on a mesh that is
 cached, as seconds are only those of this process; the truth is that of fitted charges on a mesh of 25,000 nodes and
-more, whose estimate is printed. `--head` is a head of four layers against its series.
+more, whose estimate is printed.
 
 Seconds are of the processor, of all threads, the least of three runs, from a surface whose trees are built. The truth
 is the series for balls, and elsewhere the same method with as many charges as `--truth` says, whose own bound is
@@ -21,18 +21,16 @@ from pathlib import Path
 
 import numpy as np
 
-from tetlux.fem import Medium, PencilBeam, PointSource, Power, solve
+from tetlux.fem import Medium, PencilBeam, PointSource, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of
-from tetlux.fem.charges.places import distance_from
-from tetlux.fem.charges.places import scaled as scaled_spacing
+from tetlux.fem.charges.placement import distance_from
+from tetlux.fem.charges.placement import scaled as scaled_spacing
 from tetlux.fem.charges.samples import cells_of, draw
-from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.known.split import Subtract
-from tetlux.fem.meshless.solution import LightLedger, charge_solution
 from tetlux.meshing import Surface, box, cylinder, read_surface, refine, slab, sphere, tetrahedralize, torus
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.repair.pipeline import surface_from_arrays
@@ -164,7 +162,7 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
         started = time.process_time()
         fitted = scene.fit(charges)
         seconds.append(time.process_time() - started)
-    samples, errors = fitted.places.checked, fitted.errors
+    samples, errors = fitted.placement.checked, fitted.errors
     exitance = fitted.field.exitance(samples.points)[:, 0]
     right, bound = scene.truth_at(samples.points, truth)
     size = norm(samples.areas, right)
@@ -175,7 +173,7 @@ def row(scene: Scene, charges: int, truth: int, repeats: int) -> tuple[str, floa
     median = float(np.median(off[faint] / right[faint])) if faint.any() else 0.0
     columns = [
         scene.name,
-        str(len(fitted.places.charges)),
+        str(len(fitted.placement.charges)),
         f"{min(seconds):.2f}",
         f"{error:.4%}",
         f"{errors.estimate:.4%}",
@@ -195,7 +193,7 @@ def fitted_rows(scene: Scene) -> Iterator[str]:
     light, mesh = PointSource(tuple(scene.source[0].tolist())), tetrahedralize(scene.surface)
     distance = distance_from(scene.surface, scene.source)
     spacing = scaled_spacing(distance, 0.2)
-    samples = draw(scene.surface, cells_of(scene.surface, spacing).cut(spacing), np.random.default_rng(3))
+    samples = draw(cells_of(scene.surface, spacing), np.random.default_rng(3))
     if scene.radius is None:
         while len(mesh.points) < FINE:
             mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), scene.surface)
@@ -222,35 +220,6 @@ def fitted_rows(scene: Scene) -> Iterator[str]:
         )
 
 
-def head_rows() -> Iterator[str]:
-    """Lines of the table of a head of four layers, for more and more charges."""
-    radii = (36.8, 34.8, 32.0, 31.2)
-    media = [
-        Medium(sigma_a=a, sigma_s_prime=s, eta=1.4) for a, s in ((0.018, 1.9), (0.016, 1.6), (0.004, 0.3), (0.036, 2.2))
-    ]
-    outer, *inner = (sphere(radius) for radius in radii)
-    depth = radii[0] - media[0].mean_free_path
-    gamma = np.radians([0.0, 10.0, 20.0, 30.0, 45.0])
-    points = radii[0] * np.column_stack([np.sin(gamma), np.zeros(5), np.cos(gamma)])
-    right = layered_ball.point_exitance(media[::-1], radii[::-1], source_radius=depth, gamma=gamma)
-    entry = LightLedger(Power(1.0, 0.0, 0.0, 0.0, 0.0))
-    for most in (700, 1050):
-        started = time.process_time()
-        solution = charge_solution(
-            outer,
-            media[0],
-            np.array([[0.0, 0.0, depth]]),
-            np.ones((1, 1)),
-            [entry],
-            inner=list(zip(inner, media[1:], strict=True)),
-            tolerance=0.0,
-            most=most,
-        )
-        seconds = time.process_time() - started
-        off = " | ".join(f"{each:.3%}" for each in solution.exitance_on(points) / right - 1.0)
-        yield f"| {solution.charges} | {seconds:.1f} | {solution.error_estimate:.4%} | {off} |"
-
-
 HEAD = """| body | charges | seconds | error | estimate | over error | bound | over error | bound of truth | \
 median error below 1 % of the brightest | worst within six decades |
 |---|---|---|---|---|---|---|---|---|---|---|"""
@@ -265,15 +234,7 @@ def main() -> None:
     parser.add_argument("--charges", type=int, nargs="+", default=[100, 300, 800])
     parser.add_argument("files", nargs="*")
     parser.add_argument("--fitted", action="store_true")
-    parser.add_argument("--head", action="store_true")
     given = parser.parse_args()
-    if given.head:
-        print(
-            "| charges | seconds | estimate | error at 0° | 10° | 20° | 30° | 45° |\n|---|---|---|---|---|---|---|---|"
-        )
-        for text in head_rows():
-            print(text, flush=True)
-        return
     if given.fitted:
         print(
             "| body | subtracted | tolerance | charges | nodes | seconds | error | estimate over error | "

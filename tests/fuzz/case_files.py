@@ -54,7 +54,7 @@ detectors:
 tolerance: {exitance: 0.05, detectors: 0.02}
 camera: {position: [0, 0, 50]}
 outputs: [surface, volume, picture]
-sweep: {tolerance.detectors: [0.02, 0.01], detectors.0.point.0: [0, 1]}
+sweep: {tolerance.detectors: [0.02, 0.01], zip: {detectors.0.point.0: [0, 1], up: [[0, 0, 1], [0, 1, 0]]}}
 """,
         """
 surface: {box: {size: [10, 10, 10]}}
@@ -80,6 +80,9 @@ lights: [{pencil: {origin: [0, 0, 20], direction: [0, 0, -1], radius: 1.0, depos
 detectors: [{name: here, disc: {center: [0, 0, 5], radius: 1}}]
 tolerance: {detectors: 0.02}
 up: [0, 1, 0]
+sweep:
+  medium.eta: {start: 1.2, stop: 1.4, num: 2, scale: log}
+  sample: {method: random, size: 2, seed: 1, medium.sigma_s: {start: 9, stop: 11}, up: [[0, 0, 1], [0, 1, 0]]}
 """,
         """
 mesh:
@@ -127,7 +130,24 @@ NUMBERS = [
     *(float("nan"), float("inf"), -float("inf"), -1e300, 5.0, -5.0, 10.0, 1.0000001, 0.9999999, 180, 2**31, 2**63),
 ]
 KEYS: list[Any] = [
-    *("", "x", "Name", "surfaces", "sphere", "file", "scale", "radius", "power", "spot", "sweep", "material", "images"),
+    *(
+        "",
+        "x",
+        "Name",
+        "surfaces",
+        "sphere",
+        "file",
+        "scale",
+        "radius",
+        "power",
+        "spot",
+        "sweep",
+        "material",
+        "images",
+        "base",
+        "zip",
+        "sample",
+    ),
     *("exitance", "detectors", "tolerance", "model", "holes", "up", "mesh", "labels"),
     *("volume", "array", "phase", "g", "sigma_s", "eta", "region", 1, None, True, 1.5, "?one", "?list", "<<", "=", "é"),
     *("a.b", "__class__", "model_config", "kinds", "a\nb", "x" * 300),
@@ -136,6 +156,7 @@ SWEPT = [
     *("medium.sigma_a", "lights.0.pencil.power", "lights.²", "lights.-1.name", "lights.99", "lights", "name", "sweep"),
     *("", ".", "..", "surface.slab.width", "surface.file", "outputs.0", "unit", "medium.", "medium.sigma_a.x", "x/y"),
     *("tolerance.exitance", "tolerance.detectors", "tolerance.everywhere", "model", "mesh.labels.1", "up.0"),
+    *("zip", "sample", "base", "surface", "medium", "camera.azimuth", "surface.box.center.0", "lights[0].pencil.power"),
     *("lights.0", "lights." + "9" * 30, "regions.0.name", "channels.0", "lights.٣", "medium.material", "name.x"),
 ]
 scalars = st.one_of(
@@ -193,9 +214,24 @@ def _mutate(draw: st.DrawFn, data: dict[Any, Any]) -> None:
     elif kind == 7 and isinstance(holder, dict):
         holder[draw(st.sampled_from(KEYS))] = copy.deepcopy(draw(wrong_values))
     elif kind == 8:
-        data["sweep"] = {draw(st.sampled_from(SWEPT)): copy.deepcopy(draw(st.lists(wrong_values, max_size=3)))}
+        data["sweep"] = _sweep(draw)
     else:
         holder[last] = [holder[last]] * draw(st.integers(1, 4))
+
+
+def _sweep(draw: st.DrawFn) -> dict[str, Any]:
+    """A sweep of a list, a range, zipped lists or a sample, most of them wrong."""
+    key, values = draw(st.sampled_from(SWEPT)), copy.deepcopy(draw(st.lists(wrong_values, max_size=3)))
+    number = st.sampled_from(NUMBERS)
+    ends = {"start": draw(number), "stop": draw(number), "scale": draw(st.sampled_from(["log", "linear"]))}
+    kind = draw(st.integers(0, 5))
+    if kind == 0:
+        return {key: {**ends, "num": draw(st.sampled_from([0, 1, 2, 3, -1, 1e3, 10**6, None]))}}
+    if kind == 1:
+        return {"zip": {key: values, "medium.eta": [1.3, 1.4]}}
+    if kind == 2:
+        return {"sample": {"size": draw(st.sampled_from([0, 1, 3, 2.5, -1, None])), "seed": 1, key: ends}}
+    return {key: values}
 
 
 @st.composite
@@ -319,6 +355,53 @@ def traps() -> Iterator[tuple[str, bytes]]:
         for key in (b"tolerance", b"name", b"unit", b"surface", b"camera", b"sweep"):
             kept = b"".join(part for part in right.splitlines(keepends=True) if not part.startswith(key))
             yield f"{key.decode()}: {tag[:40]}", kept + b"\n" + key + b": " + tag.encode() + b"\n"
+    for named in (
+        b"case.yaml",
+        b"./case.yaml",
+        b"../inputs/case.yaml",
+        b"none.yaml",
+        b".",
+        b"/dev/zero",
+        b"cube.stl",
+        b"''",
+        b"3",
+    ):
+        yield f"base {named.decode()}", b"base: " + named + b"\n" + right
+    for odd in (
+        *("{zip: {}}", "{zip: {medium.eta: [1.2, 1.4], medium.g: [1]}}", "{zip: 3}", "{zip: {zip: {medium.eta: [1]}}}"),
+        *(
+            "{sample: {size: 0}}",
+            "{sample: {size: 1e3, medium.eta: {start: 1, stop: 2}}}",
+            "{sample: [1]}",
+            "{sample: {}}",
+        ),
+        *(
+            "{sample: {size: 20001, medium.eta: {start: 1, stop: 2}}}",
+            "{sample: {size: 2, medium.eta: {start: 1, stop: .inf}}}",
+        ),
+        *(
+            "{medium.eta: {start: 1, stop: 2, num: 0}}",
+            "{medium.eta: {start: 1, stop: 2, num: 20001}}",
+            "{medium.eta: {}}",
+        ),
+        *(
+            "{medium.eta: {start: -1, stop: 2, num: 3, scale: log}}",
+            "{medium.eta: {start: -1.e+308, stop: 1.e+308, num: 3}}",
+        ),
+        *(
+            "{medium.eta: {start: 1.e-320, stop: 1.e+308, num: 3, scale: log}}",
+            "{medium: [{}]}",
+            "{lights: [[]]}",
+            "{lights: [1]}",
+        ),
+        *(
+            "{medium.eta: [[1, 2], [1, 2]]}",
+            "{surface: [{sphere: {radius: 1}}, {sphere: {radius: 1}}]}",
+            "{sweep: [1]}",
+        ),
+    ):
+        alone = yaml.safe_dump({key: value for key, value in RIGHT[0].items() if key not in ("sweep", "compare")})
+        yield f"sweep {odd[:40]}", alone.encode() + b"sweep: " + odd.encode() + b"\n"
     for name in (
         *(
             "..",

@@ -201,7 +201,7 @@ def from_closed_form(written: Written, light: Light, solution: Solution) -> floa
     media, thicknesses = zip(*written.layers, strict=True)
     depth = -light.position[2]
     both = [layered.point_total(media, thicknesses, depth=depth, face=face) for face in ("front", "back")]
-    return abs(solution.power.exited / sum(both) - 1.0)
+    return abs(float(solution.power.exited) / sum(both) - 1.0)
 
 
 def scenes(wanted: list[str]) -> Iterator[tuple[str, str]]:

@@ -7,7 +7,9 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Section, Vector3, shape_of
+from tetlux.cases.file.schema.sweep import SweepSpec
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
 
 class SphereSpec(Section):
@@ -113,6 +115,10 @@ class ToleranceSpec(Section):
 
     exitance: Relative | None = Field(None, description="wanted relative L2 error of the exitance")
     detectors: Relative | None = Field(None, description="wanted relative error of what each detector reads")
+    everywhere: Relative | None = Field(
+        None, description="wanted relative error of the exitance at almost every point of the surface"
+    )
+    volume: Relative | None = Field(None, description="wanted relative error of the fluence almost everywhere inside")
 
 
 Tolerance = Annotated[
@@ -120,17 +126,6 @@ Tolerance = Annotated[
     | Annotated[Relative, Tag(TAG + "list")]
     | Annotated[ToleranceSpec, Tag(TAG + "mapping")],
     Discriminator(shape_of),
-]
-
-
-def _word_or_number(value: object) -> str:
-    whole = isinstance(value, int) and not isinstance(value, bool)
-    return TAG + ("word" if isinstance(value, str) else "whole" if whole else "number")
-
-
-SweepValue = Annotated[
-    Annotated[str, Tag(TAG + "word")] | Annotated[int, Tag(TAG + "whole")] | Annotated[Number, Tag(TAG + "number")],
-    Discriminator(_word_or_number),
 ]
 
 
@@ -153,7 +148,8 @@ class CaseSpec(Section):
         "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
     )
     tolerance: Tolerance = Field(
-        0.02, description="wanted relative L2 error of the exitance, or tolerances of exitance and detectors"
+        DEFAULT_TOLERANCE,
+        description="wanted relative L2 error of the exitance, or exitance, detectors, everywhere, volume",
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
@@ -165,8 +161,11 @@ class CaseSpec(Section):
         None,
         description="closed forms to compare with: robin, images, dipole for slabs; series for spheres and cylinders",
     )
-    sweep: dict[str, Annotated[list[SweepValue], Field(min_length=1)]] | None = Field(
+    sweep: SweepSpec | None = Field(
         None, description="values by dotted key; one run for each, several keys make a grid"
+    )
+    base: str | None = Field(
+        None, description="another case file, relative to this one; its keys hold where this one has none"
     )
 
     @property
@@ -174,22 +173,25 @@ class CaseSpec(Section):
         """Those of each quantity."""
         if isinstance(self.tolerance, ToleranceSpec):
             return self.tolerance
-        return ToleranceSpec(exitance=self.tolerance, detectors=None)
+        return ToleranceSpec(exitance=self.tolerance, detectors=None, everywhere=None, volume=None)
 
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
-        found = self.tolerances
-        if found.exitance is None and (found.detectors is None or self.model == "charges"):
-            needed = "of the exitance" if self.model == "charges" else "of exitance or detectors"
+        given = {name: value for name, value in self.tolerances if value is not None}
+        if not given or (self.model == "charges" and "exitance" not in given):
+            needed = "of the exitance" if self.model == "charges" else "of exitance, detectors, everywhere or volume"
             raise PydanticCustomError(
                 "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
             )
-        if found.detectors is not None and not self.detectors:
+        if "detectors" in given and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
-        if found.detectors is not None and self.model == "charges":
-            raise PydanticCustomError(
-                "tolerance", 'a tolerance for detectors is for finite elements, not for model "charges"; leave it out'
-            )
+        for name in given:
+            if name != "exitance" and self.model == "charges":
+                raise PydanticCustomError(
+                    "tolerance",
+                    'tolerance.{name} is for finite elements, not for model "charges"; leave it out',
+                    {"name": name},
+                )
         return self
 
     @model_validator(mode="before")

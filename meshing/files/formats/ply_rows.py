@@ -36,7 +36,7 @@ class Rows:
         """The next values of a type."""
         raise NotImplementedError
 
-    def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
+    def read_equal_rows(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
         """The columns of an element if its lists have these lengths in every row, or else None."""
         raise NotImplementedError
 
@@ -47,7 +47,7 @@ class Rows:
         start = self.at
         lengths = [len(values) for values in self._row(element)]
         self.at = start
-        columns = self.even(element, lengths)
+        columns = self.read_equal_rows(element, lengths)
         if columns is not None:
             return columns
         rows = [self._row(element) for _ in range(element.count)]
@@ -82,7 +82,7 @@ class Binary(Rows):
         self.at = end
         return values
 
-    def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
+    def read_equal_rows(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
         """The columns of an element if its lists have these lengths in every row, or else None."""
         parts: list[tuple[str, str, tuple[int, ...]]] = []
         for i, (_, length, kind) in enumerate(element.properties):
@@ -118,7 +118,7 @@ class Text(Rows):
         self.at = end
         return values
 
-    def even(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
+    def read_equal_rows(self, element: Element, lengths: list[int]) -> dict[str, Column] | None:
         """The columns of an element if its lists have these lengths in every row, or else None."""
         width = sum(n + bool(length) for n, (_, length, _) in zip(lengths, element.properties, strict=True))
         end = self.at + element.count * width

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 from yaml.constructor import ConstructorError
@@ -72,6 +72,13 @@ _Loader.add_implicit_resolver(
 )
 
 
+class Place(NamedTuple):
+    """Where a key stands: a file, and a line of it."""
+
+    path: Path
+    line: int
+
+
 @dataclass(frozen=True)
 class Document:
     """Plain data read from a YAML file.
@@ -80,27 +87,27 @@ class Document:
     ----------
     path : Path
     data : dict
-    lines : dict
-        Line number of each key, by its path in the document.
+    places : dict
+        The file and line of each key, by its path in the document.
     run : str, optional
         Label of a run of the sweep, which error messages then name.
     """
 
     path: Path
     data: dict[str, Any]
-    lines: dict[Key, int]
+    places: dict[Key, Place]
     run: str | None = None
 
-    def line(self, key: Key) -> int | None:
-        """The line of a key or, where it has none (merged in by `<<`), of the innermost key that contains it."""
-        while key and key not in self.lines:
+    def place(self, key: Key) -> Place | None:
+        """The place of a key or, where it has none (merged in by `<<`), of the innermost key that contains it."""
+        while key and key not in self.places:
             key = key[:-1]
-        return self.lines[key] if key else None
+        return self.places[key] if key else None
 
     def error(self, key: Key, message: str) -> InputError:
-        """An error that names this file, the line of a key, and the key."""
-        line = self.line(key)
-        where = f"{self.path}, line {line}" if line else f"{self.path}"
+        """An error that names the file and line of a key, and the key."""
+        place = self.place(key)
+        where = f"{place.path}, line {place.line}" if place else f"{self.path}"
         name = format_key(key)
         if self.run is not None:
             message = f"in the run {self.run}: {message}"
@@ -162,8 +169,8 @@ def read_document(path: Path) -> Document:
         node = loader.get_single_node()
         if not isinstance(node, yaml.MappingNode):
             raise InputError(f"{path} is {'empty' if node is None else 'not a mapping'}; give keys and values.")
-        lines: dict[Key, int] = {}
-        _collect_lines(path, node, (), lines)
+        places: dict[Key, Place] = {}
+        _collect_places(path, node, (), places)
         data = loader.construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
@@ -174,22 +181,22 @@ def read_document(path: Path) -> Document:
     except yaml.YAMLError as error:
         reason = (str(error).splitlines() or ["no reason given"])[0]
         raise InputError(f"{path}: not valid YAML: {reason}.") from error
-    return Document(path, data, lines)
+    return Document(path, data, places)
 
 
-def _collect_lines(path: Path, node: yaml.Node, key: Key, lines: dict[Key, int]) -> None:
-    """Add the line of each key within a node to `lines`."""
-    if len(lines) > MOST_KEYS:
+def _collect_places(path: Path, node: yaml.Node, key: Key, places: dict[Key, Place]) -> None:
+    """Add the place of each key within a node to `places`."""
+    if len(places) > MOST_KEYS:
         raise InputError(f"{path} holds more than {MOST_KEYS:,} keys; a case file is a few lines of YAML.")
     if isinstance(node, yaml.MappingNode):
         for name, value in node.value:
             part: Key = (*key, str(name.value))
-            if part in lines:
+            if part in places:
                 where = f"{path}, line {name.start_mark.line + 1}: {format_key(part)}"
                 raise InputError(f"{where}: this key is given twice; give it once.")
-            lines[part] = name.start_mark.line + 1
-            _collect_lines(path, value, part, lines)
+            places[part] = Place(path, name.start_mark.line + 1)
+            _collect_places(path, value, part, places)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
-            lines[*key, index] = value.start_mark.line + 1
-            _collect_lines(path, value, (*key, index), lines)
+            places[*key, index] = Place(path, value.start_mark.line + 1)
+            _collect_places(path, value, (*key, index), places)

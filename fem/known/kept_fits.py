@@ -1,8 +1,8 @@
-"""Places of charges that are kept with a mesh, so that readings on it depend smoothly on the coefficients.
+"""Fits of charges that are kept with a mesh, so that readings on it depend smoothly on the coefficients.
 
 Where charges go follows from a light's depth and from random draws: chosen anew for each set of coefficients, a reading
-would jump by the error of the fit. So a light on a mesh that was solved on before has the places that it had then, and
-is left to other ways if it was then.
+would jump by the error of the fit. So charges of a light on a mesh that was solved on before are placed as they were
+then, and a light that was not fitted then is not fitted now.
 """
 
 from dataclasses import dataclass, field
@@ -12,13 +12,13 @@ from tetlux.fem.known.fitted import FittedLight
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
-# A fit serves for a light that is so many times deeper or shallower than the one they were chosen for.
+# A fit serves for a light that is up to this factor deeper or shallower than the one it was made for.
 OTHER_DEPTH = 1.5
 
 
 @dataclass(frozen=True, eq=False)
-class KeptPlaces:
-    """Places by light.
+class KeptFits:
+    """Fits by light.
 
     Attributes
     ----------
@@ -39,17 +39,21 @@ class KeptPlaces:
         """Remember a choice."""
         self.choices.setdefault(light, []).append((depth, fit))
 
+    def copy(self) -> "KeptFits":
+        """The same choices, to which others can be added."""
+        return KeptFits({light: list(choices) for light, choices in self.choices.items()})
+
     __repr__ = one_line
 
 
-_OF_MESHES: WeakKeyDictionary[TetMesh, KeptPlaces] = WeakKeyDictionary()
+_OF_MESHES: WeakKeyDictionary[TetMesh, KeptFits] = WeakKeyDictionary()
 
 
-def kept_on(mesh: TetMesh) -> KeptPlaces:
-    """What is kept with a mesh; nothing at first."""
-    return _OF_MESHES.setdefault(mesh, KeptPlaces())
+def fits_of(mesh: TetMesh) -> KeptFits:
+    """The fits that are kept with a mesh; none at first."""
+    return _OF_MESHES.setdefault(mesh, KeptFits())
 
 
-def keep_with(mesh: TetMesh, kept: KeptPlaces) -> None:
-    """Keep places with a mesh."""
+def keep_fits(mesh: TetMesh, kept: KeptFits) -> None:
+    """Keep fits with a mesh."""
     _OF_MESHES[mesh] = kept

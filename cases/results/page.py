@@ -1,0 +1,82 @@
+"""``index.html`` of a batch: its table, thumbnails, and a plot, in one file that asks nothing of any server."""
+
+import base64
+import io
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from tetlux.cases.results.rows import FIGURES, READING, SECONDS, Row, swept_keys
+from tetlux.cases.results.table_file import replace_file
+
+# Height of a thumbnail in pixels, and how many there are: 200 take about 2 MB.
+HEIGHT, MOST_THUMBNAILS = 96, 200
+PICTURE = "picture.png"
+
+
+def write_page(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> None:
+    """Write the page of a batch.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write, in the folder that the runs are in.
+    rows : sequence of dict
+    columns : sequence of str
+
+    Raises
+    ------
+    OSError, RunError
+        If it cannot be written.
+    """
+    shown = [name for name in columns if any(row.get(name) is not None for row in rows)]
+    data = {
+        "columns": shown,
+        "units": {name: _unit(name) for name in shown},
+        "swept": swept_keys(shown),
+        "rows": [[_plain(row.get(name)) for name in shown] for row in rows],
+        "pictures": _thumbnails(path.parent, rows),
+    }
+    # In a script of HTML, "<" could begin its end.
+    text = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    page = Path(__file__).with_name("page.html").read_text(encoding="utf-8")
+    replace_file(path, page.replace("DATA", text, 1))
+
+
+def _unit(column: str) -> str:
+    if column.startswith(SECONDS):
+        return "s"
+    if column.startswith(READING):
+        return "1" if column.endswith(".relative_error") else "W, or W/unit² at a point"
+    unit = FIGURES.get(column, "")
+    return "" if unit in ("1", "unit of length") else unit
+
+
+def _plain(value: Any) -> Any:
+    """A value as the page shows it: numbers, text or nothing."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return json.dumps(value) if isinstance(value, list | dict) else value
+
+
+def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, str]:
+    """Small pictures of the first runs that have one, as data addresses by the name of the run."""
+    from PIL import Image  # noqa: PLC0415 - only needed where there are pictures
+
+    found: dict[str, str] = {}
+    for run in dict.fromkeys(row["run"] for row in rows):
+        picture = folder / run / PICTURE
+        if len(found) == MOST_THUMBNAILS or not picture.is_file():
+            continue
+        try:
+            with Image.open(picture) as image:
+                small = image.convert("RGB")
+                small.thumbnail((4 * HEIGHT, HEIGHT))
+        except (OSError, ValueError, SyntaxError):
+            continue
+        target = io.BytesIO()
+        small.save(target, "JPEG", quality=80)
+        found[run] = "data:image/jpeg;base64," + base64.b64encode(target.getvalue()).decode()
+    return found

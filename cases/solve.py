@@ -1,0 +1,51 @@
+"""`solve_case`: solve each channel of a case by its model."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from tetlux.cases.file.case import Case
+from tetlux.cases.write.results import AnySolution
+from tetlux.fem.media.region import Region
+from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.scenes import media_by_scene
+from tetlux.fem.shared import SharedMesh
+from tetlux.fem.solve import solve
+from tetlux.fem.solve_scenes import solve_each
+
+Report = Callable[[str], None]
+
+
+def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | None = None) -> Sequence[AnySolution]:
+    """Solve each channel by the model of the case; `start` is the mesh that finite elements begin with."""
+    if case.spec.model == "charges":
+        return _solve_with_charges(case, report)
+    return solve_each(
+        case.mesh or case.surface,
+        [channel.media for channel in case.channels],
+        [list(channel.lights.values()) for channel in case.channels],
+        regions=case.regions,
+        tolerance=case.tolerance,
+        detectors=[entry.detector for entry in case.detectors],
+        detector_tolerance=case.detector_tolerance,
+        start=start,
+        everywhere_tolerance=case.everywhere_tolerance,
+        volume_tolerance=case.volume_tolerance,
+        cache=cache,
+        report=report,
+    )
+
+
+def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
+    """Solve each channel by charges; the seconds of each solution are those of all channels together."""
+    solutions = []
+    assert case.tolerance is not None
+    media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
+    for channel, (body, *inner) in zip(case.channels, media, strict=True):
+        regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
+        lights = list(channel.lights.values())
+        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
+        where = f"{channel.name}: " if len(case.channels) > 1 else ""
+        report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
+        solutions.append(solution)
+    seconds = {stage: sum(solution.seconds[stage] for solution in solutions) for stage in solutions[0].seconds}
+    return [replace(solution, seconds=seconds) for solution in solutions]

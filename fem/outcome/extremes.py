@@ -1,0 +1,75 @@
+"""Places where the exitance is largest and least, found without the many vertices that a picture of it needs."""
+
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from tetlux.fem.outcome.solution import Solution
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import longest_sides
+
+# The brightest nodes, from which the largest value is climbed to; directions of a step; and how often a step is halved,
+# which begins with the longest side of the facets around the node.
+PEAKS, DIRECTIONS, HALVINGS = 4, 8, 6
+MOST_STEPS = 40
+
+# Copies of vertices that cannot be written to, whose nearest points a mesh keeps.
+_VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
+
+
+def extreme_places(solution: Solution) -> FloatArray:
+    """Points of the surface among which the exitance is largest and least.
+
+    Parameters
+    ----------
+    solution : Solution
+
+    Returns
+    -------
+    (q, 3) ndarray
+        The vertices of the surface, and the brightest places that a climb from the brightest nodes leads to. The
+        largest value there is within 1 % of that at the vertices of `surface_exitance`.
+    """
+    return np.vstack([vertices_of(solution.surface), _climb(solution)])
+
+
+def vertices_of(surface: Surface) -> FloatArray:
+    """The vertices of a surface, (n, 3), as one array that cannot be written to."""
+    if surface not in _VERTICES:
+        vertices = surface.points.copy()
+        vertices.setflags(write=False)
+        _VERTICES[surface] = vertices
+    return _VERTICES[surface]
+
+
+def _climb(solution: Solution) -> FloatArray:
+    """Climb from the brightest nodes to places (p, 3) of the surface that none around is brighter than."""
+    mesh, surface = solution.mesh, solution.surface
+    sides = np.zeros(len(mesh.points))
+    facets = mesh.boundary_faces
+    np.maximum.at(sides, facets.ravel(), np.repeat(longest_sides(mesh.points[facets]), 3))
+    brightest = mesh.boundary_nodes[np.argsort(-solution.exitance)[:PEAKS]]
+    places, normals = surface.project(mesh.points[brightest])
+    values, steps = solution.exitance_on(places), sides[brightest]
+    least = steps / 2.0**HALVINGS
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    for _ in range(MOST_STEPS):
+        climbing = np.flatnonzero(steps > least)
+        if len(climbing) == 0:
+            break
+        first = np.cross(normals[climbing], np.eye(3)[np.abs(normals[climbing]).argmin(axis=1)])
+        first /= np.linalg.norm(first, axis=1)[:, None]
+        second = np.cross(normals[climbing], first)
+        ways = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
+        tried = places[climbing, None] + steps[climbing, None, None] * ways
+        found, found_normals = surface.project(tried.reshape(-1, 3))
+        bright = solution.exitance_on(found).reshape(len(climbing), DIRECTIONS)
+        best = bright.argmax(axis=1)
+        row = np.arange(len(climbing)) * DIRECTIONS + best
+        better = bright.max(axis=1) > values[climbing]
+        moved = climbing[better]
+        places[moved], normals[moved] = found[row[better]], found_normals[row[better]]
+        values[moved] = bright.max(axis=1)[better]
+        steps[climbing[~better]] *= 0.5
+    return places

@@ -1,0 +1,204 @@
+"""Batches as users run them: shared meshes, worker processes that die, resumption, and Ctrl-C."""
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tetlux.cases.batch import workshop
+from tetlux.cases.batch.engine import run_batch, worker_count
+from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
+from tetlux.cases.batch.requests import load_all
+from tetlux.cases.file.case import Case
+from tetlux.cases.write.content import content_of
+from tetlux.fem.solve_scenes import solve_each
+from tetlux.meshing.errors import InputError, RunError
+
+BALL = """
+unit: mm
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights:
+  - pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 1.0}
+tolerance: 0.1
+outputs: []
+sweep: {medium.sigma_a: [0.01, 0.012, 0.014, 0.016, 0.018, 0.02]}
+"""
+
+
+def read(folder: Path, text: str = BALL, name: str = "ball") -> list[Case]:
+    (folder / f"{name}.yaml").write_text(text)
+    return load_all([str(folder / f"{name}.yaml")])
+
+
+def summaries(out: Path) -> dict[str, Any]:
+    """All summaries without their seconds, by folder."""
+    found = {}
+    for path in out.glob("*/*/summary.json"):
+        summary = json.loads(path.read_text())
+        del summary["seconds"]
+        found[path.parent.name] = summary
+    return found
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A batch that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("finished")
+    run_batch(read(folder), folder / "out", jobs=1)
+    return folder
+
+
+def test_runs_share_a_mesh_and_hold_their_tolerance(finished: Path) -> None:
+    found = summaries(finished / "out")
+    assert len(found) == 6
+    assert len({summary["mesh"]["nodes"] for summary in found.values()}) == 1
+    for summary in found.values():
+        assert summary["channels"][0]["error_estimate"] <= 0.1
+    assert sorted(path.name for path in (finished / "out").iterdir()) == ["ball"]
+
+
+def test_a_run_of_a_batch_finds_what_it_finds_alone(finished: Path) -> None:
+    for case in load_all([str(finished / "ball.yaml")])[::5]:
+        (alone,) = solve_each(case.surface, case.medium, [list(case.lights)], tolerance=0.01)
+        (channel,) = summaries(finished / "out")[Path(case.name).name]["channels"]
+        assert channel["power"]["exited"] == pytest.approx(alone.power.exited, rel=0.01)
+        assert channel["exitance"]["max"] == pytest.approx(alone.exitance_at([[0, 0, 10]])[0], rel=0.02)
+
+
+def test_resume_keeps_what_is_finished_and_runs_what_has_changed(finished: Path, tmp_path: Path) -> None:
+    cases = read(tmp_path, BALL.replace("0.02]", "0.021]"))
+    out = tmp_path / "out"
+    (finished / "out" / "ball").rename(finished / "moved")
+    try:
+        out.mkdir()
+        (out / "ball").symlink_to(finished / "moved")
+        events: list[Event] = []
+        run_batch(cases, out, jobs=1, resume=True, listeners=[events.append])
+        ends = [event for event in events if isinstance(event, RunFinished)]
+        assert [event.run for event in ends if event.kept] == [0, 1, 2, 3, 4]
+        assert [event.run for event in ends if not event.kept] == [5]
+        ended = events[-1]
+        assert isinstance(ended, BatchEnded)
+        assert (ended.kept, ended.finished, ended.failed, ended.left) == (5, 1, 0, 0)
+    finally:
+        (finished / "moved").rename(finished / "out" / "ball")
+
+
+def test_content_is_that_of_files_and_not_their_names(tmp_path: Path) -> None:
+    (case,) = load_all(["hare"])
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    (copies / "other.stl").write_bytes((case.source.parent / "hare.stl").read_bytes())
+    text = case.source.read_text().replace("hare.stl", "other.stl").replace("name: hare", "name: rabbit")
+    (copy,) = read(copies, text)
+    assert content_of(copy) == content_of(case)
+    (other,) = read(copies, text.replace("sigma_a: 0.01", "sigma_a: 0.011"))
+    assert content_of(other) != content_of(case)
+    moved = bytearray((copies / "other.stl").read_bytes())
+    moved[96] ^= 1  # the lowest bit of a coordinate
+    (copies / "other.stl").write_bytes(moved)
+    (changed,) = read(copies, text)
+    assert content_of(changed) != content_of(case)
+
+
+def test_one_failing_run_does_not_end_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    finish = workshop.finish_case
+
+    def fail_twice(case: Case, *rest: Any, **options: Any) -> Any:
+        if "0.012" in case.name:
+            raise RunError("no luck.")
+        if "0.014" in case.name:
+            raise ZeroDivisionError("division by zero")
+        return finish(case, *rest, **options)
+
+    monkeypatch.setattr(workshop, "finish_case", fail_twice)
+    events: list[Event] = []
+    ended = run_batch(read(tmp_path), tmp_path / "out", jobs=1, listeners=[events.append])
+    assert (ended.finished, ended.failed, ended.left) == (4, 2, 0)
+    failures = [event for event in events if isinstance(event, RunFailed)]
+    first, second = sorted(failures, key=lambda event: event.run)
+    assert first.reason == "no luck."
+    assert first.sweep == {"medium.sigma_a": 0.012}
+    assert "ZeroDivisionError" in second.reason
+
+
+def test_a_full_disk_ends_the_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fill(case: Case, *_: object, **__: object) -> None:
+        full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        raise RunError("results cannot be written: No space left on device.") from full
+
+    monkeypatch.setattr(workshop, "finish_case", fill)
+    events: list[Event] = []
+    ended = run_batch(read(tmp_path), tmp_path / "out", jobs=1, listeners=[events.append])
+    assert (ended.failed, ended.left, ended.how) == (1, 5, "stopped")
+    assert len([event for event in events if isinstance(event, RunFailed)]) == 1
+
+
+def test_workers_find_what_one_process_finds_though_one_is_killed(finished: Path, tmp_path: Path) -> None:
+    cases, out = read(tmp_path), tmp_path / "out"
+    # The mesher's mesh comes from the cache, since it would make another one.
+    events: list[Event] = []
+
+    def kill_the_first(event: Event) -> None:
+        events.append(event)
+        if isinstance(event, MeshFinished):
+            own = subprocess.run(
+                ["pgrep", "-P", str(os.getpid()), "-f", "batch.worker 1 "], capture_output=True, check=True
+            )
+            os.kill(int(own.stdout.split()[0]), signal.SIGKILL)
+
+    ended = run_batch(cases, out, jobs=2, listeners=[kill_the_first])
+    assert (ended.finished, ended.failed) == (6, 0)
+    (lost,) = (event for event in events if isinstance(event, WorkerLost))
+    assert "SIGKILL" in lost.reason
+    for name, summary in summaries(out).items():
+        expected = summaries(finished / "out")[name]
+        assert summary["mesh"] == expected["mesh"]
+        assert summary["channels"] == expected["channels"]
+
+
+def test_a_killed_batch_is_resumed_with_the_same_results(finished: Path, tmp_path: Path) -> None:
+    read(tmp_path)
+    command = [sys.executable, "-m", "tetlux", "run", "ball.yaml", "--jobs", "1", "--resume"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as batch:
+        while len(summaries(tmp_path / "results")) < 2 and batch.poll() is None:
+            time.sleep(0.05)
+        batch.kill()
+    kept = len(summaries(tmp_path / "results"))
+    assert 2 <= kept < 6
+    ended = run_batch(load_all([str(tmp_path / "ball.yaml")]), tmp_path / "results", jobs=1, resume=True)
+    assert (ended.kept, ended.finished) == (kept, 6 - kept)
+    expected = summaries(finished / "out")
+    for name, summary in summaries(tmp_path / "results").items():
+        assert summary["channels"] == expected[name]["channels"]
+    assert [path.name for path in (tmp_path / "results").iterdir()] == ["ball"]
+
+
+def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
+    read(tmp_path, BALL.replace("0.02]", f"{', '.join(str(0.02 + 0.001 * i) for i in range(60))}]"))
+    command = [sys.executable, "-m", "tetlux", "run", "ball.yaml", "--jobs", "2"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as batch:
+        while not summaries(tmp_path / "results") and batch.poll() is None:
+            time.sleep(0.05)
+        batch.send_signal(signal.SIGINT)
+        _, messages = batch.communicate(timeout=60)
+    assert batch.returncode == 130
+    assert b"finished cases are kept" in messages
+    assert 1 <= len(summaries(tmp_path / "results")) < 60
+    assert not list((tmp_path / "results").glob(".partial*"))
+
+
+def test_worker_counts() -> None:
+    assert worker_count(1, 100) == 1
+    assert worker_count(8, 3) == 3
+    assert worker_count(None, 1) == 1
+    with pytest.raises(InputError, match="--jobs is 0; give the number"):
+        worker_count(0, 1)

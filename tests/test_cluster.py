@@ -1,0 +1,113 @@
+"""Batches on a Dask cluster: a real scheduler and real workers on loopback, of which one is killed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tetlux.cases.batch.cluster import solve_remotely
+from tetlux.cases.batch.engine import run_batch
+from tetlux.cases.batch.events import RunFinished
+from tetlux.cases.batch.jobs import RunJob, SolveJob
+from tetlux.cases.batch.requests import load_all
+from tetlux.cases.batch.wire import pack
+from tetlux.cases.cli import main
+
+BALL = """
+unit: mm
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights:
+  - pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 1.0}
+tolerance: 0.1
+outputs: []
+"""
+SWEEP = "sweep: {medium.sigma_a: [0.01, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016, 0.017]}\n"
+
+
+def channels(out: Path) -> dict[str, Any]:
+    return {path.parent.name: json.loads(path.read_text())["channels"] for path in out.glob("*/*/summary.json")}
+
+
+def start(*arguments: str) -> "subprocess.Popen[bytes]":
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    one_thread = dict.fromkeys(("TETLUX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    return subprocess.Popen([sys.executable, "-m", *arguments], env={**os.environ, **one_thread}, **silent)
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
+    """The scheduler file of a cluster of two workers, and one of these."""
+    file = str(tmp_path_factory.mktemp("dask") / "scheduler.json")
+    here = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file)
+    processes = [start("distributed.cli.dask_scheduler", *here)]
+    for _ in range(2):
+        own = ("--scheduler-file", file, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
+        processes.append(start("distributed.cli.dask_worker", *own))
+    while not Path(file).is_file():
+        assert processes[0].poll() is None
+        time.sleep(0.05)
+    try:
+        yield file, processes[1]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.slow
+def test_a_cluster_finds_what_one_process_finds_though_a_worker_is_killed(
+    cluster: tuple[str, "subprocess.Popen[bytes]"], tmp_path: Path
+) -> None:
+    file, worker = cluster
+    (tmp_path / "ball.yaml").write_text(BALL + SWEEP)
+    request = [str(tmp_path / "ball.yaml"), "--scheduler", file, "--out", str(tmp_path / "out")]
+    with start("tetlux", "run", *request) as batch:
+        while not channels(tmp_path / "out") and batch.poll() is None:
+            time.sleep(0.02)
+        worker.send_signal(signal.SIGKILL)
+        assert batch.wait() == 0
+    run_batch(load_all([str(tmp_path / "ball.yaml")]), tmp_path / "here", jobs=1)
+    assert len(channels(tmp_path / "here")) == 8
+    assert channels(tmp_path / "out") == channels(tmp_path / "here")
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["ball"]
+
+
+def test_files_come_back_as_bytes_where_the_folder_is_not_shared(tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(BALL)
+    (case,) = load_all([str(tmp_path / "ball.yaml")])
+    job = SolveJob(0, 0, None, (RunJob(0, case, 0),), {}, str(tmp_path / "elsewhere"), True)
+    data, shared = pack(job)
+    ((event, files),) = solve_remotely(data, list(shared), *shared.values(), probe=str(tmp_path / "missing"))
+    assert isinstance(event, RunFinished)
+    assert json.loads(files["summary.json"]) == event.summary
+    assert not (tmp_path / "elsewhere").exists()
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "sentence"),
+    [
+        ("missing.json", "missing.json is no scheduler file"),
+        ("tcp://127.0.0.1:9", "no Dask scheduler answers at tcp://127.0.0.1:9; start one"),
+    ],
+)
+def test_a_scheduler_that_is_not_there_is_refused(
+    scheduler: str,
+    sentence: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tetlux.cases.batch.cluster.PATIENCE", 1)
+    (tmp_path / "ball.yaml").write_text(BALL)
+    request = [str(tmp_path / "ball.yaml"), "--scheduler", scheduler, "--out", str(tmp_path / "out")]
+    assert main(["run", *request]) == 2
+    assert sentence in capsys.readouterr().err
+    assert not list((tmp_path / "out").glob("*/*"))

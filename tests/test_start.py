@@ -1,0 +1,66 @@
+"""What commands import, and whether the seconds of a run are those of its process."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import needs
+
+# Each takes a tenth of a second or more to import, alone or with what it needs.
+PICTURES = ("matplotlib", "pyvista", "vtkmodules")
+READERS = ("trimesh", "meshio", "PIL", "networkx", "lxml")
+SOLVERS = ("skfem", "pyamg", "pytetwild", "numba")
+CASE = """\
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+lights: [{pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 1}}]
+tolerance: 0.5
+"""
+
+
+def imported(code: str, names: tuple[str, ...], *arguments: str) -> list[str]:
+    """The modules of these names that a new process has imported after running some code."""
+    code = f"import sys\n{code}\nprint('IMPORTED', *(name for name in {names!r} if name in sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True)
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("IMPORTED")]
+    return line.split()[1:]
+
+
+def test_help_imports_nothing() -> None:
+    code = "from tetlux.cases.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit:\n    pass"
+    assert imported(code, ("numpy", "yaml", "pydantic", *PICTURES, *READERS, *SOLVERS)) == []
+
+
+def test_the_solver_imports_no_pictures_and_no_readers() -> None:
+    assert imported("import tetlux.fem", (*PICTURES, *READERS, *SOLVERS, "pydantic")) == []
+
+
+@needs("embreex")
+def test_a_run_imports_what_it_uses(tmp_path: Path) -> None:
+    code = "from tetlux.cases.cli import main\nassert main(['run', sys.argv[1], '--out', sys.argv[2]]) == 0"
+    unused = (*PICTURES, *READERS, "skfem", "pytetwild", "numba", "urllib.request", "tetlux.cases.picture.draw")
+    for outputs, names in (("[]", unused), ("[picture]", tuple(set(unused) - {"PIL", "tetlux.cases.picture.draw"}))):
+        (tmp_path / "case.yaml").write_text(CASE + f"outputs: {outputs}\n")
+        assert imported(code, names, str(tmp_path / "case.yaml"), str(tmp_path / "out")) == []
+
+
+@pytest.mark.parametrize("outputs", ["[]", "[surface, picture]"])
+def test_seconds_add_up_to_those_of_the_process(outputs: str, tmp_path: Path) -> None:
+    (tmp_path / "case.yaml").write_text(CASE + f"outputs: {outputs}\n")
+    command = [sys.executable, "-m", "tetlux", "run", str(tmp_path / "case.yaml"), "--out", str(tmp_path / "out")]
+    started = time.perf_counter()
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    whole = time.perf_counter() - started
+    seconds = json.loads((tmp_path / "out" / "case" / "summary.json").read_text())["seconds"]
+    total = seconds.pop("total")
+    assert sum(seconds.values()) == pytest.approx(total, abs=1e-3)
+    # Not counted are the start of Python itself and its end: measured 3 to 10 % of 1.5 to 12 s.
+    assert 0.75 * whole < total < whole
+    assert seconds["start"] > 0
+    lines = [line.split("s  ", 1)[1] for line in done.stdout.splitlines() if " s  " in line]
+    for beginning in ("read in", "meshed in", "written in"):
+        assert len([line for line in lines if line.startswith(beginning)]) == 1
