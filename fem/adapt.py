@@ -29,7 +29,6 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution, System
 from tetlux.meshing.arrays import IntArray
-from tetlux.meshing.boundary.layers import LayeredMesh
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
@@ -84,8 +83,7 @@ class Tolerances:
 
     def assess(self, steps: Sequence[MeshSolution], parents: IntArray | None = None) -> "Assessment":
         """Compare the errors of solutions on one mesh with the tolerances; see `LayeredMesh` for `parents`."""
-        if parents is None:
-            parents = np.arange(len(steps[0].solution.mesh.tetrahedra))
+        parents = np.arange(len(steps[0].solution.mesh.tetrahedra)) if parents is None else parents
         splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
@@ -270,7 +268,7 @@ def solve_and_refine(
         One for each scene, all on the same mesh.
     """
     # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
-    bodies = problem.scenes.bodies
+    bodies, surface, inner = problem.scenes.bodies, problem.scenes.surface, problem.scenes.inner
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
     deposits = [deposit for split in problem.lights for deposit in split.deposits] if most_tetrahedra > 0 else []
     sizes = deposits, tolerances.exitance or tolerances.readings or 0.02
@@ -287,11 +285,9 @@ def solve_and_refine(
         fine_enough = not found.splits.any()
         if not fine_enough and len(layered.mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                scenes = problem.scenes
-                finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
+                finer = refine_often(mesh, found.splits, surface, inner, most_tetrahedra)
                 finer_layered = with_layers(finer, *sizes)
             if len(finer_layered.mesh.tetrahedra) <= most_tetrahedra:
-                # A mesh with layers is no refinement of another one.
                 refines = layered.mesh is mesh and finer_layered.mesh is finer
                 mesh, layered, solve_on = finer, finer_layered, problem.solver_on(finer_layered.mesh)
                 steps = {scene: solve_on(scene, step if refines else None) for scene, step in steps.items()}
