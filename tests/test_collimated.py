@@ -186,7 +186,7 @@ def test_what_faces_the_light_but_is_hidden_gets_none(ring_mesh: TetMesh) -> Non
     assert without_shadows > 1.5 * SEEN
     bright = segments.fluxes > 1e-6 * segments.fluxes.max()
     entering, power = segments.starts[bright], segments.fluxes[bright]
-    # The inner side of the far half is hidden by the near one but for a hair at the top, where light passes over facets.
+    # The inner side of the far half is hidden by the near one but for a hair at the top, where light passes over.
     hidden = (np.hypot(*entering.T[:2]) < MAJOR - 0.1) & (entering[:, 0] < -0.5) & (np.abs(entering[:, 2]) < 1.6)
     assert power[hidden].sum() < 5e-3 * power.sum()
 
