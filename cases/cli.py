@@ -7,9 +7,12 @@ import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from tetlux.cases.start import mark_start
+
+if TYPE_CHECKING:
+    from tetlux.cases.batch.events import Listener
 
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
@@ -174,10 +177,14 @@ def _run(options: argparse.Namespace) -> int:
     from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.engine import run_batch  # noqa: PLC0415
     from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
-    from tetlux.cases.results.batch_tables import BatchTables  # noqa: PLC0415
+    from tetlux.cases.results.batch_tables import BatchTables, results_file  # noqa: PLC0415
     from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
     cases = load_all(options.cases)
+    listeners: list[Listener] = [choose_display(len(cases), quiet=options.quiet)]
+    # The summary of a single run says all that tables would, unless there are tables that it belongs into.
+    if len(cases) > 1 or results_file(options.out).path.exists():
+        listeners += [RunLogs(), BatchTables()]
     try:
         ended = run_batch(
             cases,
@@ -186,7 +193,7 @@ def _run(options: argparse.Namespace) -> int:
             resume=options.resume,
             scheduler=options.scheduler,
             cache=not options.no_cache,
-            listeners=[choose_display(len(cases), quiet=options.quiet), RunLogs(), BatchTables()],
+            listeners=listeners,
         )
     except RunError as error:
         return _report(str(error), 1)

@@ -151,7 +151,8 @@ def test_workers_find_what_one_process_finds_though_one_is_killed(finished: Path
 
     def kill_the_first(event: Event) -> None:
         events.append(event)
-        if isinstance(event, MeshFinished):
+        # Once: the mesh is adapted again if its worker was killed before it could hand it over.
+        if isinstance(event, MeshFinished) and sum(isinstance(each, MeshFinished) for each in events) == 1:
             own = subprocess.run(
                 ["pgrep", "-P", str(os.getpid()), "-f", "batch.worker 1 "], capture_output=True, check=True
             )
@@ -181,7 +182,7 @@ def test_a_killed_batch_is_resumed_with_the_same_results(finished: Path, tmp_pat
     expected = summaries(finished / "out")
     for name, summary in summaries(tmp_path / "results").items():
         assert summary["channels"] == expected[name]["channels"]
-    assert [path.name for path in (tmp_path / "results").iterdir()] == ["ball"]
+    assert not list((tmp_path / "results").glob(".*"))
 
 
 def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:

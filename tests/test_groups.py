@@ -128,5 +128,8 @@ def test_draws_from_groups_are_even() -> None:
     fine = quartered(box((10.0, 10.0, 10.0)), 5)
     samples = draw(cells_of(fine, constant(1.0)), np.random.default_rng(0))
     assert len(samples) == pytest.approx(4 * 600, rel=0.01)
+    # Groups are squares of .625, of four squares of triangles.
+    top = samples.points[samples.points[:, 2] > 4.999, :2] + 5.0
+    assert (top % 0.625 < 0.3125).all(axis=1).mean() == pytest.approx(0.25, abs=0.08)
     octants = (samples.points > 0).astype(int) @ np.array([4, 2, 1])
     assert np.bincount(octants) == pytest.approx(np.full(8, 300), rel=0.06)

@@ -14,6 +14,7 @@ from PIL import Image
 
 from tetlux.cases import load_result, load_results
 from tetlux.cases.batch.events import BatchEnded, BatchStarted, RunFailed, RunFinished
+from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.results.batch_tables import BatchTables
 from tetlux.cases.run import run_case
@@ -253,3 +254,20 @@ def test_what_holds_no_results_is_refused(tmp_path: Path) -> None:
     (tmp_path / "summary.json").write_text(json.dumps(summary_of("a", {})))
     with pytest.raises(InputError, match=r"holds no surface; run its case with outputs: \[surface\]"):
         _ = load_result(tmp_path).exitance
+
+
+def test_a_single_run_makes_no_table_and_joins_one(tmp_path: Path) -> None:
+    case = "surface: {box: {size: [10, 10, 10]}}\nmedium: {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}\n"
+    case += "lights: [{diffuse: {irradiance: 1}}]\noutputs: []\ntolerance: 0.5\n"
+    (tmp_path / "alone.yaml").write_text(case)
+    (tmp_path / "two.yaml").write_text(case + "sweep: {medium.eta: [1.3, 1.4]}\n")
+    out = tmp_path / "out"
+
+    def run(name: str) -> list[str]:
+        assert main(["run", str(tmp_path / name), "--out", str(out), "--jobs", "1", "--quiet"]) == 0
+        return sorted(path.name for path in out.iterdir())
+
+    assert run("alone.yaml") == ["alone"]
+    assert {"alone", "two", "results.csv", "index.html"} <= set(run("two.yaml"))
+    run("alone.yaml")
+    assert [row["case"] for row in rows(out / "results.csv")] == ["alone", "two", "two"]

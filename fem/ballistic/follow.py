@@ -25,7 +25,13 @@ NEGLIGIBLE_REFLECTION = 1e-6
 MOST_FACETS = 64
 
 
-def refract_and_follow(mesh: TetMesh, coefficients: Coefficients, arriving: Rays, normals: FloatArray) -> Deposit:
+def refract_and_follow(
+    mesh: TetMesh,
+    coefficients: Coefficients,
+    arriving: Rays,
+    normals: FloatArray,
+    facet_normals: FloatArray | None = None,
+) -> Deposit:
     """Refract rays that arrive at a mesh from outside, and follow them inside.
 
     Parameters
@@ -35,14 +41,16 @@ def refract_and_follow(mesh: TetMesh, coefficients: Coefficients, arriving: Rays
     arriving : Rays
         They start on the boundary of the mesh, each with the power that arrives there.
     normals : (r, 3) ndarray
-        Outward unit normals of the facets that they start on.
+        Outward unit normals of the facets that they start on, or of the curved surface that these stand for.
+    facet_normals : (r, 3) ndarray, optional
+        Those of the facets, if `normals` are of the curved surface.
 
     Returns
     -------
     Deposit
         Its ledger holds all of the incident power.
     """
-    refracted, specular = refract_in(arriving, normals, coefficients.outer.eta)
+    refracted, specular = refract_in(arriving, normals, coefficients.outer.eta, facet_normals)
     deposit = follow(mesh, coefficients, refracted)
     outside = Ledger(incident=float(arriving.powers.sum()), specular=specular)
     return replace(deposit, ledger=Ledger.merge([outside, deposit.ledger]))

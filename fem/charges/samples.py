@@ -160,8 +160,9 @@ def _cut_pieces(cells: Cells, spacing: Spacing, size: float) -> Cells:
         if small.all():
             break
         corners = bisect(rest[2][~small])
-        first, last, areas = (np.repeat(part[~small], 2) for part in (rest[0], rest[1], 0.5 * rest[4]))
-        middles = corners.mean(axis=1)
+        first, last = (np.repeat(part[~small], 2) for part in rest[:2])
+        middles: FloatArray = np.asarray(corners.mean(axis=1))
+        areas: FloatArray = np.asarray(np.repeat(0.5 * rest[4][~small], 2))
         rest = (first, last, corners, middles, areas, spacing(middles))
         whole = np.zeros(len(corners), dtype=bool)
     parts = [np.concatenate(part) for part in zip(*done, strict=True)]

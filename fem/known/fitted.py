@@ -198,7 +198,7 @@ def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | Non
     exitance, values = np.empty(len(points)), np.empty(len(points))
     new = np.arange(len(points))
     if known is not None:
-        distance, nearest = known.tree.query(points.points)
+        distance, nearest = (np.asarray(found) for found in known.tree.query(points.points))
         same = distance <= SAME * float(np.abs(points.points).max())
         # Two triangles may have a point in common and not its normal.
         same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from tests.benchmarks.readings import Scene, random_scene
+from tests.benchmarks.reading_scenes import Scene, random_scene
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, solve
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact_sphere
