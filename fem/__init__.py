@@ -23,7 +23,8 @@ from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
+from tetlux.fem.outcome.detectors import read
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading

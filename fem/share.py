@@ -10,7 +10,8 @@ from tetlux.fem.known.split import split_lights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.memory import limit_by_memory
-from tetlux.fem.outcome.detectors import Detector, place_detector
+from tetlux.fem.outcome.detector_kinds import Detector
+from tetlux.fem.outcome.detectors import place_detector
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.scenes import build_scenes
 from tetlux.fem.shared import SharedMesh

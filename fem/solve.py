@@ -13,7 +13,8 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
-from tetlux.fem.outcome.detectors import Detector, read_all
+from tetlux.fem.outcome.detector_kinds import Detector
+from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import Report, no_report, solve_each

@@ -17,7 +17,8 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memory
 from tetlux.fem.notes import notes_on, notes_on_fields, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
-from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, Detector, place_detector, read_all
+from tetlux.fem.outcome.detector_kinds import Detector
+from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.fields import error_of_field, use_quadratic_elements
 from tetlux.fem.outcome.solution import Solution

@@ -227,8 +227,8 @@ class System:
         loads = []
         for light, deposit in enumerate(split.remaining):
             on_mesh = self._scale_emission(deposit.evaluate_on(self.mesh, self.true_surface, self.coefficients))
-            known = light in split.owners or light in split.fitted
-            operator = self.layer_operator if on_mesh.terms.is_distributed and not known else self.plain
+            is_subtracted = light in split.owners or light in split.fitted
+            operator = self.layer_operator if on_mesh.terms.is_distributed and not is_subtracted else self.plain
             loads.append(load_of(on_mesh, operator))
         return loads
 

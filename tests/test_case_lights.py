@@ -15,7 +15,7 @@ from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture.arrows import light_rays
 from tetlux.fem import CollimatedBeam, DiffusePatch, Disc, Emission, EnvironmentLight, Gaussian, Rectangle
 from tetlux.fem import Image as ImageSpot
-from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector
+from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
 from tetlux.meshing import InputError, box
 
 CUBE = """\

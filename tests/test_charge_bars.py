@@ -8,7 +8,7 @@ from tetlux.fem import DiffuseLight, DiscDetector, Medium, PencilBeam, PointDete
 from tetlux.fem.exact import layered_ball
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.meshless import ChargeSolution
-from tetlux.fem.outcome.detectors import Detector
+from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.meshing import box, sphere
 from tetlux.meshing.arrays import FloatArray
 

@@ -12,7 +12,8 @@ from tests.conftest import TISSUE
 from tetlux.fem import Medium, Solution
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.fresnel import moments, reflectance
-from tetlux.fem.outcome.detectors import DiscDetector, FibreDetector, PointDetector, read
+from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
+from tetlux.fem.outcome.detectors import read
 from tetlux.fem.outcome.radiance import collected_share, radiance
 from tetlux.meshing import InputError, Surface, box
 from tetlux.meshing.arrays import FloatArray

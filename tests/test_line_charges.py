@@ -12,7 +12,7 @@ from tetlux.fem.exact import half_space, sphere_light
 from tetlux.fem.exact.beam import beam_source
 from tetlux.fem.known import beam_as_charges as lines
 from tetlux.fem.known.beam_as_charges import beam_as_charges
-from tetlux.fem.known.images import MOST_CHARGES
+from tetlux.fem.known.images import MOST_IMAGE_CHARGES
 from tetlux.fem.known.split import split_lights
 from tetlux.meshing import Surface, slab, sphere
 from tetlux.meshing.arrays import FloatArray
@@ -202,7 +202,7 @@ def test_beams_that_cannot_be_afforded_stay_on_the_mesh(ball: Surface) -> None:
     ]
     split = split_lights(beams, Body(ball, (FORWARD,)), "half-space")
     assert 5 < len(split.charges) < 20
-    assert sum(len(c.positions) for c in split.charges) <= MOST_CHARGES
+    assert sum(len(c.positions) for c in split.charges) <= MOST_IMAGE_CHARGES
     put = sum(float(c.strengths[: c.sources].sum()) for c in split.charges)
     put += sum(scattered(d, FORWARD) for d in split.remaining)
     assert put == pytest.approx(sum(scattered(b.deposit_in(Body(ball, (FORWARD,))), FORWARD) for b in beams), rel=1e-12)

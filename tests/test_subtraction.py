@@ -10,7 +10,7 @@ from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import half_space
 from tetlux.fem.known.charges import Charges
-from tetlux.fem.known.images import MOST_CHARGES, charges_of
+from tetlux.fem.known.images import MOST_IMAGE_CHARGES, charges_of
 from tetlux.fem.known.patch import Patch, _any_inside, _point_cells, patch_of
 from tetlux.fem.known.split import Subtract, split_lights
 from tetlux.fem.operators.assembly import Lumping
@@ -204,7 +204,7 @@ def test_lights_share_the_charges_that_can_be_afforded(ball: Surface) -> None:
         wide = PencilBeam((0.0, 0.0, 30.0), (0.0, 0.0, -1.0), radius=min(radius, 9.0))
         split = split_lights([point, wide], Body(ball, (TISSUE,)), "half-space")
         assert len(split.charges[0].positions) > 1
-        assert sum(len(c.positions) for c in split.charges) <= MOST_CHARGES
+        assert sum(len(c.positions) for c in split.charges) <= MOST_IMAGE_CHARGES
         assert sum(float(d.terms.powers.sum()) for d in split.remaining) + sum(
             float(c.strengths[: c.sources].sum()) for c in split.charges
         ) == pytest.approx(sum(float(d.terms.powers.sum()) for d in split.deposits))

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from tetlux.cases.file.channels import ALL
-from tetlux.cases.file.schema.lights import DetectorSpec
+from tetlux.cases.file.schema.detectors import DetectorSpec
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.outcome.detectors import Detector, DiscDetector, FibreDetector, PointDetector, read, read_all
+from tetlux.fem.outcome.detector_kinds import Detector
+from tetlux.fem.outcome.detectors import read, read_all
 from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
 from tetlux.meshing.surface.surface import Surface
 
@@ -37,14 +38,7 @@ def build_detector(spec: DetectorSpec, surface: Surface, medium: Medium) -> Name
     InputError
         If it does not lie on the surface, or a number is out of range.
     """
-    detector: Detector
-    if spec.point is not None:
-        detector = PointDetector(spec.point)
-    elif spec.disc:
-        detector = DiscDetector(spec.disc.center, spec.disc.radius)
-    else:
-        assert spec.fibre is not None
-        detector = FibreDetector(spec.fibre.center, spec.fibre.radius, spec.fibre.numerical_aperture)
+    detector = spec.detector()
     # Reading a dark field checks the position before anything is solved.
     read(detector, Dark(surface, medium))
     return NamedDetector(spec.name, spec.kind, detector)

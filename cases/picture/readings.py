@@ -22,7 +22,7 @@ def draw_readings(rows: Sequence[dict[str, Any]], lit: FloatArray, title: str, u
     Parameters
     ----------
     rows : sequence of dict
-        As `tetlux.cases.file.sensors.readings` returns them, of all lights together.
+        As `tetlux.cases.file.detectors.read_detectors` returns them, of all lights together.
     lit : (p, 3) ndarray
         Where the lights meet the body. If there are no such places, readings are drawn in the detectors' order.
     title, unit : str

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.file.schema.lights import CameraSpec
+from tetlux.cases.file.schema.camera import CameraSpec
 from tetlux.meshing.arrays import BoolArray, FloatArray, Vector
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.rays import RayCaster

@@ -181,14 +181,14 @@ def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
             # At the border of the patch the mesh holds all of the fluence.
-            known, residual = patch.at_nodes, patch.residual_at_nodes
+            subtracted, residual = patch.at_nodes, patch.residual_at_nodes
             if not patch.is_whole:
-                known, residual = known.copy(), residual.copy()
+                subtracted, residual = subtracted.copy(), residual.copy()
                 border = mesh.tetrahedra[~patch.cells]
-                known[border] = residual[border] = 0.0
-            remainder = remainder - known
+                subtracted[border] = residual[border] = 0.0
+            remainder = remainder - subtracted
             robin = boundary_condition_of(patch.charges.medium).robin
-            outward_flux[mesh.boundary_nodes] -= robin * known[mesh.boundary_nodes]
+            outward_flux[mesh.boundary_nodes] -= robin * subtracted[mesh.boundary_nodes]
             outward_flux += residual
     return remainder, outward_flux
 

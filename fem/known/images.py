@@ -18,7 +18,7 @@ CLEARANCE = 0.5
 # path, the fluence at that distance is used.
 CLOSEST = 0.02
 # More charges than this cost more than the tetrahedra that they save.
-MOST_CHARGES = 3000
+MOST_IMAGE_CHARGES = 3000
 
 
 def charges_of(
@@ -28,7 +28,7 @@ def charges_of(
     medium: Medium,
     *,
     images: bool | BoolArray,
-    most: int = MOST_CHARGES,
+    most: int = MOST_IMAGE_CHARGES,
     region: int | None = None,
     field: VaryingMedium | None = None,
 ) -> Charges | None:

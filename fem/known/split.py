@@ -11,7 +11,7 @@ from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.beam_as_charges import beam_as_charges
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted import FittedLight, fit_light
-from tetlux.fem.known.images import MOST_CHARGES, charges_of
+from tetlux.fem.known.images import MOST_IMAGE_CHARGES, charges_of
 from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
@@ -110,7 +110,7 @@ def split_lights(
     owners: list[int] = []
     remaining: list[Deposit] = []
     fitted: dict[int, FittedLight] = {}
-    left = 0 if subtract == "nothing" else MOST_CHARGES
+    left = 0 if subtract == "nothing" else MOST_IMAGE_CHARGES
     images = subtract in ("fitted", "half-space")
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 from tetlux.fem.media.fresnel import boundary_factor_classic, boundary_factor_exact
 from tetlux.fem.media.phase import PhaseFunction
@@ -70,8 +70,9 @@ class Medium:
                 raise InputError(f"{name} is {value:g}; a coefficient cannot be negative.", field=name)
         if not 0.1 <= self.eta <= 10:
             raise InputError(f"eta is {self.eta:g}; give a refractive index between 0.1 and 10.", field="eta")
-        if self.boundary not in ("exact", "classic"):
-            raise InputError(f'boundary is "{self.boundary}"; it is "exact" or "classic".', field="boundary")
+        if self.boundary not in get_args(BoundaryKind):
+            kinds = " or ".join(f'"{kind}"' for kind in get_args(BoundaryKind))
+            raise InputError(f'boundary is "{self.boundary}"; it is {kinds}.', field="boundary")
         self._check_scattering()
         if self.sigma_t_prime <= 0:
             raise InputError("the medium neither scatters nor absorbs; give a coefficient greater than 0.")

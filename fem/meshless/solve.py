@@ -176,7 +176,7 @@ def homogeneous_medium(medium: AnyMedium) -> Medium:
     Raises
     ------
     InputError
-        If it does.
+        If it varies.
     """
     if isinstance(medium, Medium):
         return medium

@@ -13,7 +13,8 @@ from tetlux.meshing.arrays import FloatArray, NumberArray
 class BoundaryCondition(Protocol):
     """A boundary condition ``E.n = robin phi - inflow``, with E.n the net flux that leaves the body.
 
-    All finite elements ask it for these factors; nothing else in `tetlux.fem` writes them.
+    All finite elements ask it for these factors. Only what has no mesh (`tetlux.fem.charges`, `tetlux.fem.exact`) and
+    the weak form that checks the matrices (`tetlux.fem.operators.forms`) compute them for themselves.
     """
 
     @property

@@ -75,7 +75,7 @@ class Assembly:
 
     def solver(self, model: Model, matrix: csr_array, expected_right_hand_sides: int) -> Solver:
         """A solver for the matrix of a model with one unknown; it takes the multigrid cycle of a similar one."""
-        known = next(
+        similar = next(
             (
                 cycle
                 for other, cycle in self.multigrid_cycles
@@ -83,8 +83,8 @@ class Assembly:
             ),
             None,
         )
-        solver = solver_for(matrix, expected_right_hand_sides, known)
-        if known is None and solver.cycle is not None:
+        solver = solver_for(matrix, expected_right_hand_sides, similar)
+        if similar is None and solver.cycle is not None:
             self.multigrid_cycles.append((model, solver.cycle))
         return solver
 

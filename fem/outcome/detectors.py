@@ -1,4 +1,4 @@
-"""Detectors on the surface: what they read of a solution."""
+"""Detectors on the surface: where they are, and what they read of a solution."""
 
 import math
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.inputs import as_vector
+from tetlux.fem.outcome.detector_kinds import Detector, DiscDetector, FibreDetector, PointDetector
 from tetlux.fem.outcome.exitance_field import ExitanceField, FieldWithErrors
 from tetlux.fem.outcome.radiance import collected_share
 from tetlux.fem.outcome.reading import Reading
@@ -30,85 +31,6 @@ SPOKES = 32
 # Most tetrahedra of a mesh that is read by quadratic elements; on larger ones these take a minute and gigabytes. Larger
 # meshes are read by linear elements, without an error.
 MOST_TETRAHEDRA_TO_READ = 400_000
-
-
-@dataclass(frozen=True)
-class PointDetector:
-    """Reads the exitance at one point.
-
-    Parameters
-    ----------
-    position : (3,) floats
-        Taken to the nearest point of the surface, unit.
-
-    Raises
-    ------
-    InputError
-        If a coordinate is not finite.
-    """
-
-    position: Vector
-
-    def __post_init__(self) -> None:
-        as_vector(self.position, "position")
-
-
-@dataclass(frozen=True)
-class DiscDetector:
-    """Reads the light that leaves through a flat disc at any angle.
-
-    Parameters
-    ----------
-    center : (3,) floats
-        Taken to the nearest point of the surface, unit; the disc is flat and touches the surface there.
-    radius : float
-        unit.
-
-    Raises
-    ------
-    InputError
-        If a coordinate is not finite or the radius not greater than 0.
-    """
-
-    center: Vector
-    radius: float
-
-    def __post_init__(self) -> None:
-        as_vector(self.center, "center")
-        if not math.isfinite(self.radius) or self.radius <= 0:
-            raise InputError(f"radius is {self.radius:g}; give a length greater than 0.")
-
-
-@dataclass(frozen=True)
-class FibreDetector(DiscDetector):
-    """Reads the light that a fibre at right angles to the surface collects.
-
-    Parameters
-    ----------
-    center : (3,) floats
-        Taken to the nearest point of the surface, unit.
-    radius : float
-        Of the fibre's core, unit.
-    numerical_aperture : float
-        Sine of the largest angle to the fibre that it accepts, in the outside medium: greater than 0, up to 1.
-
-    Raises
-    ------
-    InputError
-        If a coordinate is not finite, the radius not greater than 0 or the aperture out of range.
-    """
-
-    numerical_aperture: float
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 < self.numerical_aperture <= 1:
-            raise InputError(
-                f"numerical_aperture is {self.numerical_aperture:g}; it must be greater than 0 and at most 1."
-            )
-
-
-Detector = PointDetector | DiscDetector | FibreDetector
 
 
 def read(detector: Detector, solution: ExitanceField) -> Reading:
@@ -200,7 +122,8 @@ class PlacedDetector:
     Attributes
     ----------
     position, normal : (3,) floats
-        Its position on the surface, and the outward unit normal there.
+        Its position on the surface, and the outward unit normal there. Meshes are made fine towards it, the error of
+        ``model="charges"`` is that at it, and pictures measure the distance from the light to it.
     measurement : Measurement
         The points at which it reads.
     area : float or None

@@ -36,7 +36,7 @@ def solution_of_light(
     -------
     Solution
     """
-    known, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
+    deposited, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
     mesh, limited_power = operator.mesh, 0.0
     may_be_negative = load.has_first_moment or any(each.patch.charges.has_negative_source for each in subtractions)
     if limit and operator.model.nonnegative and not may_be_negative:
@@ -46,11 +46,11 @@ def solution_of_light(
     emitted = float((mesh.volumes * terms.emission).sum())
     absorbed = (operator.absorption_weights * fluence).sum().item()
     ledger = Power(
-        incident=known.incident + float(outside.sum()) + emitted,
-        specular=known.specular + float((outside - transmitted).sum()),
-        absorbed=known.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
+        incident=deposited.incident + float(outside.sum()) + emitted,
+        specular=deposited.specular + float((outside - transmitted).sum()),
+        absorbed=deposited.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
         exited=0.0,
-        ballistic=known.ballistic,
+        ballistic=deposited.ballistic,
         stored=operator.model.shift * (mesh.node_volumes @ fluence).item(),
     )
     solution = Solution(

@@ -120,9 +120,9 @@ class Solution:
         """Values at the points of the surface nearest to given points; nan where those are not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
-        known = values_on(self.surface.project(places[finite])[0])
-        values = np.full(len(places), np.nan, known.dtype)
-        values[finite] = known
+        found = values_on(self.surface.project(places[finite])[0])
+        values = np.full(len(places), np.nan, found.dtype)
+        values[finite] = found
         return values
 
     def exitance_on(self, queries: FloatArray) -> NumberArray:
@@ -175,24 +175,24 @@ class Solution:
     def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> NumberArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
         linear = (weights * self.fluence[nodes]).sum(axis=1)
-        known, guessed = np.zeros(len(points)), np.zeros(len(points))
+        subtracted, interpolated = np.zeros(len(points)), np.zeros(len(points))
         for patch in self.patches:
             inside = patch.cells[cells]
-            known[inside] += patch.charges.fluence(points[inside])
-            guessed[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
-        fluence = linear + (known - guessed)
+            subtracted[inside] += patch.charges.fluence(points[inside])
+            interpolated[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
+        fluence = linear + (subtracted - interpolated)
         if np.iscomplexobj(fluence):
             return np.asarray(fluence)
         # Where light fades within a tetrahedron, adding the difference may give a negative value; scaling by the ratio
         # cannot.
         below = (fluence < 0) & (linear >= 0)
-        shares = below & (known >= 0) & (guessed > 0)
-        fluence[shares] = linear[shares] * known[shares] / guessed[shares]
+        shares = below & (subtracted >= 0) & (interpolated > 0)
+        fluence[shares] = linear[shares] * subtracted[shares] / interpolated[shares]
         if any(isinstance(patch, FittedPatch) for patch in self.patches):
             # They may be below zero where they are off by more than there is light; beside a bright node the linear
             # function is far larger than either.
             rest = below & ~shares
-            fluence[rest] = np.minimum(linear[rest], np.abs(known[rest]))
+            fluence[rest] = np.minimum(linear[rest], np.abs(subtracted[rest]))
         return np.asarray(fluence)
 
     def fluence_at(self, points: FloatArray) -> NumberArray:

@@ -5,7 +5,9 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.file.schema.lights import CameraSpec, DetectorSpec, LightSpec
+from tetlux.cases.file.schema.camera import CameraSpec
+from tetlux.cases.file.schema.detectors import DetectorSpec
+from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Section, Vector3, shape_of
 from tetlux.cases.file.schema.sweep import SweepSpec

@@ -1,4 +1,4 @@
-"""The sections of the case file that describe lights, detectors and the camera."""
+"""The sections of the case file that describe lights."""
 
 from typing import Annotated, Literal, Self
 
@@ -7,24 +7,19 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.light_context import LightContext
 from tetlux.cases.file.schema.parts import Choice, Each, Encoding, Label, Length, Number, Section, Vector3
+from tetlux.cases.file.schema.spots import SpotSpec
 from tetlux.fem.inputs import check_positive
 from tetlux.fem.lights import (
     CollimatedBeam,
     DiffuseLight,
     DiffusePatch,
-    Disc,
     Emission,
     EnvironmentLight,
-    Gaussian,
-    Image,
     Light,
     PencilBeam,
     PointSource,
-    Rectangle,
 )
 from tetlux.meshing.errors import InputError
-
-AnySpot = Disc | Gaussian | Rectangle | Image
 
 
 class LightSection(Section):
@@ -101,54 +96,6 @@ class PatchSpec(LightSection):
         """See `LightSection`."""
         del context
         return DiffusePatch(self.center, self.radius, self.number("irradiance"))
-
-
-class DiscSpec(Section):
-    """A round spot, or a round patch of the surface."""
-
-    center: Vector3
-    radius: Length
-
-
-class RectangleSpec(Section):
-    """A uniform rectangular spot."""
-
-    center: Vector3
-    width: Length
-    height: Length
-    up: Vector3 = Field((0.0, 1.0, 0.0), description="the direction that is up on it, not along the beam")
-
-
-class ImageSpec(Section):
-    """A spot with the pattern of an image."""
-
-    file: str = Field(description="image file, relative to the case file")
-    center: Vector3
-    width: Length
-    up: Vector3 = Field((0.0, 1.0, 0.0), description="the direction that is up on it, not along the beam")
-    encoding: Encoding = "srgb"
-
-
-class SpotSpec(Choice):
-    """The cross-section of a beam."""
-
-    disc: DiscSpec | None = None
-    gaussian: DiscSpec | None = Field(None, description="exp(-2 r²/radius²)")
-    rectangle: RectangleSpec | None = None
-    image: ImageSpec | None = None
-
-    def spot(self, context: LightContext) -> AnySpot | None:
-        """Build the spot of one channel, or return None where its image is dark."""
-        if self.disc:
-            return Disc(self.disc.center, self.disc.radius)
-        if self.gaussian:
-            return Gaussian(self.gaussian.center, self.gaussian.radius)
-        if self.rectangle:
-            return Rectangle(**dict(self.rectangle))
-        assert self.image is not None
-        # `Image` itself refuses an image that is black in all channels.
-        pixels = context.pixels(self.image.file, self.image.encoding)
-        return None if pixels is None else Image(self.image.center, self.image.width, pixels, self.image.up)
 
 
 class CollimatedSpec(LightSection):
@@ -243,41 +190,3 @@ class LightSpec(Choice):
         section: LightSection = getattr(self, self.kind)
         here = section.in_channel(context.channel)
         return None if here is None else here.light(context)
-
-
-class FibreSpec(DiscSpec):
-    """An optical fibre whose end touches the surface."""
-
-    numerical_aperture: Number
-
-
-class DetectorSpec(Choice):
-    """A detector on the surface, see `tetlux.fem.outcome.detectors`."""
-
-    name: Label
-    point: Vector3 | None = None
-    disc: DiscSpec | None = None
-    fibre: FibreSpec | None = None
-
-
-class CameraSpec(Section):
-    """Where the surface is seen from: a position, or a direction by two angles."""
-
-    position: Vector3 | None = Field(
-        None, description="the picture is taken from this side; radiance towards it is written with the surface"
-    )
-    azimuth: Number | None = Field(
-        None, description="for the picture only: degrees about up, anticlockwise from the x axis as seen from above"
-    )
-    elevation: Annotated[float, Field(strict=True, ge=-90, le=90)] | None = Field(
-        None, description="degrees above the horizon, with azimuth; 20 if not given"
-    )
-
-    @model_validator(mode="after")
-    def _place_or_angles(self) -> "CameraSpec":
-        if (self.position is None) == (self.azimuth is None):
-            what = "neither" if self.position is None else "both"
-            raise PydanticCustomError("one_of", "give position or azimuth, not {what}", {"what": what})
-        if self.position is not None and self.elevation is not None:
-            raise PydanticCustomError("one_of", "elevation goes with azimuth; leave it out where position is given", {})
-        return self

@@ -1,6 +1,6 @@
 """The sections of the case file that describe media."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Discriminator, Field, Tag
 
@@ -16,6 +16,7 @@ from tetlux.cases.file.schema.parts import (
     Vector3,
     shape_of,
 )
+from tetlux.fem.media.medium import BoundaryKind
 
 
 class VolumeSpec(Section):
@@ -92,7 +93,7 @@ class MediumSpec(Section):
     sigma_s: Each | None = Field(None, description="scattering coefficient, 1/unit; with g or phase")
     g: Each | None = Field(None, description="mean cosine of the scattering angle; with sigma_s")
     phase: PhaseSpec | None = Field(None, description="phase function; with sigma_s, in place of g")
-    boundary: Literal["exact", "classic"] = "exact"
+    boundary: BoundaryKind = "exact"
 
 
 class MaterialSpec(Section):
