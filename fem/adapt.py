@@ -8,14 +8,7 @@ from threading import Timer
 import numpy as np
 
 from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
-from tetlux.fem.grading import (
-    LONGEST_EDGE,
-    LONGEST_IF_FITTED,
-    grade_between,
-    grade_mesh,
-    places_to_resolve,
-    with_layers,
-)
+from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
@@ -81,27 +74,26 @@ class Tolerances:
         """Whether quadratic elements are solved for on each mesh."""
         return self.readings is not None or len(self.fields) > 0
 
-    def assess(self, steps: Sequence[MeshSolution], parents: IntArray | None = None) -> "Assessment":
-        """Compare the errors of solutions on one mesh with the tolerances; see `LayeredMesh` for `parents`."""
-        parents = np.arange(len(steps[0].solution.mesh.tetrahedra)) if parents is None else parents
-        splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
+    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
+        """Compare the errors of solutions on one mesh with the tolerances."""
+        splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
             largest_ratio = error / self.exitance
-            splits += cells_to_split((step.estimate.sum_by(parents) for step in steps), self.exitance)
+            splits += cells_to_split((step.estimate for step in steps), self.exitance)
         if self.readings is not None:
             readings = [reading for step in steps for reading in self._read(step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
-            np.maximum.at(splits, parents, splits_for_readings(readings, self.readings, len(parents)))
+            splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
         for where, tolerance in self.fields.items():
             bands = [band for step in steps for band in _bands(step, where)]
             error = max((band.relative for band in bands), default=0.0)
             largest_ratio = max(largest_ratio, error / tolerance)
             summary += f", {FIELD_NAMES[where]} {error:.2%}"
-            np.maximum.at(splits, parents, splits_for_fields(bands, tolerance, len(parents)))
+            splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
         return Assessment(largest_ratio, splits, summary)
 
     def _read(self, step: MeshSolution) -> list[ReadingError]:
@@ -126,7 +118,7 @@ class Assessment:
     largest_error_ratio : float
         The largest ratio of an estimated error to its tolerance.
     splits : (m,) ndarray of int
-        How often to split each tetrahedron of the mesh without layers.
+        How often to split each tetrahedron.
     summary : str
         The errors, in a few words.
     """
@@ -268,29 +260,25 @@ def solve_and_refine(
         One for each scene, all on the same mesh.
     """
     # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
-    bodies, surface, inner = problem.scenes.bodies, problem.scenes.surface, problem.scenes.inner
+    bodies = problem.scenes.bodies
     first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
-    deposits = [deposit for split in problem.lights for deposit in split.deposits] if most_tetrahedra > 0 else []
-    sizes = deposits, tolerances.exitance or tolerances.readings or 0.02
-    layered = with_layers(mesh, *sizes)
-    solve_on = problem.solver_on(layered.mesh)
+    solve_on = problem.solver_on(mesh)
     steps = best_steps = {first: solve_on(first, None)}
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = tolerances.assess(list(steps.values()), layered.parents)
+            found = tolerances.assess(list(steps.values()))
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
-        report(f"solved on {len(layered.mesh.tetrahedra):,} tetrahedra: {found.summary}")
+        report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
         fine_enough = not found.splits.any()
-        if not fine_enough and len(layered.mesh.tetrahedra) < most_tetrahedra:
+        if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                finer = refine_often(mesh, found.splits, surface, inner, most_tetrahedra)
-                finer_layered = with_layers(finer, *sizes)
-            if len(finer_layered.mesh.tetrahedra) <= most_tetrahedra:
-                refines = layered.mesh is mesh and finer_layered.mesh is finer
-                mesh, layered, solve_on = finer, finer_layered, problem.solver_on(finer_layered.mesh)
-                steps = {scene: solve_on(scene, step if refines else None) for scene, step in steps.items()}
+                scenes = problem.scenes
+                finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
+            if len(finer.tetrahedra) <= most_tetrahedra:
+                mesh, solve_on = finer, problem.solver_on(finer)
+                steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.

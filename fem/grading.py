@@ -1,4 +1,4 @@
-"""The first mesh: fine enough near sources for its error to be estimated at all; and layers below lit surfaces."""
+"""The first mesh: fine enough near sources for its error to be estimated at all."""
 
 from collections.abc import Sequence
 
@@ -9,10 +9,8 @@ from scipy.spatial.distance import cdist
 from tetlux.fem.media.coefficients import AnyMedium, coefficients_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.boundary.layers import LayeredMesh, add_layers
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
@@ -31,15 +29,6 @@ LONGEST_EDGE = 1.0
 # Where charges are fitted the error needs no such edges, but values at nodes should show the light: 10 to 60 % more
 # nodes than the mesher's own.
 LONGEST_IF_FITTED = 1.5
-# Height of the first layer of tetrahedra below a lit surface at a tolerance of .02, in depths over which the light
-# fades to 1/e. The error is proportional to its square.
-FIRST_LAYER, AT_LAYER_TOLERANCE = 0.2, 0.02
-# Depth of all layers together, at least, in depths over which the light fades to 1/e.
-LAYERS_REACH = 3.0
-# A boundary node within this many times the spacing of the lit places, or within its longest edge, is lit.
-LIT_WITHIN = 2.0
-# How the height of the first layer grows with the distance from lit nodes.
-RISE = 0.15
 
 
 def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
@@ -113,44 +102,6 @@ def grade_mesh(
         if len(finer.tetrahedra) > most:
             return mesh
         mesh = finer
-
-
-def layer_sizes(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> tuple[FloatArray, FloatArray]:
-    """Height of the first layer below each boundary node, (b,), and least depth of all layers together, (b,), unit.
-
-    Around lit parts of the surface the height grows with the distance from them, until there is no room for layers.
-
-    Parameters
-    ----------
-    mesh : TetMesh
-    deposits : sequence of Deposit
-    tolerance : float
-        Wanted error of the exitance.
-    """
-    heights, least_depths = np.full(len(mesh.boundary_nodes), np.inf), np.zeros(len(mesh.boundary_nodes))
-    share = FIRST_LAYER * np.sqrt(tolerance / AT_LAYER_TOLERANCE)
-    reach = np.zeros(len(heights))
-    corners = mesh.boundary_triangles
-    np.maximum.at(reach, corners, longest_sides(mesh.boundary_points[corners])[:, None])
-    for hints in (deposit.hints for deposit in deposits):
-        if len(hints.lit) == 0:
-            continue
-        tree = cKDTree(hints.lit)
-        spacing = float(np.median(tree.query(hints.lit, k=[2])[0])) if len(hints.lit) > 1 else 0.0
-        distance, index = tree.query(mesh.boundary_points, workers=THREADS)
-        nearest = np.asarray(index)
-        beyond = np.maximum(distance - np.maximum(reach, LIT_WITHIN * spacing), 0.0)
-        heights = np.minimum(heights, share * hints.depths[nearest] + RISE * beyond)
-        lit = beyond == 0.0
-        least_depths[lit] = np.maximum(least_depths[lit], LAYERS_REACH * hints.depths[nearest[lit]])
-    return heights, least_depths
-
-
-def with_layers(mesh: TetMesh, deposits: Sequence[Deposit], tolerance: float) -> LayeredMesh:
-    """A mesh with layers of flat tetrahedra below lit parts of the surface; see `layer_sizes`."""
-    if not any(len(deposit.hints.lit) for deposit in deposits):
-        return LayeredMesh(mesh, np.arange(len(mesh.tetrahedra)))
-    return add_layers(mesh, *layer_sizes(mesh, deposits, tolerance))
 
 
 def grade_between(

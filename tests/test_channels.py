@@ -29,7 +29,7 @@ from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing import InputError, Surface, TetMesh, box, sphere
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets import cache as mesh_cache
 
 RED = Medium(sigma_a=0.01, sigma_s=4.0, g=0.75, eta=1.4)
@@ -84,7 +84,7 @@ def test_what_falls_on_a_mesh_is_worked_out_once(monkeypatch: pytest.MonkeyPatch
     worked: list[str] = []
     draw, look = CollimatedBeam._incident_rays, EnvironmentLight._illuminate
 
-    def counting_draw(light: CollimatedBeam, mesh: TetMesh) -> tuple[Rays, FloatArray, IntArray]:
+    def counting_draw(light: CollimatedBeam, mesh: TetMesh) -> tuple[Rays, FloatArray]:
         worked.append("beam")
         return draw(light, mesh)
 

@@ -38,26 +38,25 @@ def on_sphere(radius: float, gamma: FloatArray) -> FloatArray:
 def test_a_ball_in_a_beam_against_its_series(radius: float, given: tuple[float, float, float]) -> None:
     """Exitance within five degrees of 0, 90 and 180 degrees: single nodes ripple by some per cent as tetrahedra do.
 
-    Measured: .2 % at 0, .5 to 1.7 % at 90 degrees, and at 180 degrees, in the dark, .7 to 1.2 %, with radius 10 up to
-    4 %. The estimate was 1.05 to 1.35 times the error. Layers make it 3,500 nodes instead of 16,000 with radius 10.
+    Measured: .2 % at 0, .5 % at 90 degrees, and at 180 degrees, in the dark, .7 to 1.2 %, with radius 10 1.7 to 2.7 %.
+    The estimate was 1.25 to 1.35 times the error.
     """
     scene = lit_ball("", turbid(0.99, 1.0), radius=radius)
     solution = solve(scene.surface, scene.medium, [scene.light], tolerance=0.02)
     error = scene.error(solution)
     assert error <= 0.02
     assert 0.5 < solution.error_estimate / error < 3.0
-    for middle, expected, within in zip((0.0, 90.0, 180.0), given, (0.01, 0.03, 0.08), strict=True):
+    for middle, expected, within in zip((0.0, 90.0, 180.0), given, (0.01, 0.015, 0.05), strict=True):
         gamma = ring(middle)
         series = sphere_light.beam_exitance(scene.medium, radius=radius, gamma=gamma).mean()
         # The figure at the very point: over five degrees the mean differs by 1 % at most.
         assert series == pytest.approx(expected, rel=0.012)
-        allowed = within if radius == 10.0 else min(within, 0.03)
+        allowed = within if radius == 10.0 else min(within, 0.02)
         assert solution.exitance_at(on_sphere(radius, gamma)).mean() == pytest.approx(series, rel=allowed)
     total = sphere_light.beam_total(scene.medium, radius=radius)
     # Both are shares of what falls on the mesh, which is a little smaller than the ball.
     assert solution.power.exited / solution.power.incident == pytest.approx(total / (math.pi * radius**2), rel=5e-3)
     assert abs(solution.power.balance_error) < 1e-9
-    assert len(solution.mesh.points) < 5000
 
 
 # Radiative transfer by Monte Carlo: radius 5, sigma_a .01, sigma_s .99, g 0, n 1.3, unit irradiance, 6.4 million
@@ -154,15 +153,10 @@ def test_all_of_a_convex_bodys_lit_side_is_lit_and_nothing_else(
     segments = deposit.terms.segments
     facing = -mesh.surface.normals @ (np.array(direction) / np.linalg.norm(direction))
     lit = facing > 0
-    # A ball's facets get what falls on the ball, which is .7 % more than falls on them; measured .2 % less of that.
-    power = float(mesh.boundary_areas[lit] @ facing[lit])
-    assert deposit.ledger.incident == pytest.approx(power, rel=5e-3 if name == "ball" else 1e-5)
+    assert deposit.ledger.incident == pytest.approx(float(mesh.boundary_areas[lit] @ facing[lit]), rel=1e-5)
     # A ray starts on every lit facet, but for those nearly edge-on, and on no other.
     _, starts, _ = mesh.closest_boundary(segments.starts)
-    edge_on = 0.1 if name == "ball" else 1e-2
-    # Facets span .2 radians: measured, light starts on some that are turned away by .12.
-    assert facing[starts].min() > (-0.2 if name == "ball" else 0.0)
-    assert np.isin(np.flatnonzero(facing > edge_on), starts).mean() > (0.98 if name == "ball" else 0.9999)
+    assert set(np.flatnonzero(facing > 1e-2)) <= set(starts.tolist()) <= set(np.flatnonzero(lit))
 
 
 # A ring whose tube is four across; seen from the side it is a band of four by twelve with two half discs.
@@ -184,11 +178,10 @@ def test_what_faces_the_light_but_is_hidden_gets_none(ring_mesh: TetMesh) -> Non
     # Measured -.8 %: facets, and one ray each where they are half in the shadow.
     assert deposit.ledger.incident == pytest.approx(SEEN, rel=0.015)
     assert without_shadows > 1.5 * SEEN
-    bright = segments.fluxes > 1e-6 * segments.fluxes.max()
-    entering, power = segments.starts[bright], segments.fluxes[bright]
-    # The inner side of the far half is hidden by the near one but for a hair at the top, where light passes over.
-    hidden = (np.hypot(*entering.T[:2]) < MAJOR - 0.1) & (entering[:, 0] < -0.5) & (np.abs(entering[:, 2]) < 1.6)
-    assert power[hidden].sum() < 5e-3 * power.sum()
+    entering = segments.starts[segments.fluxes > 1e-6 * segments.fluxes.max()]
+    # The inner side of the far half is hidden by the near one but for a hair at the very top, where facets are.
+    hidden = (np.hypot(*entering.T[:2]) < MAJOR - 0.1) & (entering[:, 0] < -0.5) & (np.abs(entering[:, 2]) < 1.8)
+    assert not hidden.any()
 
 
 def passes(extinction: float) -> tuple[float, float]:
@@ -211,9 +204,9 @@ def test_behind_a_gap_arrives_what_has_passed_before_it(ring_mesh: TetMesh) -> N
     segments = deposit.terms.segments
     again = (np.hypot(*segments.starts.T[:2]) < MAJOR) & (segments.starts[:, 0] < 0)
     entering, leaving = passes(0.4)
-    # Measured 5 % and 10 %: at the rim, where ways are short, those through the facets are shorter still.
-    assert float(segments.fluxes[again].sum()) == pytest.approx(entering, rel=0.08)
-    assert deposit.ledger.ballistic == pytest.approx(leaving, rel=0.14)
+    # Measured 2 % of both, by the facets; 1 % with edges of .6.
+    assert float(segments.fluxes[again].sum()) == pytest.approx(entering, rel=0.04)
+    assert deposit.ledger.ballistic == pytest.approx(leaving, rel=0.04)
     out = deposit.ledger.absorbed + deposit.ledger.ballistic + deposit.ledger.specular
     scattered = segments.fluxes @ -np.expm1(-0.4 * segments.lengths) * 0.35 / 0.4
     assert out + scattered == pytest.approx(deposit.ledger.incident, rel=1e-9)

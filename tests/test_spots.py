@@ -110,15 +110,12 @@ def test_rays_lie_where_the_spot_is_bright_and_balance_about_its_middle() -> Non
 
 
 @pytest.mark.parametrize("name", ["disc", "noise", "bright quarter"])
-def test_a_facet_has_up_to_three_rays_from_the_middle_of_what_it_sees(name: str) -> None:
+def test_a_facet_has_one_ray_from_the_middle_of_what_it_sees(name: str) -> None:
     """However many parts of it were looked at: a finer mesh has more rays."""
     mesh, spot = MESHES["seven"], SPOTS[name]
-    rays, normals, facets = CollimatedBeam(DOWN, spot=spot)._incident_rays(mesh)
-    assert len(facets) == len(normals) == len(rays)
-    assert np.bincount(facets).max() <= 3
-    # On the facet that they are said to start on; a ray on its edge may be nearest to its neighbour.
-    assert (mesh.closest_boundary(rays.starts)[1] == facets).mean() > 0.9
-    assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (len(rays), 1)), abs=1e-12)
+    rays, normals = CollimatedBeam(DOWN, spot=spot)._incident_rays(mesh)
+    facets = mesh.closest_boundary(rays.starts)[1]
+    assert len(np.unique(facets)) == len(facets) == len(normals)
     assert (mesh.boundary_cells[facets] == rays.cells).all()
     assert rays.starts[:, 2] == pytest.approx(0.0, abs=1e-12)
     # Their moments are those of the spot, by a million points of it.

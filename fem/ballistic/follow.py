@@ -25,13 +25,7 @@ NEGLIGIBLE_REFLECTION = 1e-6
 MOST_FACETS = 64
 
 
-def refract_and_follow(
-    mesh: TetMesh,
-    coefficients: Coefficients,
-    arriving: Rays,
-    normals: FloatArray,
-    facet_normals: FloatArray | None = None,
-) -> Deposit:
+def refract_and_follow(mesh: TetMesh, coefficients: Coefficients, arriving: Rays, normals: FloatArray) -> Deposit:
     """Refract rays that arrive at a mesh from outside, and follow them inside.
 
     Parameters
@@ -41,16 +35,14 @@ def refract_and_follow(
     arriving : Rays
         They start on the boundary of the mesh, each with the power that arrives there.
     normals : (r, 3) ndarray
-        Outward unit normals of the facets that they start on, or of the curved surface that these stand for.
-    facet_normals : (r, 3) ndarray, optional
-        Those of the facets, if `normals` are of the curved surface.
+        Outward unit normals of the facets that they start on.
 
     Returns
     -------
     Deposit
         Its ledger holds all of the incident power.
     """
-    refracted, specular = refract_in(arriving, normals, coefficients.outer.eta, facet_normals)
+    refracted, specular = refract_in(arriving, normals, coefficients.outer.eta)
     deposit = follow(mesh, coefficients, refracted)
     outside = Ledger(incident=float(arriving.powers.sum()), specular=specular)
     return replace(deposit, ledger=Ledger.merge([outside, deposit.ledger]))

@@ -15,13 +15,8 @@ from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Cosine, at least, between a ray that enters through a facet and the facet's inward normal.
-LEAST_INWARDS = 0.02
 
-
-def refract_in(
-    rays: Rays, normals: FloatArray, eta: float, facet_normals: FloatArray | None = None
-) -> tuple[Rays, float]:
+def refract_in(rays: Rays, normals: FloatArray, eta: float) -> tuple[Rays, float]:
     """Refract rays that meet a surface from outside.
 
     Parameters
@@ -32,9 +27,6 @@ def refract_in(
         Outward unit normals where they start.
     eta : float
         Refractive index of the inside over that of the outside.
-    facet_normals : (r, 3) ndarray, optional
-        Of the facets on which they start, where `normals` are those of the curved surface. Light that grazes that may
-        meet a facet from behind: it goes on just below the facet.
 
     Returns
     -------
@@ -48,10 +40,6 @@ def refract_in(
     cosine_inside = np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / eta**2, 0.0))
     refracted = rays.directions / eta + (cosine / eta - cosine_inside)[:, None] * normals
     refracted /= np.linalg.norm(refracted, axis=1, keepdims=True)
-    if facet_normals is not None:
-        outwards = np.einsum("ij,ij->i", refracted, facet_normals)
-        refracted -= np.maximum(outwards + LEAST_INWARDS, 0.0)[:, None] * facet_normals
-        refracted /= np.linalg.norm(refracted, axis=1, keepdims=True)
     passes = reflected < 1.0
     specular = float(rays.powers @ reflected)
     return Rays(rays.starts, refracted, (1.0 - reflected) * rays.powers, rays.cells)[passes], specular

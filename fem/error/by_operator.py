@@ -7,7 +7,6 @@ import numpy as np
 from tetlux.fem.error.estimate import Estimate, estimate_error
 from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.solution import Solution, sum_solutions
-from tetlux.meshing.arrays import FloatArray, divide_or_zero
 from tetlux.meshing.surface.surface import Surface
 
 
@@ -47,7 +46,6 @@ def estimate_by_operator(
                 emission,
                 inner,
                 operator.fitting,
-                _fixed_share([loads[light] for light in own], [of_lights[light] for light in own]),
             )
         )
     return Estimate(
@@ -55,19 +53,3 @@ def estimate_by_operator(
         np.sum([each.power_indicators for each in estimates], axis=0),
         np.max([each.splits for each in estimates], axis=0),
     )
-
-
-def _fixed_share(loads: Sequence[Load], of_lights: Sequence[Solution]) -> float | FloatArray:
-    """The part of the light at each tetrahedron that does not come from beams, which start at the facets of a mesh."""
-    beams = [len(load.deposit.terms.segments) > 0 for load in loads]
-    pairs = list(zip(of_lights, beams, strict=True))
-    if not any(beams):
-        return 1.0
-    if all(beams):
-        return 0.0
-    corners = of_lights[0].mesh.tetrahedra
-    of_beams, others = (
-        sum(np.abs(solution.fluence)[corners].sum(axis=1) for solution, of_beam in pairs if of_beam == wanted)
-        for wanted in (True, False)
-    )
-    return np.asarray(divide_or_zero(others, of_beams + others))

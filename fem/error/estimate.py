@@ -34,7 +34,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
@@ -69,15 +69,6 @@ class Estimate:
         """Relative L2 error of the exitance over the surface."""
         return float(self.exitance_indicators.sum())
 
-    def sum_by(self, parents: IntArray) -> "Estimate":
-        """Add up the indicators of tetrahedra that have a common parent (m,)."""
-        splits = np.zeros(int(parents.max()) + 1, dtype=np.int64)
-        np.maximum.at(splits, parents, self.splits)
-        exitance, power = (
-            sum_by_index(parents, each, len(splits)) for each in (self.exitance_indicators, self.power_indicators)
-        )
-        return Estimate(exitance, power, splits)
-
     __repr__ = one_line
 
 
@@ -90,7 +81,6 @@ def estimate_error(
     emission: float | FloatArray = 0.0,
     inner: Sequence[Surface] = (),
     fitting: LayerFitting | None = None,
-    fixed_share: float | FloatArray = 1.0,
 ) -> Estimate:
     """Estimate the error of a solution, or of a part of one.
 
@@ -111,9 +101,6 @@ def estimate_error(
         Of the regions of the mesh.
     fitting : LayerFitting, optional
         Of the matrix.
-    fixed_share : float or (m,) ndarray
-        The part of the light in each tetrahedron whose sources stay where they are if a facet of the boundary moves;
-        beams start at the facets.
 
     Returns
     -------
@@ -148,7 +135,7 @@ def estimate_error(
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
         values = remainder, outward_flux, dual
         indicators += FACET_WEIGHT * boundary_facets(
-            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale * fixed_share
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale
         )
         indicators += interface_layers(mesh, coefficients, smooth, at_corners)
         return indicators + FACET_WEIGHT * interface_facets(

@@ -6,10 +6,9 @@ the nodes (Zienkiewicz & Zhu 1987), for the fluence and for the dual z alike::
     eta_K = D ∫_K |grad phi_h - R grad phi_h| |grad z_h - R grad z_h|
           + sigma_a ∫_K (lumping of phi_h z_h)  +  1/(2A) ∮ (lumping of phi_h z_h)
 
-Where power is deposited along the boundary, as by a broad beam, the exitance ripples from node to node with the height
-of tetrahedra over the boundary, which is that of regular ones with edges h. The ripple does not change the total exited
-power, and duals do not show it. It is proportional to the density q of the deposited power, and its square is
-integrated over the boundary::
+Where power is deposited along the boundary, as by a broad beam, the exitance ripples from node to node with the size h
+of tetrahedra. The ripple does not change the total exited power, and duals do not show it. It is proportional to the
+density q of the deposited power, and its square is integrated over the boundary::
 
     ripple² = RIPPLE_FACTOR² ∮ (h² q / (2A D))²
 """
@@ -88,8 +87,8 @@ def ripple_indicators(mesh: TetMesh, coefficients: Coefficients, load: FloatArra
     cells = mesh.boundary_cells
     # The least density at the four nodes: others may include a point source, or light through the boundary.
     density = (np.abs(load) / mesh.node_volumes)[mesh.tetrahedra[cells]].min(axis=1)
-    # The edge of a regular tetrahedron as high over the boundary, squared.
-    square = 1.5 * (3.0 * mesh.volumes[cells] / mesh.boundary_areas) ** 2
+    # The edge of a regular tetrahedron of this volume, squared.
+    square = (6.0 * np.sqrt(2.0) * mesh.volumes[cells]) ** (2.0 / 3.0)
     robin = boundary_condition_of(coefficients.outer).robin
     height = RIPPLE_FACTOR * square * density * robin / at_cells(coefficients.diffusion, cells)
     indicators = np.bincount(cells, mesh.boundary_areas * height**2, minlength=len(mesh.tetrahedra))

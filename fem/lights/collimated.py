@@ -9,25 +9,23 @@ from tetlux.fem.ballistic.rays import Rays
 from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import check_positive, unit_vector
 from tetlux.fem.lights.arrows import Arrows
-from tetlux.fem.lights.illumination import ENTRY_RAYS, illumination_hints
+from tetlux.fem.lights.illumination import ENTRY_RAYS, illumination_resolution
 from tetlux.fem.lights.spots import IMMUTABLE_SPOTS, Spot
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.spots.triangles import area_vectors, sample_spot, split_for_spot
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
-from tetlux.meshing.boundary.curved_facets import CurvedFacets
+from tetlux.fem.sources.hints import MeshHints
+from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import barycentric_on_triangles
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Entries, at most, at which the penetration depth is computed.
 DEPTH_SAMPLES = 64
-# Barycentric coordinates of the points of a facet at which light on the whole body is sampled: exact for quadratics.
-CORNER_RULE = np.array([[4.0, 1.0, 1.0], [1.0, 4.0, 1.0], [1.0, 1.0, 4.0]]) / 6.0
 # Arrows of light on the whole body in pictures.
 ARROWS = 3
 
@@ -87,7 +85,7 @@ class CollimatedBeam:
         depth = self._least_depth(body, entries)
         size = np.inf if self.spot is None else self.spot.reach
         return Deposit(
-            hints=illumination_hints(entries, depth, size),
+            hints=MeshHints(illumination_resolution(surface, depth, size), entries),
             footprint=Footprint(entries, radius=np.inf if self.spot is None else None),
             on_mesh=self,
         )
@@ -137,62 +135,45 @@ class CollimatedBeam:
         del surface
         if self.spot is None or isinstance(self.spot, IMMUTABLE_SPOTS):
             key = (type(self), tuple(self.direction), self.spot, self.from_center)
-            rays, normals, facets = mesh.cache.get(key, lambda: self._incident_rays(mesh))
+            rays, normals = mesh.cache.get(key, lambda: self._incident_rays(mesh))
         else:
-            rays, normals, facets = self._incident_rays(mesh)
+            rays, normals = self._incident_rays(mesh)
         arriving = replace(rays, powers=self.irradiance * rays.powers)
-        return refract_and_follow(mesh, coefficients, arriving, normals, mesh.surface.normals[facets])
+        return refract_and_follow(mesh, coefficients, arriving, normals)
 
-    def _incident_rays(self, mesh: TetMesh) -> tuple[Rays, FloatArray, IntArray]:
-        """Up to three rays for each illuminated facet of a mesh, with power at an irradiance of 1.
+    def _incident_rays(self, mesh: TetMesh) -> tuple[Rays, FloatArray]:
+        """One ray for each illuminated facet of a mesh, with its power at an irradiance of 1, and the normals (r, 3).
 
-        With one ray a facet, the error of the exitance is 25 % larger.
-
-        Returns
-        -------
-        rays : Rays
-        normals : (r, 3) ndarray
-            Of the curved surface that the facets stand for.
-        facets : (r,) ndarray
-            On which they start.
+        With three rays a facet, the error of the exitance is 5 % smaller and the computation takes twice as long.
         """
         direction = unit_vector(self.direction, "direction")
-        curved = CurvedFacets(mesh)
-        facets = np.flatnonzero((curved.normals @ direction < 0).any(axis=1))
+        normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
+        facets = np.flatnonzero(normals @ direction < 0)
         corners = mesh.points[mesh.boundary_faces[facets]]
-        if self.spot is None:
-            facets, weights = np.repeat(facets, 3), np.tile(CORNER_RULE, (len(facets), 1))
-            powers, reach = mesh.boundary_areas[facets] / 3.0, np.full(len(facets), np.inf)
-        else:
-            pieces, owners = split_for_spot(self.spot, corners, direction)
-            points, powers, reach = self._sample_pieces(self.spot, pieces, direction)
-            facets, weights = facets[owners], barycentric_on_triangles(points, corners[owners])
-        normals = curved.normals_at(facets, weights)
-        powers = powers * np.maximum(-normals @ direction, 0.0)
+        if self.spot is not None:
+            corners, owners = split_for_spot(self.spot, corners, direction)
+            facets = facets[owners]
+        points, powers, reach = self._sample_pieces(corners, direction)
         lit = np.flatnonzero((powers > 0) & (reach > 0))
-        facets, weights, normals, powers = facets[lit], weights[lit], normals[lit], powers[lit]
         # A piece is in shadow if the way back to the light meets another facet.
-        lifted = curved.points_at(facets, weights)
-        distances, _ = mesh.rays.first(lifted, np.broadcast_to(-direction, lifted.shape))
-        lit = np.flatnonzero(distances >= reach[lit])
-        # The power of all pieces near one corner of a facet starts at their centroid.
-        places, index = np.unique(3 * facets[lit] + weights[lit].argmax(axis=1), return_inverse=True)
-        total = sum_by_index(index, powers[lit], len(places))
-        starts, normals = (
-            np.column_stack([sum_by_index(index, powers[lit] * axis, len(places)) for axis in each[lit].T])
-            for each in (np.einsum("pc,pci->pi", weights, mesh.points[mesh.boundary_faces[facets]]), normals)
+        distances, _ = mesh.rays.first(points[lit], np.broadcast_to(-direction, (len(lit), 3)))
+        lit = lit[distances >= reach[lit]]
+        facets, places = np.unique(facets[lit], return_inverse=True)
+        total = sum_by_index(places, powers[lit], len(facets))
+        # The power of all pieces of a facet starts at their centroid.
+        starts = np.column_stack(
+            [sum_by_index(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T]
         )
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        facets = places // 3
         directions = np.broadcast_to(direction, starts.shape)
-        return Rays(starts / total[:, None], directions, total, mesh.boundary_cells[facets]), normals, facets
+        return Rays(starts, directions, total, mesh.boundary_cells[facets]), normals[facets]
 
-    def _sample_pieces(
-        self, spot: Spot, corners: FloatArray, direction: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Place, brightness times area, and distance that light has travelled, for pieces of facets (p, 3, 3)."""
-        points, brightness = sample_spot(spot, corners, direction)
+    def _sample_pieces(self, corners: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Place, power at an irradiance of 1, and distance that light has travelled, for pieces of facets (p, 3, 3)."""
+        projected_areas = -area_vectors(corners) @ direction
+        if self.spot is None:
+            return corners.mean(axis=1), projected_areas, np.full(len(corners), np.inf)
+        points, brightness = sample_spot(self.spot, corners, direction)
         reach = np.full(len(corners), np.inf)
         if self.from_center:
-            reach = (points - np.asarray(spot.center, dtype=float)) @ direction
-        return points, brightness * np.linalg.norm(area_vectors(corners), axis=1), reach
+            reach = (points - np.asarray(self.spot.center, dtype=float)) @ direction
+        return points, brightness * projected_areas, reach

@@ -10,12 +10,13 @@ from tetlux.fem.body.body import Body
 from tetlux.fem.inputs import as_vector, check_positive
 from tetlux.fem.lights.arrows import Arrows
 from tetlux.fem.lights.diffuse import diffuse_transmittance
-from tetlux.fem.lights.illumination import illumination_hints
+from tetlux.fem.lights.illumination import illumination_resolution
 from tetlux.fem.lights.spots.plane import sunflower
 from tetlux.fem.lights.spots.triangles import area_vectors, triangle_samples
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
+from tetlux.fem.sources.hints import MeshHints
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
@@ -77,9 +78,9 @@ class DiffusePatch:
         transmitted = diffuse_transmittance(body.outer, "a diffuse patch") * self.irradiance
         places = self._places(body.surface)
         depth = float(body.mean_free_paths(body.just_inside(places)).min())
-        hints = illumination_hints(places, depth, self.radius)
+        resolution = illumination_resolution(body.surface, depth, self.radius)
         on_mesh = PatchOnMesh(self.center, self.radius, self.irradiance, transmitted)
-        return Deposit(hints=hints, footprint=Footprint(places), on_mesh=on_mesh)
+        return Deposit(hints=MeshHints(resolution, places), footprint=Footprint(places), on_mesh=on_mesh)
 
     def arrows(self, surface: Surface) -> Arrows:
         """Draw a point at its center; see `HasArrows`."""

@@ -2,24 +2,22 @@
 
 import numpy as np
 
-from tetlux.fem.sources.hints import MeshHints
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface.surface import Surface
 
 # Rays that find where light on the whole body enters it.
 ENTRY_RAYS = 2000
 
 
-def illumination_hints(places: FloatArray, depth: float, size: float = np.inf) -> MeshHints:
-    """Hints for a mesh below an illuminated part of a surface.
+def illumination_resolution(surface: Surface, depth: float, size: float = np.inf) -> float:
+    """Length that a mesh has to resolve below an illuminated part of a surface.
 
-    The light fades over its penetration depth, which layers along the surface resolve. Along the surface, the mesh has
-    to resolve half the size of the part. In a part smaller than the penetration depth, scattering blurs what is finer
-    than that depth.
+    It is the penetration depth, but no finer than the spacing of `ENTRY_RAYS` places on the surface, between which the
+    mesh is not refined; and no coarser than half the size of the part. In a part smaller than the penetration depth,
+    scattering blurs what is finer than that depth.
 
     Parameters
     ----------
-    places : (e, 3) ndarray
-        Samples of the part, unit.
+    surface : Surface
     depth : float
         Penetration depth of the light, unit.
     size : float
@@ -27,8 +25,8 @@ def illumination_hints(places: FloatArray, depth: float, size: float = np.inf) -
 
     Returns
     -------
-    MeshHints
+    float
+        unit.
     """
-    return MeshHints(
-        resolution=0.5 * max(size, depth), places=places, lit=places, depths=np.full(len(places), float(depth))
-    )
+    spacing = surface.diagonal / np.sqrt(ENTRY_RAYS)
+    return float(min(max(depth, spacing), 0.5 * max(size, depth)))

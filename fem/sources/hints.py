@@ -5,14 +5,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tetlux.fem.sources.arrays import no_values, no_vectors
+from tetlux.fem.sources.arrays import no_vectors
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 
 
 @dataclass(frozen=True, eq=False)
 class MeshHints:
-    """The length that a mesh has to resolve near a light, and where; and where it needs layers along the surface.
+    """The length that a mesh has to resolve near a light, and where.
 
     Parameters
     ----------
@@ -20,25 +20,14 @@ class MeshHints:
         Length over which the fluence varies near the light, unit; inf if a mesh may be of any size there.
     places : (p, 3) ndarray
         Places near which the mesh has to be fine, besides the points of `SourceTerms`, unit.
-    lit : (l, 3) ndarray
-        Samples of the part of the surface below which light fades, unit: the mesh has layers of flat tetrahedra there.
-    depths : (l,) ndarray
-        Depth at which the light below each of `lit` has faded to 1/e, unit.
     """
 
     resolution: float = np.inf
     places: FloatArray = field(default_factory=no_vectors)
-    lit: FloatArray = field(default_factory=no_vectors)
-    depths: FloatArray = field(default_factory=no_values)
 
     @classmethod
     def merge(cls, parts: "Sequence[MeshHints]") -> "MeshHints":
         """Join the places of several parts, with the finest resolution."""
-        return cls(
-            resolution=min(part.resolution for part in parts),
-            places=np.vstack([part.places for part in parts]),
-            lit=np.vstack([part.lit for part in parts]),
-            depths=np.concatenate([part.depths for part in parts]),
-        )
+        return cls(resolution=min(part.resolution for part in parts), places=np.vstack([part.places for part in parts]))
 
     __repr__ = one_line

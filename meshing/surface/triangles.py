@@ -48,14 +48,3 @@ def barycentric_on_triangles(points: FloatArray, triangles: FloatArray) -> Float
     second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
     third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
     return np.column_stack([1.0 - second - third, second, third])
-
-
-def vertex_normals(points: FloatArray, faces: IntArray) -> FloatArray:
-    """Outward unit normals (n, 3) at points (n, 3), the corners of triangles (m, 3): exact on a sphere (Max 1999)."""
-    corners = points[faces]
-    first, second = corners[:, NEXT_CORNER] - corners, corners[:, NEXT_CORNER[NEXT_CORNER]] - corners
-    sizes = np.einsum("fci,fci->fc", first, first) * np.einsum("fci,fci->fc", second, second)
-    parts = np.cross(first, second) / sizes[:, :, None]
-    total = np.column_stack([sum_by_index(faces, parts[..., axis], len(points)) for axis in range(3)])
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.asarray(total / np.where(length > 0, length, 1.0))
