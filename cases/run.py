@@ -103,6 +103,7 @@ def run_case(
     Examples
     --------
     >>> import tempfile
+    >>> from dataclasses import replace
     >>> from tetlux.cases.file.load import load_cases
     >>> from tetlux.cases.shipped import find_case_file
     >>> (case,) = load_cases(find_case_file("sphere"))

@@ -19,6 +19,17 @@ BOX_FACES = np.array(
         [5, 7, 1], [3, 7, 2], [6, 4, 2], [2, 7, 6], [6, 5, 4], [7, 5, 6],
     ]
 )  # fmt: skip
+# Three golden rectangles of unit diagonals, each across the next.
+_SHORT, _LONG = np.sqrt((5.0 - np.sqrt(5.0)) / 10.0), np.sqrt((5.0 + np.sqrt(5.0)) / 10.0)
+_RECTANGLE = np.array([[x, y, 0.0] for y in (_LONG, -_LONG) for x in (-_SHORT, _SHORT)])
+ICOSAHEDRON_CORNERS = np.vstack([np.roll(_RECTANGLE, shift, axis=1) for shift in (0, 1, 2)])
+ICOSAHEDRON_FACES = np.array(
+    [
+        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
+        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
+        [8, 6, 7], [9, 8, 1],
+    ]
+)  # fmt: skip
 
 
 def _check_lengths(**lengths: float) -> None:
@@ -67,20 +78,7 @@ def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int
 
 def _icosphere(subdivisions: int) -> tuple[FloatArray, IntArray]:
     """An icosahedron whose triangles are split into four several times, with its points on the unit sphere."""
-    # One point opposite to the other, and between them two rings of five.
-    step = 0.4 * np.pi * np.arange(5)
-    height = np.sqrt(0.2)
-    rings = [
-        np.column_stack([2.0 * height * np.cos(angle), 2.0 * height * np.sin(angle), np.full(5, z)])
-        for angle, z in ((step, height), (step + 0.2 * np.pi, -height))
-    ]
-    points = np.vstack([[0.0, 0.0, 1.0], *rings, [0.0, 0.0, -1.0]])
-    upper = 1 + np.arange(5)
-    after = 1 + (np.arange(5) + 1) % 5
-    lower, lower_after = upper + 5, after + 5
-    top, bottom = np.zeros(5, dtype=np.int64), np.full(5, 11)
-    triangles = [(top, upper, after), (upper, lower, after), (lower, lower_after, after), (bottom, lower_after, lower)]
-    faces = np.vstack([np.column_stack(triangle) for triangle in triangles])
+    points, faces = ICOSAHEDRON_CORNERS, ICOSAHEDRON_FACES
     for _ in range(subdivisions):
         ends, edge = number_triangle_edges(faces)
         (a, b, c), (ab, bc, ca) = faces.T, edge.T + len(points)

@@ -12,7 +12,7 @@ import pytest
 import pyvista
 import trimesh
 
-from tetlux.cases import run as run_module
+from tetlux.cases import solve as solve_module
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.colours import LUMINANCE, preview, to_linear, to_srgb
 from tetlux.cases.file.detectors import read_detectors
@@ -67,7 +67,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
         return solved
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module, "solve_each", kept)
+        patch.setattr(solve_module, "solve_each", kept)
         target = run_case(case, folder / "out")
     summary = json.loads((target / "summary.json").read_text())
     return Finished(case, solved, target, summary, meshio.read(target / "surface.ply"))

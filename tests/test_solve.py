@@ -245,13 +245,16 @@ def test_a_mesh_too_coarse_or_of_another_unit_is_said(ball: Surface, ball_mesh: 
 
 
 def test_a_source_that_facets_move_is_said() -> None:
-    """A hundredth below a ball whose facets stand off by a sixth of that: 11 % wrong, and the estimate says 3."""
-    body, source = sphere(0.3), [PointSource((0.0, 0.0, 0.29))]
-    told = "a source 0.01 mm below the surface is 0.008[0-9]* below the mesh's facets"
+    """A hundredth below a ball, where its mesh's facets stand off most, by six tenths of that."""
+    body = sphere(0.3)
     mesh = tetrahedralize(body)
+    middles = mesh.points[mesh.boundary_faces].mean(axis=1)
+    radii = np.linalg.norm(middles, axis=1)
+    source = [PointSource(tuple(0.29 * middles[radii.argmin()] / radii.min()))]
+    told = r"a source 0\.0098 mm below the surface is 0\.00[345][0-9]* below the mesh's facets"
     coarse = solve(body, TISSUE, source, mesh=mesh, subtract="half-space")
     assert any(re.match(told, warning) for warning in coarse.warnings)
-    # Left to itself a run resolves it: 1.6 % wrong, estimated 1.3. Charges fitted to the surface see no facets: .03 %.
+    # Left to itself a run resolves it. Charges fitted to the surface see no facets.
     resolved = solve(body, TISSUE, source, subtract="half-space")
     fitted = solve(body, TISSUE, source, mesh=mesh)
     assert not any("the mesh's facets" in warning for warning in [*resolved.warnings, *fitted.warnings])
