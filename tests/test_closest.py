@@ -117,3 +117,13 @@ def test_memory_of_points_is_bounded_and_tells_points_apart(monkeypatch: pytest.
     same = Located()
     same.add(points[:3], points[:3], np.arange(3))
     assert same.find(points)[0].sum() == 1
+
+
+def test_rounding_does_not_choose_among_equally_close_triangles() -> None:
+    """Above the corner of a box, which several triangles share, at scales that round differently."""
+    cube = box((1.0, 1.0, 1.0))
+    at_corner = np.flatnonzero((np.abs(cube.points[cube.faces] - 0.5).sum(axis=2) < 1e-9).any(axis=1))
+    assert len(at_corner) > 2
+    for scale in (1.0, 1e-3, 0.3, 7.0, 1e3, 1.1e5):
+        _, faces = ClosestPoint(scale * cube.points, cube.faces)(scale * np.array([[0.7, 0.6, 0.9]]))
+        assert faces.tolist() == [at_corner[0]]

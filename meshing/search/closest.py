@@ -57,11 +57,16 @@ class ClosestPoint:
         faces = np.asarray(self._centres.query(places)[1], dtype=np.int64)
         reach = np.sqrt(self._squares(places, faces))
         for rows, candidates in self._candidates(places, reach):
+            if len(rows) == 0:
+                continue
             squares = self._squares(places[rows], candidates)
-            # By query and then by distance: the first of each query is its closest triangle.
-            order = np.lexsort((squares, rows))
-            first = order[np.flatnonzero(np.diff(rows, prepend=-1))]
-            faces[rows[first]] = candidates[first]
+            # Where triangles are equally close, as above a vertex, the first of them is taken, so that rounding does not decide.
+            first = np.flatnonzero(np.diff(rows, prepend=-1))
+            least = np.sqrt(np.minimum.reduceat(squares, first))
+            equal = (least * (1.0 + ROUNDING) + ROUNDING_OF_EXTENT * self._extent) ** 2
+            counts = np.diff(first, append=len(rows))
+            tied = np.where(squares <= np.repeat(equal, counts), candidates, len(self._triangles[1]))
+            faces[rows[first]] = np.minimum.reduceat(tied, first)
         offsets = _offsets_from_triangles(places.T, self._corners[:, :, faces])
         return places - offsets.T + self._middle, faces
 

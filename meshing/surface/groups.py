@@ -14,6 +14,8 @@ from tetlux.meshing.surface.triangles import longest_sides
 
 # Levels of the octree; what shares a cell of the finest one is a group of its own each below it.
 LEVELS = 12
+# Relative difference of lengths that count as equal.
+EQUAL = 1e-9
 # Triangles are cut until they are at most so many times longer than they are wide on average.
 LONGEST_PIECE = 3.0
 # No piece is shorter than this share of the longest side of all.
@@ -71,7 +73,7 @@ class TriangleGroups:
 def bisect(corners: FloatArray) -> FloatArray:
     """Cut triangles (f, 3, 3) in the middle of their longest sides, (2 f, 3, 3)."""
     sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-    turn = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    turn = (_largest(sides)[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(corners, turn[:, :, None], axis=1).transpose(1, 0, 2)
     middle = 0.5 * (a + b)
     return np.stack([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)], axis=1).reshape(-1, 3, 3)
@@ -153,7 +155,7 @@ def group_triangles(faces: IntArray, corners: FloatArray, areas: FloatArray) -> 
 def _keys(corners: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.uint64]]:
     """The axis of each normal, then the interleaved digits of the centroid's cell, (p,)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    axis = np.abs(normals).argmax(axis=1)
+    axis = _largest(np.abs(normals))
     kind = 2 * axis + (np.take_along_axis(normals, axis[:, None], axis=1)[:, 0] > 0)
     middles = corners.mean(axis=1)
     low = middles.min(axis=0)
@@ -164,6 +166,12 @@ def _keys(corners: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.uint64]]:
         for i in range(3):
             keys = (keys << np.uint64(1)) | ((cells[:, i] >> np.uint64(digit)) & np.uint64(1))
     return np.asarray(keys)
+
+
+def _largest(values: FloatArray) -> IntArray:
+    """The column of the largest of each row, (n,); the first of equal ones, so that rounding does not decide."""
+    most = values.max(axis=1, keepdims=True)
+    return np.asarray((values >= (1.0 - EQUAL) * most).argmax(axis=1))
 
 
 def _areas(corners: FloatArray) -> FloatArray:
