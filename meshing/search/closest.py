@@ -60,7 +60,7 @@ class ClosestPoint:
             if len(rows) == 0:
                 continue
             squares = self._squares(places[rows], candidates)
-            # Where triangles are equally close, as above a vertex, the first of them is taken, so that rounding does not decide.
+            # Of triangles that are equally close, as above a vertex, the first is taken: rounding does not decide.
             first = np.flatnonzero(np.diff(rows, prepend=-1))
             least = np.sqrt(np.minimum.reduceat(squares, first))
             equal = (least * (1.0 + ROUNDING) + ROUNDING_OF_EXTENT * self._extent) ** 2
