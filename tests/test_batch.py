@@ -16,16 +16,19 @@ import pytest
 from tetlux.cases.batch import workshop
 from tetlux.cases.batch.engine import run_batch, worker_count
 from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
+from tetlux.cases.batch.launch import Launcher
 from tetlux.cases.batch.requests import load_all
+from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.meshing.errors import InputError, RunError
 
+# A radius of its own: other tests, in other processes, may put another mesh of the same ball into the cache.
 BALL = """
 unit: mm
-surface: {sphere: {radius: 10}}
+surface: {sphere: {radius: 9.97}}
 medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
 lights:
   - pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 1.0}
@@ -197,6 +200,28 @@ def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
     assert b"finished cases are kept" in messages
     assert 1 <= len(summaries(tmp_path / "results")) < 60
     assert not list((tmp_path / "results").glob(".partial*"))
+
+
+def test_prepared_workers_are_used_or_ended() -> None:
+    with Launcher() as launcher:
+        launcher.prepare(2)
+        launcher.prepare(3)
+        taken = launcher.take("1", 2)
+        again = launcher.take("1", 2)
+        others = list(launcher._early.values())
+        assert len(others) == 1
+        for process in (taken, again):
+            process.kill()
+            process.communicate()
+    assert taken.pid != again.pid
+    assert [process.returncode for process in others] == [-signal.SIGKILL]
+
+
+def test_a_wrong_case_leaves_no_workers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "ball.yaml").write_text(BALL.replace("0.02]", "0.02, -1]"))
+    assert main(["run", str(tmp_path / "ball.yaml"), "--jobs", "2", "--out", str(tmp_path / "out")]) == 2
+    assert "sigma_a is -1" in capsys.readouterr().err
+    assert not subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "batch.worker"], capture_output=True).stdout
 
 
 def test_worker_counts() -> None:
