@@ -133,9 +133,8 @@ def _check_workers(client: Any, scheduler: str) -> None:
         python = ".".join(platform.python_version_tuple()[:2])
         return f"tetlux {tetlux.__version__} (numerics {NUMERICS}) on Python {python}"
 
-    for worker, versions in client.run(ask, on_error="return").items():
-        if isinstance(versions, BaseException):
-            versions = f"libraries that cannot be asked for their version ({type(versions).__name__})"
+    for worker, answer in client.run(ask, on_error="return").items():
+        versions = f"libraries that fail ({type(answer).__name__})" if isinstance(answer, BaseException) else answer
         if versions != own:
             raise InputError(f"the worker {worker} has {versions}, and here is {own}; install the same on both.")
 

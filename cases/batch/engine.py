@@ -50,8 +50,8 @@ def run_batch(
     out : Path
         Folder of all results.
     jobs : int, optional
-        How many worker processes. By default as many as the cores and the memory suffice for; with 1, or for few runs,
-        this process does the work.
+        How many worker processes, fewer if memory does not suffice. By default as many as there are cores; with 1, or
+        for few runs, this process does the work.
     resume : bool
         Whether runs that are finished in `out`, by their content, are kept as they are.
     scheduler : str, optional
@@ -122,12 +122,12 @@ def worker_count(jobs: int | None, runs: int) -> int:
     InputError
         If `jobs` is no positive number.
     """
+    affordable = int(available() / LEAST_MEMORY)
     if jobs is not None:
         if jobs < 1:
             raise InputError(f"--jobs is {jobs}; give the number of worker processes, 1 or more.")
-        return max(1, min(jobs, runs))
-    affordable = int(min(available() / LEAST_MEMORY, CORES))
-    return max(1, min(affordable, runs // FEWEST_RUNS_PER_WORKER))
+        return max(1, min(jobs, runs, affordable))
+    return max(1, min(affordable, CORES, runs // FEWEST_RUNS_PER_WORKER))
 
 
 def _run_here(batch: Batch, track: "_Track") -> None:
