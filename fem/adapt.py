@@ -7,21 +7,16 @@ from threading import Timer
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
-from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
-from tetlux.fem.quadratic.field_error import field_errors
-from tetlux.fem.quadratic.reading_error import ReadingError
-from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution, System
-from tetlux.meshing.arrays import IntArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
@@ -32,100 +27,10 @@ MOST_TETRAHEDRA = 1_000_000
 SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
 PROGRESS_AFTER_SECONDS = 8.0
-# How progress lines call errors of fields.
-FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
 
 Report = Callable[[str], None]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
 SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
-
-
-@dataclass(frozen=True, eq=False)
-class Tolerances:
-    """What a mesh is refined for: wanted errors.
-
-    Attributes
-    ----------
-    exitance : float, optional
-        Wanted relative L2 error of the exitance.
-    readings : float, optional
-        Wanted relative error of what each detector reads.
-    placed : tuple of PlacedDetector
-        The detectors.
-    everywhere, volume : float, optional
-        Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside: see
-        `tetlux.fem.quadratic.field_error`.
-    """
-
-    exitance: float | None
-    readings: float | None = None
-    placed: tuple[PlacedDetector, ...] = ()
-    everywhere: float | None = None
-    volume: float | None = None
-
-    @property
-    def fields(self) -> dict[Where, float]:
-        """Those of the exitance everywhere and of the fluence inside that are given."""
-        given: dict[Where, float | None] = {"surface": self.everywhere, "inside": self.volume}
-        return {where: tolerance for where, tolerance in given.items() if tolerance is not None}
-
-    @property
-    def need_quadratic(self) -> bool:
-        """Whether quadratic elements are solved for on each mesh."""
-        return self.readings is not None or len(self.fields) > 0
-
-    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
-        """Compare the errors of solutions on one mesh with the tolerances."""
-        splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
-        error = max(step.estimate.error for step in steps)
-        largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
-        if self.exitance is not None:
-            largest_ratio = error / self.exitance
-            splits += cells_to_split((step.estimate for step in steps), self.exitance)
-        if self.readings is not None:
-            readings = [reading for step in steps for reading in self._read(step)]
-            of_readings = max((reading.relative for reading in readings), default=0.0)
-            largest_ratio = max(largest_ratio, of_readings / self.readings)
-            summary += f", of readings {of_readings:.2%}"
-            splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
-        for where, tolerance in self.fields.items():
-            bands = [band for step in steps for band in _bands(step, where)]
-            error = max((band.relative for band in bands), default=0.0)
-            largest_ratio = max(largest_ratio, error / tolerance)
-            summary += f", {FIELD_NAMES[where]} {error:.2%}"
-            splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
-        return Assessment(largest_ratio, splits, summary)
-
-    def _read(self, step: MeshSolution) -> list[ReadingError]:
-        quadratic = step.solution.quadratic
-        assert quadratic is not None
-        parts = quadratic.prepare([placed.measurement for placed in self.placed])
-        return [estimate_reading(step.solution, measurement) for some in parts for measurement in some]
-
-
-def _bands(step: MeshSolution, where: Where) -> list[ReadingError]:
-    quadratic = step.solution.quadratic
-    assert quadratic is not None
-    return field_errors(quadratic, where)
-
-
-@dataclass(frozen=True, eq=False)
-class Assessment:
-    """How far solutions on one mesh are from the tolerances.
-
-    Attributes
-    ----------
-    largest_error_ratio : float
-        The largest ratio of an estimated error to its tolerance.
-    splits : (m,) ndarray of int
-        How often to split each tetrahedron.
-    summary : str
-        The errors, in a few words.
-    """
-
-    largest_error_ratio: float
-    splits: IntArray
-    summary: str
 
 
 @dataclass(frozen=True, eq=False)

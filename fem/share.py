@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from tetlux.fem.adapt import Problem, Tolerances, first_mesh
+from tetlux.fem.adapt import Problem, first_mesh
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.known.split import split_lights

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, Tolerances, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, solve_and_refine
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits

@@ -153,8 +153,10 @@ def test_a_process_that_may_not_have_more() -> None:
     done = subprocess.run([sys.executable, "-c", SHORT, "350000000"], capture_output=True, text=True, check=False)
     assert done.stderr == ""
     refused, stopped = done.stdout.splitlines()
-    # The check of the given mesh has left its tables of faces, which the solution would use too.
-    assert re.match(r"384,000 tetrahedra need about 0\.472 GB of memory, and 0\.[23]\d* GB", refused)
+    found = re.match(r"384,000 tetrahedra need about 0\.472 GB of memory, and (0\.\d+) GB are available", refused)
+    assert found is not None
+    # The check of the given mesh has left its tables of faces, and allocators keep more or less of what was freed.
+    assert 0.1 <= float(found[1]) <= 0.35
     # What the given mesh took may be free again.
     assert re.search(r"tetrahedra that 0\.[34]\d* GB of memory suffice for", stopped)
 

@@ -144,8 +144,8 @@ def test_spheres_of_all_sizes_share_one_shape() -> None:
     """A wide curved body and its images: nothing in it knows a length but the mean free path."""
     for scale in (1e-3, 1e3):
         medium = Medium(sigma_a=0.01 / scale, sigma_s_prime=1.0 / scale, eta=1.4)
-        charges = charged(scale * np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0 * scale), medium, images=True)
-        plain = charged(np.array([[0.0, 0.0, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
+        charges = charged(scale * np.array([[0.3, 0.2, 9.0]]), ONE, sphere(10.0 * scale), medium, images=True)
+        plain = charged(np.array([[0.3, 0.2, 9.0]]), ONE, sphere(10.0), TISSUE, images=True)
         np.testing.assert_allclose(charges.positions / scale, plain.positions, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(charges.strengths, plain.strengths, rtol=1e-9)
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.picture.rasterizer import gradients, visible_triangles
+from tetlux.cases.picture.rasterizer import Visible, gradients, visible_triangles
 from tetlux.cases.picture.stage import ARROW_OPACITY, FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage
 from tetlux.cases.picture.view import PANEL, Camera, caster_of
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
@@ -32,8 +32,8 @@ def draw_stage(stage: Stage) -> Image:
     image[:] = stage.background
     lit: BoolArray = np.zeros(len(image), dtype=bool)
     if len(arrows):
-        arrow = _by_pixel(visible_triangles(arrows, SIZE, closed=False, before=body.nearness).owner)
-        lit = np.asarray((arrow >= 0).any(axis=0))
+        lit_pixels, arrow = _visible_arrows(arrows, body)
+        lit[lit_pixels] = True
     plain = paint.is_even(owner) & ~lit
     pixels = np.flatnonzero(plain & (owner[0] >= 0))
     row, column = np.divmod(pixels, PANEL[0])
@@ -42,12 +42,27 @@ def draw_stage(stage: Stage) -> Image:
     mixed = np.flatnonzero(~plain & ~lit)
     image[mixed] = _paint_mixed(stage, paint, owner[:, mixed], mixed)
     if lit.any():
-        pixels = np.flatnonzero(lit)
-        under = _paint_samples(paint, owner[:, pixels], pixels, _ground(stage, len(pixels)))
-        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow[:, pixels], pixels, under)
-        share = np.where(owner[:, pixels] >= 0, ARROW_OPACITY, 1.0)[:, :, None]
-        image[pixels] = (under + share * (over - under)).mean(axis=0)
+        own = owner[:, lit_pixels]
+        under = _paint_samples(paint, own, lit_pixels, _ground(stage, len(lit_pixels)))
+        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow, lit_pixels, under)
+        share = np.where(own >= 0, ARROW_OPACITY, 1.0)[:, :, None]
+        image[lit_pixels] = (under + share * (over - under)).mean(axis=0)
     return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(PANEL[1], PANEL[0], 3)
+
+
+def _visible_arrows(arrows: FloatArray, body: Visible) -> tuple[IntArray, IntArray]:
+    """The pixels (n,) in which arrows (m, 3, 3) are visible, and the triangles at their samples, (samples, n)."""
+    corners = arrows[:, :, :2].reshape(-1, 2)
+    last = np.array(PANEL) - 1
+    low = np.clip(np.floor(corners.min(axis=0) / OVERSAMPLING).astype(np.int64), 0, last)
+    high = np.clip(np.floor(corners.max(axis=0) / OVERSAMPLING).astype(np.int64), 0, last) + 1
+    (left, top), (right, bottom) = OVERSAMPLING * low, OVERSAMPLING * high
+    shifted = arrows - np.array([left, top, 0.0])
+    before = body.nearness[top:bottom, left:right]
+    owner = _by_pixel(visible_triangles(shifted, (right - left, bottom - top), closed=False, before=before).owner)
+    seen = np.flatnonzero((owner >= 0).any(axis=0))
+    row, column = np.divmod(seen, int(high[0] - low[0]))
+    return (row + low[1]) * PANEL[0] + column + low[0], owner[:, seen]
 
 
 def _ground(stage: Stage, pixels: int) -> FloatArray:

@@ -104,8 +104,10 @@ def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingErr
 
 def read_all(detectors: Sequence[Detector], solution: ExitanceField) -> tuple[Reading, ...]:
     """`read` several detectors; this is faster than reading one after another."""
+    if not detectors:
+        return ()
     placed = [place_detector(detector, solution) for detector in detectors]
-    if isinstance(solution, FieldWithErrors) and placed:
+    if isinstance(solution, FieldWithErrors):
         errors = solution.errors_on(np.array([each.position for each in placed])).tolist()
         return tuple(_read(each, solution, error) for each, error in zip(placed, errors, strict=True))
     if not (isinstance(solution, Solution) and is_quadratic(solution)):
