@@ -127,7 +127,7 @@ def test_a_region_is_one_object_for_all_runs(tmp_path: Path) -> None:
     region = "regions: [{surface: {sphere: {radius: 2}}, medium: {sigma_a: 0.1, sigma_s_prime: 1.0, eta: 1.4}}]\n"
     cases = load(tmp_path, "{regions.0.medium.sigma_a: [0.1, 0.2], medium.sigma_a: [0.01, 0.02]}", CASE + region)
     assert len({id(case.regions[0].surface) for case in cases}) == 1
-    assert [case.regions[0].medium[0].sigma_a for case in cases] == [0.1, 0.1, 0.2, 0.2]
+    assert len({repr(case.regions[0].medium) for case in cases}) == 2
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import glob
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ def load_all(requests: Sequence[str], expect: Callable[[int], None] = lambda _: 
     cases: list[Case] = []
     for done, path in enumerate(paths, 1):
         others = len(cases) + len(paths) - done
-        cases += load_cases(path, files, lambda runs, others=others: expect(runs + others))
+        cases += load_cases(path, files, partial(_expect, expect, others))
     sources: dict[str, Path] = {}
     for case in cases:
         if case.name in sources:
@@ -51,6 +52,10 @@ def load_all(requests: Sequence[str], expect: Callable[[int], None] = lambda _: 
             )
         sources[case.name] = case.source
     return cases
+
+
+def _expect(expect: Callable[[int], None], others: int, runs: int) -> None:
+    expect(others + runs)
 
 
 def check_all(requests: Sequence[str], *, plan: bool = False) -> int:

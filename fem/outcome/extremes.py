@@ -12,7 +12,8 @@ from tetlux.meshing.surface.triangles import longest_sides
 # The brightest nodes, from which the largest value is climbed to; directions of a step; and lengths that are tried at
 # once, each half of the one before, the first the longest side of the facets around the node.
 PEAKS, DIRECTIONS, LENGTHS = 4, 8, 6
-MOST_STEPS = 40
+# A step that gains less than this share is the last.
+LEAST_GAIN, MOST_STEPS = 1e-3, 40
 
 # Copies of vertices that cannot be written to, whose nearest points a mesh keeps.
 _VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
@@ -68,7 +69,8 @@ def _climb(solution: Solution) -> FloatArray:
         bright = solution.exitance_on(found).reshape(len(climbing), LENGTHS * DIRECTIONS)
         best = bright.argmax(axis=1)
         row = np.arange(len(climbing)) * LENGTHS * DIRECTIONS + best
-        better = bright.max(axis=1) > values[climbing]
+        gains = bright.max(axis=1) - values[climbing]
+        better = gains > LEAST_GAIN * np.abs(values[climbing])
         moved = climbing[better]
         places[moved], normals[moved] = found[row[better]], found_normals[row[better]]
         values[moved] = bright.max(axis=1)[better]
