@@ -23,6 +23,7 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
 from tetlux.fem.solve_scenes import solve_each
+from tetlux.meshing import box
 from tetlux.meshing.errors import InputError, RunError
 
 # A radius of its own: other tests, in other processes, may put another mesh of the same ball into the cache.
@@ -95,6 +96,25 @@ def test_resume_keeps_what_is_finished_and_runs_what_has_changed(finished: Path,
         assert (ended.kept, ended.finished, ended.failed, ended.left) == (5, 1, 0, 0)
     finally:
         (finished / "moved").rename(finished / "out" / "ball")
+
+
+def test_resume_runs_again_what_has_another_case_or_surface(tmp_path: Path) -> None:
+    """Runs of the same names, whose case file, and then whose surface file, has changed."""
+    three = BALL.replace("{sphere: {radius: 9.97}}", "{file: body.obj}").replace(", 0.016, 0.018, 0.02]", "]")
+
+    def resume(text: str, side: float) -> tuple[int, int]:
+        cube = box((side, side, side))
+        lines = [" ".join(map(str, ("v", *point))) for point in cube.points.tolist()]
+        lines += [" ".join(map(str, ("f", *face))) for face in (cube.faces + 1).tolist()]
+        (tmp_path / "body.obj").write_text("\n".join(lines))
+        ended = run_batch(read(tmp_path, text), tmp_path / "out", jobs=1, resume=True)
+        return ended.kept, ended.finished
+
+    assert resume(three, 12.0) == (0, 3)
+    assert resume(three, 12.0) == (3, 0)
+    changed = three.replace("eta: 1.4", "eta: 1.3")
+    assert resume(changed, 12.0) == (0, 3)
+    assert resume(changed, 12.5) == (0, 3)
 
 
 def test_content_is_that_of_files_and_not_their_names(tmp_path: Path) -> None:

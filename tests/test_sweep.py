@@ -136,6 +136,7 @@ def test_a_region_is_one_object_for_all_runs(tmp_path: Path) -> None:
         ("{lights.0.pencil.origin.0: [0, 0.5, 11]}", "misses the body"),
         ("{lights.0.pencil.origin.2: [20, 9]}", "starts inside the body"),
         ("{surface.box.size.0: [20, 30], lights.0.pencil.origin.0: [0, 12]}", "misses the body"),
+        ("{surface.box.size.0: [20, 4], zip: {lights.0.pencil.origin.0: [5]}}", "misses the body"),
         ("{lights.0: [{diffuse: {irradiance: 1}}], medium.boundary: [exact, classic]}", 'needs the boundary "exact"'),
         ("{surface.box.size.0: [20, 3], regions: [[{surface: {sphere: {radius: 2}}, medium: {sigma_a: 0.1, "
          "sigma_s_prime: 1, eta: 1.4}}]]}", "region"),
