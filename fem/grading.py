@@ -78,8 +78,8 @@ def grade_mesh(
     most : int
         Largest number of tetrahedra; a refinement that would exceed it is not made.
     longest : float
-        Longest edge relative to the distance of the tetrahedron's middle from the nearest point, or to the resolution
-        there if that is larger.
+        Longest edge relative to the distance of the tetrahedron's middle from each point, or to the resolution there if
+        that is larger.
     inner : sequence of Surface
         Surfaces of the mesh's regions; new nodes on them are moved onto them.
 
@@ -89,13 +89,16 @@ def grade_mesh(
     """
     if len(points) == 0:
         return mesh
-    tree = cKDTree(points)
+    # Each place has to be resolved, also where one of another resolution is nearer.
+    trees = {finest: cKDTree(points[resolutions == finest]) for finest in np.unique(resolutions).tolist()}
     while True:
         long = np.flatnonzero(mesh.longest_edges > longest * resolutions.min())
         middles = mesh.points.take(mesh.tetrahedra[long], axis=0).mean(axis=1)
-        distance, nearest = tree.query(middles, workers=THREADS)
+        allowed = np.full(len(long), np.inf)
+        for finest, tree in trees.items():
+            allowed = np.minimum(allowed, np.maximum(tree.query(middles, workers=THREADS)[0], finest))
         marked = np.zeros(len(mesh.tetrahedra), dtype=bool)
-        marked[long] = mesh.longest_edges[long] > longest * np.maximum(distance, resolutions[nearest])
+        marked[long] = mesh.longest_edges[long] > longest * allowed
         if not marked.any():
             return mesh
         finer = refine(mesh, marked, surface, inner)

@@ -16,16 +16,20 @@ import pytest
 from tetlux.cases.batch import workshop
 from tetlux.cases.batch.engine import run_batch, worker_count
 from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
+from tetlux.cases.batch.launch import Launcher
 from tetlux.cases.batch.requests import load_all
+from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
 from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
 from tetlux.fem.solve_scenes import solve_each
+from tetlux.meshing import box
 from tetlux.meshing.errors import InputError, RunError
 
+# A radius of its own: other tests, in other processes, may put another mesh of the same ball into the cache.
 BALL = """
 unit: mm
-surface: {sphere: {radius: 10}}
+surface: {sphere: {radius: 9.97}}
 medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
 lights:
   - pencil: {origin: [0, 0, 20], direction: [0, 0, -1], power: 1.0}
@@ -92,6 +96,25 @@ def test_resume_keeps_what_is_finished_and_runs_what_has_changed(finished: Path,
         assert (ended.kept, ended.finished, ended.failed, ended.left) == (5, 1, 0, 0)
     finally:
         (finished / "moved").rename(finished / "out" / "ball")
+
+
+def test_resume_runs_again_what_has_another_case_or_surface(tmp_path: Path) -> None:
+    """Runs of the same names, whose case file, and then whose surface file, has changed."""
+    three = BALL.replace("{sphere: {radius: 9.97}}", "{file: body.obj}").replace(", 0.016, 0.018, 0.02]", "]")
+
+    def resume(text: str, side: float) -> tuple[int, int]:
+        cube = box((side, side, side))
+        lines = [" ".join(map(str, ("v", *point))) for point in cube.points.tolist()]
+        lines += [" ".join(map(str, ("f", *face))) for face in (cube.faces + 1).tolist()]
+        (tmp_path / "body.obj").write_text("\n".join(lines))
+        ended = run_batch(read(tmp_path, text), tmp_path / "out", jobs=1, resume=True)
+        return ended.kept, ended.finished
+
+    assert resume(three, 12.0) == (0, 3)
+    assert resume(three, 12.0) == (3, 0)
+    changed = three.replace("eta: 1.4", "eta: 1.3")
+    assert resume(changed, 12.0) == (0, 3)
+    assert resume(changed, 12.5) == (0, 3)
 
 
 def test_content_is_that_of_files_and_not_their_names(tmp_path: Path) -> None:
@@ -199,7 +222,32 @@ def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
     assert not list((tmp_path / "results").glob(".partial*"))
 
 
-def test_worker_counts() -> None:
+def test_prepared_workers_are_used_or_ended() -> None:
+    with Launcher() as launcher:
+        launcher.prepare(2)
+        launcher.prepare(3)
+        taken = launcher.take("1", 2)
+        again = launcher.take("1", 2)
+        others = list(launcher._early.values())
+        assert len(others) == 1
+        for process in (taken, again):
+            process.kill()
+            process.communicate()
+    assert taken.pid != again.pid
+    assert [process.returncode for process in others] == [-signal.SIGKILL]
+
+
+def test_a_wrong_case_leaves_no_workers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "ball.yaml").write_text(BALL.replace("0.02]", "0.02, -1]"))
+    assert main(["run", str(tmp_path / "ball.yaml"), "--jobs", "2", "--out", str(tmp_path / "out")]) == 2
+    assert "sigma_a is -1" in capsys.readouterr().err
+    left = subprocess.run(["pgrep", "-P", str(os.getpid()), "-f", "batch.worker"], capture_output=True, check=False)
+    assert not left.stdout
+
+
+def test_worker_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tetlux.cases.batch.engine.available", lambda: 9e9)
+    assert worker_count(1000, 10_000) == 18
     assert worker_count(1, 100) == 1
     assert worker_count(8, 3) == 3
     assert worker_count(None, 1) == 1

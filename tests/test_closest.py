@@ -127,3 +127,21 @@ def test_rounding_does_not_choose_among_equally_close_triangles() -> None:
     for scale in (1.0, 1e-3, 0.3, 7.0, 1e3, 1.1e5):
         _, faces = ClosestPoint(scale * cube.points, cube.faces)(scale * np.array([[0.7, 0.6, 0.9]]))
         assert faces.tolist() == [at_corner[0]]
+
+
+def test_points_of_all_tables_are_known() -> None:
+    known, rng = Located(), np.random.default_rng(3)
+    tables = [rng.normal(size=(count, 3)) for count in (400, 30, 3)]
+    for number, points in enumerate(tables):
+        known.add(points, 2.0 * points, np.full(len(points), number))
+    assert len(known._tables) == 3
+    points = np.vstack(tables)
+    found, nearest, faces = known.find(points)
+    assert found.all()
+    np.testing.assert_array_equal(nearest, 2.0 * points)
+    np.testing.assert_array_equal(faces, np.repeat([0, 1, 2], [400, 30, 3]))
+    for _ in range(100):
+        known.add(rng.normal(size=(30, 3)), np.zeros((30, 3)), np.zeros(30, np.int64))
+    assert len(known._tables) < 5
+    assert known.find(points)[0].all()
+    assert not known.find(points + 1.0)[0].any()

@@ -2,11 +2,14 @@
 
 import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,15 +49,15 @@ def start(*arguments: str) -> "subprocess.Popen[bytes]":
     )
 
 
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
-    """The scheduler file of a cluster of two workers, and one of these."""
-    file = str(tmp_path_factory.mktemp("dask") / "scheduler.json")
+@contextmanager
+def running(folder: Path, *, workers: int = 2, preload: str = "") -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
+    """The scheduler file of a cluster, and its first worker. Workers run some code before all else."""
+    file = str(folder / "scheduler.json")
     here = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file)
     processes = [start("distributed.cli.dask_scheduler", *here)]
-    for _ in range(2):
+    for _ in range(workers):
         own = ("--scheduler-file", file, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1")
-        processes.append(start("distributed.cli.dask_worker", *own))
+        processes.append(start("distributed.cli.dask_worker", *own, *(("--preload", preload) if preload else ())))
     while not Path(file).is_file():
         assert processes[0].poll() is None
         time.sleep(0.05)
@@ -64,6 +67,40 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "su
         for process in processes:
             process.kill()
             process.wait()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, "subprocess.Popen[bytes]"]]:
+    """The scheduler file of a cluster of two workers, and one of these."""
+    with running(tmp_path_factory.mktemp("dask")) as found:
+        yield found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("preload", "sentence"),
+    [
+        ("import tetlux; tetlux.__version__ = '0.0.1'", r"has tetlux 0\.0\.1 \(numerics \d+\) on Python"),
+        ("import sys; sys.modules['tetlux'] = None", r"has Python [\d.]+ without tetlux, and here is tetlux"),
+        (
+            "import tetlux.cases.write.content as content; content.NUMERICS = 0",
+            r"has tetlux [\d.]+\w* \(numerics 0\) on",
+        ),
+    ],
+)
+def test_workers_with_another_version_are_refused(
+    preload: str, sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "ball.yaml").write_text(BALL)
+    (tmp_path / "preload.py").write_text(preload)
+    with running(tmp_path, workers=1, preload=str(tmp_path / "preload.py")) as (file, _):
+        request = [str(tmp_path / "ball.yaml"), "--scheduler", file, "--out", str(tmp_path / "out")]
+        assert main(["run", *request]) == 2
+    errors = capsys.readouterr().err
+    assert re.search(sentence, errors)
+    assert errors.count("\n") == 1
+    assert "install the same on both" in errors
+    assert not list((tmp_path / "out").glob("*/*"))
 
 
 @pytest.mark.slow
@@ -100,6 +137,10 @@ def test_files_come_back_as_bytes_where_the_folder_is_not_shared(tmp_path: Path)
     [
         ("missing.json", "missing.json is no scheduler file"),
         ("tcp://127.0.0.1:9", "no Dask scheduler answers at tcp://127.0.0.1:9; start one"),
+        ("http://127.0.0.1:9", "no Dask scheduler answers at http://127.0.0.1:9; start one"),
+        ("tcp://127.0.0.1", "no Dask scheduler answers at tcp://127.0.0.1; start one"),
+        ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999; start one"),
+        ("tcp://nowhere.invalid:8786", "no Dask scheduler answers at tcp://nowhere.invalid:8786; start one"),
     ],
 )
 def test_a_scheduler_that_is_not_there_is_refused(
@@ -115,3 +156,14 @@ def test_a_scheduler_that_is_not_there_is_refused(
     assert main(["run", *request]) == 2
     assert sentence in capsys.readouterr().err
     assert not list((tmp_path / "out").glob("*/*"))
+
+
+def test_a_server_that_is_no_scheduler_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tetlux.cases.batch.cluster.PATIENCE", 0.2)
+    (tmp_path / "ball.yaml").write_text(BALL)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert main(["run", str(tmp_path / "ball.yaml"), "--scheduler", address, "--out", str(tmp_path / "out")]) == 2
+    assert f"no Dask scheduler answers at {address}; start one" in capsys.readouterr().err

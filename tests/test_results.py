@@ -210,6 +210,20 @@ def test_a_table_that_cannot_be_written_fails_in_one_sentence(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir() if "partial" in path.name] == []
 
 
+@pytest.mark.parametrize("name", ["results.csv", "readings.csv"])
+def test_a_table_of_something_else_is_not_replaced(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("time,voltage\n1,2\n")
+    with pytest.raises(InputError, match=rf"{name} is no table of tetlux; move it, or choose another folder"):
+        Batch(tmp_path, ["a/x=1"])
+    assert (tmp_path / name).read_text() == "time,voltage\n1,2\n"
+
+
+@pytest.mark.parametrize("begun", ["", "ru", "run,case\n"])
+def test_a_table_that_was_only_begun_is_replaced(begun: str, tmp_path: Path) -> None:
+    (tmp_path / "results.csv").write_text(begun)
+    Batch(tmp_path, ["a/x=1"]).end()
+
+
 def test_results_of_runs_are_loaded_as_arrays(tmp_path: Path) -> None:
     pytest.importorskip("pandas")
     (tmp_path / "box.yaml").write_text(

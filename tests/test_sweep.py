@@ -123,6 +123,30 @@ def test_a_surface_is_read_once_for_all_runs(tmp_path: Path) -> None:
     assert len({id(case.surface) for case in cases}) == 1
 
 
+def test_a_region_is_one_object_for_all_runs(tmp_path: Path) -> None:
+    region = "regions: [{surface: {sphere: {radius: 2}}, medium: {sigma_a: 0.1, sigma_s_prime: 1.0, eta: 1.4}}]\n"
+    cases = load(tmp_path, "{regions.0.medium.sigma_a: [0.1, 0.2], medium.sigma_a: [0.01, 0.02]}", CASE + region)
+    assert len({id(case.regions[0].surface) for case in cases}) == 1
+    assert len({repr(case.regions[0].medium) for case in cases}) == 2
+
+
+@pytest.mark.parametrize(
+    ("sweep", "sentence"),
+    [
+        ("{lights.0.pencil.origin.0: [0, 0.5, 11]}", "misses the body"),
+        ("{lights.0.pencil.origin.2: [20, 9]}", "starts inside the body"),
+        ("{surface.box.size.0: [20, 30], lights.0.pencil.origin.0: [0, 12]}", "misses the body"),
+        ("{surface.box.size.0: [20, 4], zip: {lights.0.pencil.origin.0: [5]}}", "misses the body"),
+        ("{lights.0: [{diffuse: {irradiance: 1}}], medium.boundary: [exact, classic]}", 'needs the boundary "exact"'),
+        ("{surface.box.size.0: [20, 3], regions: [[{surface: {sphere: {radius: 2}}, medium: {sigma_a: 0.1, "
+         "sigma_s_prime: 1, eta: 1.4}}]]}", "region"),
+    ],
+)  # fmt: skip
+def test_a_light_or_region_that_fits_the_first_run_only_is_refused(sweep: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=sentence):
+        load(tmp_path, sweep, CASE.replace("detectors: [{name: here, point: [10, 0, 0]}]\n", ""))
+
+
 @pytest.mark.parametrize(
     ("sweep", "sentence"),
     [

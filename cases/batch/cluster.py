@@ -5,6 +5,7 @@ writes into it; elsewhere files come back as bytes. Credentials and encryption a
 an open scheduler can run any code on its workers.
 """
 
+import json
 import logging
 import os
 import platform
@@ -31,6 +32,7 @@ from tetlux.meshing.errors import InputError, RunError
 
 # Seconds to wait for the scheduler, and for its first worker.
 PATIENCE = 10
+SCHEMES = ("tcp", "tls", "ws", "wss")
 INSTALL = "pip install 'tetlux[cluster]'"
 
 _Files = dict[str, bytes]
@@ -86,8 +88,9 @@ def connect(scheduler: str) -> Iterator[Any]:
         raise InputError(f"{scheduler} is no scheduler file; give that of dask scheduler, or tcp://host:port.")
     where: dict[str, Any] = {"scheduler_file": scheduler} if is_file else {"address": scheduler}
     try:
+        _check_answer(json.loads(Path(scheduler).read_text(encoding="utf-8"))["address"] if is_file else scheduler)
         client = Client(**where, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TypeError, TimeoutError) as error:
+    except (OSError, ValueError, TypeError, KeyError, TimeoutError) as error:
         raise InputError(
             f"no Dask scheduler answers at {scheduler}; start one with dask scheduler, or leave --scheduler out."
         ) from error
@@ -96,6 +99,18 @@ def connect(scheduler: str) -> Iterator[Any]:
         yield client
     finally:
         client.close(timeout=2)
+
+
+def _check_answer(address: str) -> None:
+    """Raise OSError or ValueError where no scheduler is: a client would wait for one for minutes."""
+    scheme, _, place = address.rpartition("://")
+    if scheme not in ("", *SCHEMES):
+        raise ValueError(scheme)
+    host, _, port = place.rpartition(":")
+    with socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE) as connection:
+        # A scheduler speaks first, unless the connection is encrypted.
+        if scheme in ("", "tcp") and not connection.recv(1):
+            raise OSError(f"{address} closes the connection")
 
 
 def _check_workers(client: Any, scheduler: str) -> None:
@@ -118,7 +133,8 @@ def _check_workers(client: Any, scheduler: str) -> None:
         python = ".".join(platform.python_version_tuple()[:2])
         return f"tetlux {tetlux.__version__} (numerics {NUMERICS}) on Python {python}"
 
-    for worker, versions in client.run(ask, on_error="return").items():
+    for worker, answer in client.run(ask, on_error="return").items():
+        versions = f"libraries that fail ({type(answer).__name__})" if isinstance(answer, BaseException) else answer
         if versions != own:
             raise InputError(f"the worker {worker} has {versions}, and here is {own}; install the same on both.")
 

@@ -11,6 +11,7 @@ from typing import Any
 from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, Listener, RunFailed, RunFinished
 from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.batch.jobs import MeshJob
+from tetlux.cases.batch.launch import Launcher
 from tetlux.cases.batch.mesh_store import MeshStore
 from tetlux.cases.batch.processes import run_in_processes
 from tetlux.cases.batch.schedule import Batch, Schedule
@@ -38,6 +39,7 @@ def run_batch(
     scheduler: str | None = None,
     cache: bool = True,
     listeners: Sequence[Listener] = (),
+    launcher: Launcher | None = None,
 ) -> BatchEnded:
     """Run cases, each into its own folder.
 
@@ -48,8 +50,8 @@ def run_batch(
     out : Path
         Folder of all results.
     jobs : int, optional
-        How many worker processes. By default as many as the cores and the memory suffice for; with 1, or for few runs,
-        this process does the work.
+        How many worker processes, fewer if memory does not suffice. By default as many as there are cores; with 1, or
+        for few runs, this process does the work.
     resume : bool
         Whether runs that are finished in `out`, by their content, are kept as they are.
     scheduler : str, optional
@@ -58,6 +60,8 @@ def run_batch(
         Whether meshes are looked up and kept in the user's cache directory.
     listeners : sequence of callable
         Are called with each event.
+    launcher : Launcher, optional
+        Has worker processes that have been started already.
 
     Returns
     -------
@@ -77,7 +81,7 @@ def run_batch(
     kept = _finished(cases, out, contents) if resume else {}
     plan = make_plan(cases)
     batch = Batch(plan, cases, frozenset(kept), str(out.absolute()), cache, MeshStore(out, plan, contents))
-    with _workers(scheduler, worker_count(jobs, len(cases) - len(kept))) as (workers, run_on):
+    with _workers(scheduler, worker_count(jobs, len(cases) - len(kept)), launcher) as (workers, run_on):
         track = _Track(len(cases), listeners)
         track(BatchStarted(plan.names, out, workers, tuple(str(case.source) for case in cases)))
         for run, summary in kept.items():
@@ -94,7 +98,9 @@ def run_batch(
 
 
 @contextmanager
-def _workers(scheduler: str | None, count: int) -> Iterator[tuple[int, Callable[[Batch, "_Track"], None]]]:
+def _workers(
+    scheduler: str | None, count: int, launcher: Launcher | None
+) -> Iterator[tuple[int, Callable[[Batch, "_Track"], None]]]:
     """How many runs are solved at a time, and what does a batch: a cluster, worker processes, or this process."""
     if scheduler is not None:
         from tetlux.cases.batch.cluster import connect, run_on_cluster  # noqa: PLC0415 - Dask takes half a second
@@ -102,7 +108,8 @@ def _workers(scheduler: str | None, count: int) -> Iterator[tuple[int, Callable[
         with connect(scheduler) as client:
             yield len(client.nthreads()), lambda batch, track: run_on_cluster(batch, client, track)
     elif count > 1:
-        yield count, lambda batch, track: run_in_processes(batch, count, track)
+        with launcher or Launcher() as used:
+            yield count, lambda batch, track: run_in_processes(batch, count, track, used)
     else:
         yield 1, _run_here
 
@@ -115,12 +122,12 @@ def worker_count(jobs: int | None, runs: int) -> int:
     InputError
         If `jobs` is no positive number.
     """
+    affordable = int(available() / LEAST_MEMORY)
     if jobs is not None:
         if jobs < 1:
             raise InputError(f"--jobs is {jobs}; give the number of worker processes, 1 or more.")
-        return max(1, min(jobs, runs))
-    affordable = int(min(available() / LEAST_MEMORY, CORES))
-    return max(1, min(affordable, runs // FEWEST_RUNS_PER_WORKER))
+        return max(1, min(jobs, runs, affordable))
+    return max(1, min(affordable, CORES, runs // FEWEST_RUNS_PER_WORKER))
 
 
 def _run_here(batch: Batch, track: "_Track") -> None:

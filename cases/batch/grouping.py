@@ -14,7 +14,7 @@ from tetlux.meshing.mesher.cache import mesh_key
 # Fewer runs than this share no mesh: adapting one takes as long as a run or more.
 FEWEST_TO_SHARE = 4
 # A mesh is adapted for one run in so many, at most for MOST_PILOTS.
-RUNS_PER_PILOT, MOST_PILOTS = 16, 6
+RUNS_PER_PILOT, MOST_PILOTS = 16, 3
 # Runs of a task, at most; fewer if there would be fewer than FEWEST_TASKS.
 MOST_RUNS_OF_TASK, FEWEST_TASKS = 50, 64
 # Lights that a task has in all of its media.

@@ -1,37 +1,20 @@
 """Worker processes on this machine: started, given jobs, replaced when they die, and stopped."""
 
 import contextlib
-import os
 import queue
 import signal
 import subprocess
-import sys
 import threading
 from dataclasses import dataclass, field
 from typing import IO, Any
 
 from tetlux.cases.batch.events import Event, Listener, RunFailed, RunFinished, RunStarted, WorkerLost
 from tetlux.cases.batch.jobs import Job, JobEnded, MeshJob, MeshMade, MeshNotMade, SolveJob, StopAfterRun
+from tetlux.cases.batch.launch import Launcher, worker_names
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.batch.wire import Sender, receive
 from tetlux.meshing.errors import RunError
-from tetlux.meshing.host.blocks import THREADS_VARIABLE
 
-# Libraries read these when they are imported. Each worker has one thread, as many workers as there are cores.
-THREAD_LIMITS = dict.fromkeys(
-    (
-        THREADS_VARIABLE,
-        "OMP_NUM_THREADS",
-        "OPENBLAS_NUM_THREADS",
-        "MKL_NUM_THREADS",
-        "BLIS_NUM_THREADS",
-        "VECLIB_MAXIMUM_THREADS",
-        "NUMBA_NUM_THREADS",
-        "NUMEXPR_NUM_THREADS",
-        "VTK_SMP_MAX_THREADS",
-    ),
-    "1",
-)
 # Workers that die before they have answered anything: there is something wrong with the machine, not with a run.
 MOST_DEATHS_AT_START = 3
 
@@ -55,7 +38,7 @@ class _Gone:
     """A worker's answers have ended."""
 
 
-def run_in_processes(batch: Batch, count: int, listener: Listener) -> None:
+def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Launcher) -> None:
     """Do a batch in worker processes.
 
     Parameters
@@ -65,6 +48,7 @@ def run_in_processes(batch: Batch, count: int, listener: Listener) -> None:
         How many.
     listener : callable
         Is called with each event, in this thread.
+    launcher : Launcher
 
     Raises
     ------
@@ -73,7 +57,7 @@ def run_in_processes(batch: Batch, count: int, listener: Listener) -> None:
     KeyboardInterrupt
         On Ctrl-C, when the runs in flight have ended; at the second one at once.
     """
-    pool = _Pool(batch, count, listener)
+    pool = _Pool(batch, count, listener, launcher)
     try:
         pool.work()
     finally:
@@ -81,8 +65,10 @@ def run_in_processes(batch: Batch, count: int, listener: Listener) -> None:
 
 
 class _Pool:
-    def __init__(self, batch: Batch, count: int, listener: Listener) -> None:
+    def __init__(self, batch: Batch, count: int, listener: Listener, launcher: Launcher) -> None:
         self._schedule, self._listener, self._count = Schedule(batch), listener, count
+        self._launcher = launcher
+        launcher.prepare(count)
         self._answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
         self._workers: list[_Worker] = []
         self._deaths_at_start = 0
@@ -139,16 +125,8 @@ class _Pool:
 
     def _start(self) -> _Worker:
         taken = {worker.name for worker in self._workers}
-        name = next(name for name in map(str, range(1, self._count + 1)) if name not in taken)
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "tetlux.cases.batch.worker", name, str(self._count), str(os.getpid())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            env={**os.environ, **THREAD_LIMITS},
-            # Ctrl-C is for this process, which then asks them to stop.
-            start_new_session=True,
-        )
+        name = next(name for name in worker_names(self._count) if name not in taken)
+        process = self._launcher.take(name, self._count)
         assert process.stdin is not None
         assert process.stdout is not None
         worker = _Worker(name, process, Sender(process.stdin))

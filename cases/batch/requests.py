@@ -2,7 +2,8 @@
 
 import glob
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,13 +17,15 @@ from tetlux.cases.shipped import find_case_files
 from tetlux.meshing.errors import InputError
 
 
-def load_all(requests: Sequence[str]) -> list[Case]:
+def load_all(requests: Sequence[str], expect: Callable[[int], None] = lambda _: None) -> list[Case]:
     """Read all case files and check that their cases have different names.
 
     Parameters
     ----------
     requests : sequence of str
         Case files, patterns of them, or names of those that ship.
+    expect : callable
+        Called with numbers of runs of which there will be at least so many, before they have been checked.
 
     Returns
     -------
@@ -35,7 +38,10 @@ def load_all(requests: Sequence[str]) -> list[Case]:
     """
     files = FilesRead()
     paths = [path for request in requests for path in find_case_files(request)]
-    cases = [case for path in paths for case in load_cases(path, files)]
+    cases: list[Case] = []
+    for done, path in enumerate(paths, 1):
+        others = len(cases) + len(paths) - done
+        cases += load_cases(path, files, partial(_expect, expect, others))
     sources: dict[str, Path] = {}
     for case in cases:
         if case.name in sources:
@@ -46,6 +52,10 @@ def load_all(requests: Sequence[str]) -> list[Case]:
             )
         sources[case.name] = case.source
     return cases
+
+
+def _expect(expect: Callable[[int], None], others: int, runs: int) -> None:
+    expect(others + runs)
 
 
 def check_all(requests: Sequence[str], *, plan: bool = False) -> int:

@@ -11,7 +11,7 @@ from tetlux.cases.batch.plan import Plan, PlannedMesh, PlannedTask
 from tetlux.cases.file.case import Case
 
 # A mesh is graded for the lights of so many runs at most.
-MOST_GRADED = 200
+MOST_GRADED = 60
 # A run whose worker died so often is taken to be the reason.
 MOST_DEATHS = 2
 

@@ -1,7 +1,7 @@
 """The body of a case with its media, built from the case file: a surface and regions, or a mesh and labels."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from tetlux.cases.file.channels import check_unique_names
@@ -49,6 +49,12 @@ class CaseBody:
     regions: tuple[Region, ...] = ()
     mesh: TetMesh | None = None
     by_label: tuple[MediaByLabel, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Ids of its surfaces, or of its mesh, which runs of the same shape share."""
+        parts = (self.surface, *(region.surface for region in self.regions)) if self.mesh is None else (self.mesh,)
+        return tuple(map(id, parts))
 
     @cached_property
     def bodies(self) -> list[Body]:
@@ -100,14 +106,18 @@ def _read_regions(
     for i, region in enumerate(spec.regions):
         key: Key = ("regions", i)
         with document.at((*key, "surface")):
-            inner = replace(reader.surface(region.surface, spec.unit), name=names[i])
+            inner = reader.region(region.surface, spec.unit, names[i])
         own = read_media(document, (*key, "medium"), region.medium, inner.points, inner.unit, len(media), reader)
         with document.at((*key, "medium")):
             for outside, inside in zip(media, own, strict=True):
                 check_compatible((outside, inside))
         regions.append(Region(inner, own))
-    with document.at(("regions",)):
-        check_regions(surface, [region.surface for region in regions])
+    inner_surfaces = [region.surface for region in regions]
+    body = (id(surface), *map(id, inner_surfaces))
+    if body not in reader.files.nested:
+        with document.at(("regions",)):
+            check_regions(surface, inner_surfaces)
+        reader.files.nested.add(body)
     return names, tuple(regions)
 
 

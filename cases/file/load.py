@@ -1,7 +1,7 @@
 """`load_cases`: from a case file to its runs, with all that can be checked before meshing."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from tetlux.cases.compare.comparison import Comparison
 
 
-def load_cases(path: Path, files: FilesRead | None = None) -> list[Case]:
+def load_cases(
+    path: Path, files: FilesRead | None = None, expect: Callable[[int], None] = lambda _: None
+) -> list[Case]:
     """Read a case file and check all that can be checked before meshing.
 
     That is keys and values, surfaces, the size of the body in mean free paths, and that lights meet the body.
@@ -43,6 +45,8 @@ def load_cases(path: Path, files: FilesRead | None = None) -> list[Case]:
     path : Path
     files : FilesRead, optional
         What other case files have read already; what this one reads is added to it.
+    expect : callable
+        Called with the number of runs, before they are checked.
 
     Returns
     -------
@@ -65,8 +69,10 @@ def load_cases(path: Path, files: FilesRead | None = None) -> list[Case]:
     document = read_with_base(path)
     spec = validate(document, document.data)
     reader = Reader(path.parent, files or FilesRead())
+    runs = expand_sweep(document, spec)
+    expect(len(runs))
     cases = []
-    for run in expand_sweep(document, spec):
+    for run in runs:
         of_run = document if run.label is None else Document(path, run.data, run.places, run.label)
         spec_of_run = spec if run.label is None else validate(of_run, run.data)
         name = spec_of_run.name or path.stem
@@ -152,7 +158,7 @@ def _build_lights(
     channels: tuple[str, ...],
     reader: Reader,
 ) -> tuple[list[dict[str, Light]], list[Deposit]]:
-    """Build the lights of each channel, by name, and the deposits of those of the first channel."""
+    """Build the lights of each channel, by name, and, where they are needed, deposits of the first channel."""
     bodies = body.bodies
     lights: list[dict[str, Light]] = [{} for _ in bodies]
     deposits = []
@@ -163,7 +169,12 @@ def _build_lights(
                 if light is None:
                     continue
                 lights[channel][names[i]] = light
+                # Whether a light is refused depends on the coefficients for charges only.
+                known = (light, body.shape, body_in_channel.outer.boundary)
+                if spec.model == "full" and not spec.compare and known in reader.files.lights:
+                    continue
                 deposit = light.deposit_in(body_in_channel)
+                reader.files.lights.add(known)
                 if spec.model == "charges":
                     check_deposit(light, deposit, body_in_channel, [region.surface for region in body.regions])
                 if channel == 0:

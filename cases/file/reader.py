@@ -9,6 +9,7 @@ from tetlux.cases.file.images import read_pixels
 from tetlux.cases.file.schema.case import MeshSpec, SurfaceSpec
 from tetlux.cases.file.schema.media import FieldSpec
 from tetlux.cases.file.schema.parts import Encoding
+from tetlux.fem.lights import Light
 from tetlux.fem.media.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
@@ -26,12 +27,21 @@ class FilesRead:
     Attributes
     ----------
     surfaces, meshes, fields, pixels : dict
+    regions : dict
+        Surfaces of regions, under the names of these.
+    nested : set
+        Bodies, by the ids of their surfaces, whose regions are known to lie within each other.
+    lights : set
+        Lights that are known to meet a body, with the ids of its surfaces and its boundary condition.
     """
 
     surfaces: dict[object, Surface] = field(default_factory=dict)
     meshes: dict[object, TetMesh] = field(default_factory=dict)
     fields: dict[object, Field] = field(default_factory=dict)
     pixels: dict[object, FloatArray] = field(default_factory=dict)
+    regions: dict[object, Surface] = field(default_factory=dict)
+    nested: set[tuple[int, ...]] = field(default_factory=set)
+    lights: set[tuple[Light, tuple[int, ...], str]] = field(default_factory=set)
 
 
 @dataclass
@@ -56,6 +66,15 @@ class Reader:
             surface = _surface(spec, unit, self.folder)
             self.files.surfaces[label] = replace(surface, crease_angle=spec.crease_angle)
         return self.files.surfaces[label]
+
+    def region(self, spec: SurfaceSpec, unit: str, name: str) -> Surface:
+        """Read the surface of a region; it has the name of the region."""
+        surface = self.surface(spec, unit)
+        # Runs share one object, so that it is hashed, checked and sent to workers once.
+        key = id(surface), name
+        if key not in self.files.regions:
+            self.files.regions[key] = replace(surface, name=name)
+        return self.files.regions[key]
 
     def mesh(self, spec: MeshSpec, unit: str) -> TetMesh:
         """Read a volume mesh."""

@@ -55,6 +55,8 @@ class BatchTables:
 
         Raises
         ------
+        InputError
+            If, at the start, there are other files in the place of the tables.
         RunError
             If the tables cannot be written at the end of the batch.
         """
@@ -74,6 +76,8 @@ class BatchTables:
         self._out = event.out
         cases = {case_of(name) for name in event.names}
         results, readings = results_file(self._out), readings_file(self._out)
+        for table in (results, readings):
+            table.check()
         kept = [row for row in results.read() if row["case"] not in cases and (self._out / row["run"]).is_dir()]
         runs = {row["run"] for row in kept}
         self._kept = kept, [row for row in readings.read() if row["run"] in runs]

@@ -11,7 +11,7 @@ from typing import Any
 
 from tetlux.cases.results.rows import HEAD, READING_HEAD, WARNINGS, Row, cell, order_columns
 from tetlux.cases.write.publish import claim_folder
-from tetlux.meshing.errors import RunError
+from tetlux.meshing.errors import InputError, RunError
 
 # Columns whose values are text even where they look like numbers.
 WORDS = frozenset({*HEAD, *READING_HEAD, WARNINGS})
@@ -50,6 +50,23 @@ class TableFile:
             for row in rows
             if None not in row and None not in row.values() and row.get(self.head[0])
         ]
+
+    def check(self) -> None:
+        """Refuse to replace a file that is no such table.
+
+        Raises
+        ------
+        InputError
+        """
+        try:
+            with self.path.open(encoding="utf-8-sig", errors="replace") as file:
+                first = file.readline(4096)
+        except OSError:
+            return
+        # That a killed process began may be cut anywhere.
+        ours = ",".join(self.head[:2])
+        if not (first.startswith(ours) or ours.startswith(first.strip())):
+            raise InputError(f"{self.path} is no table of tetlux; move it, or choose another folder with --out.")
 
     def append(self, rows: Sequence[Row]) -> None:
         """Add rows at the end, in one write; the file is replaced if they have other columns.

@@ -9,10 +9,11 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
-# The brightest nodes, from which the largest value is climbed to; directions of a step; and how often a step is halved,
-# which begins with the longest side of the facets around the node.
-PEAKS, DIRECTIONS, HALVINGS = 4, 8, 6
-MOST_STEPS = 40
+# The brightest nodes, from which the largest value is climbed to; directions of a step; and lengths that are tried at
+# once, each half of the one before, the first the longest side of the facets around the node.
+PEAKS, DIRECTIONS, LENGTHS = 4, 8, 6
+# A step that gains less than this share is the last.
+LEAST_GAIN, MOST_STEPS = 1e-3, 40
 
 # Copies of vertices that cannot be written to, whose nearest points a mesh keeps.
 _VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
@@ -52,24 +53,28 @@ def _climb(solution: Solution) -> FloatArray:
     brightest = mesh.boundary_nodes[np.argsort(-solution.exitance)[:PEAKS]]
     places, normals = surface.project(mesh.points[brightest])
     values, steps = solution.exitance_on(places), sides[brightest]
-    least = steps / 2.0**HALVINGS
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    shorter = 0.5 ** np.arange(LENGTHS)
+    climbing = np.arange(len(brightest))
     for _ in range(MOST_STEPS):
-        climbing = np.flatnonzero(steps > least)
         if len(climbing) == 0:
             break
         first = np.cross(normals[climbing], np.eye(3)[np.abs(normals[climbing]).argmin(axis=1)])
         first /= np.linalg.norm(first, axis=1)[:, None]
         second = np.cross(normals[climbing], first)
         ways = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
-        tried = places[climbing, None] + steps[climbing, None, None] * ways
+        # (climbing, lengths, directions, 3)
+        tried = places[climbing, None, None] + (steps[climbing, None] * shorter)[..., None, None] * ways[:, None]
         found, found_normals = surface.project(tried.reshape(-1, 3))
-        bright = solution.exitance_on(found).reshape(len(climbing), DIRECTIONS)
+        bright = solution.exitance_on(found).reshape(len(climbing), LENGTHS * DIRECTIONS)
         best = bright.argmax(axis=1)
-        row = np.arange(len(climbing)) * DIRECTIONS + best
-        better = bright.max(axis=1) > values[climbing]
+        row = np.arange(len(climbing)) * LENGTHS * DIRECTIONS + best
+        gains = bright.max(axis=1) - values[climbing]
+        better = gains > LEAST_GAIN * np.abs(values[climbing])
         moved = climbing[better]
         places[moved], normals[moved] = found[row[better]], found_normals[row[better]]
         values[moved] = bright.max(axis=1)[better]
-        steps[climbing[~better]] *= 0.5
+        # The next steps begin with the length that led farthest.
+        steps[moved] *= shorter[best[better] // DIRECTIONS]
+        climbing = moved
     return places

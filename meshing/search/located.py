@@ -10,35 +10,55 @@ MOST_POINTS = 1_000_000
 FACTORS = np.array([0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9], dtype=np.uint64)
 
 
+# A table is merged with the one before it unless that is so many times as long: so few points are copied often.
+GROWTH = 8
+
 Keys = np.ndarray[tuple[int], np.dtype[np.uint64]]
-_NOTHING: tuple[Keys, FloatArray, FloatArray, IntArray] = (
-    np.zeros(0, np.uint64), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)
-)  # fmt: skip
+# Sorted keys, queries, closest points, triangles.
+_Table = tuple[Keys, FloatArray, FloatArray, IntArray]
 
 
 class Located:
     """Queries, and the closest point and triangle of each, found again by the bits of their coordinates."""
 
     def __init__(self) -> None:
-        # Replaced as a whole, since other threads may be reading: sorted keys, queries, closest points, triangles.
-        self._known = _NOTHING
+        # From long to short; replaced as a whole, since other threads may be reading.
+        self._tables: tuple[_Table, ...] = ()
 
     def find(self, queries: FloatArray) -> tuple[BoolArray, FloatArray, IntArray]:
         """Which queries (q, 3) are known, and their closest points (q, 3) and triangles (q,); others have any."""
-        keys, known, nearest, faces = self._known
-        if len(keys) == 0:
-            return np.zeros(len(queries), dtype=bool), np.zeros((len(queries), 3)), np.zeros(len(queries), np.int64)
-        row = np.minimum(np.searchsorted(keys, _keys_of(queries)), len(keys) - 1)
-        # Of two points with one key, only the first is found.
-        return (known[row] == queries).all(axis=1), nearest[row], faces[row]
+        count = len(queries)
+        known, nearest, faces = np.zeros(count, dtype=bool), np.zeros((count, 3)), np.zeros(count, np.int64)
+        wanted = _keys_of(queries) if self._tables else np.zeros(count, np.uint64)
+        for keys, points, closest, triangles in self._tables:
+            row = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+            # Of two points with one key, only the first is found.
+            here = (points[row] == queries).all(axis=1)
+            known |= here
+            nearest[here], faces[here] = closest[row[here]], triangles[row[here]]
+        return known, nearest, faces
 
     def add(self, queries: FloatArray, nearest: FloatArray, faces: IntArray) -> None:
         """Remember queries (q, 3), their closest points (q, 3) and triangles (q,)."""
-        before = self._known if len(self._known[0]) + len(queries) <= MOST_POINTS else _NOTHING
-        columns = zip(before, (_keys_of(queries), queries, nearest, faces), strict=True)
-        keys, *others = (np.concatenate(pair) for pair in columns)
-        order = np.argsort(keys, kind="stable")
-        self._known = keys[order], others[0][order], others[1][order], others[2][order]
+        if len(queries) == 0:
+            return
+        before = self._tables
+        if sum(len(keys) for keys, *_ in before) + len(queries) > MOST_POINTS:
+            before = ()
+        merged = [(_keys_of(queries), queries, nearest, faces)]
+        length = len(queries)
+        while before and len(before[-1][0]) < GROWTH * length:
+            length += len(before[-1][0])
+            merged.append(before[-1])
+            before = before[:-1]
+        self._tables = (*before, _merge(merged))
+
+
+def _merge(tables: list[_Table]) -> _Table:
+    """One table of several."""
+    keys, queries, nearest, faces = (np.concatenate(columns) for columns in zip(*tables, strict=True))
+    order = np.argsort(keys, kind="stable")
+    return keys[order], queries[order], nearest[order], faces[order]
 
 
 def _keys_of(points: FloatArray) -> Keys:
