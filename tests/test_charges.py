@@ -113,6 +113,18 @@ def test_there_is_no_charge_in_a_gap_far_narrower_than_the_spacing() -> None:
     assert positions[1] == pytest.approx([7.0, 0.3, 0.4])
 
 
+def test_fitting_goes_on_where_the_exitance_is_below_zero() -> None:
+    """A hundred charges meet the tolerance of a torus, and leave dark blots on a tenth of it."""
+    ring = torus(10.0, 4.0)
+    light = of_points(np.array([[13.3, 0.0, 2.0]]))
+    few = fit_charges(ring, equation_of(TISSUE), light, tolerance=0.02, most=100)
+    assert few.errors.estimate < 0.02
+    assert few.negative_share > 0.02
+    enough = fit_charges(ring, equation_of(TISSUE), light, tolerance=0.02)
+    assert enough.negative_share < 0.5 * few.negative_share
+    assert 150 < len(enough.placement.charges) < 350
+
+
 def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
     """The bound of another field at the same points."""
     samples = fitted.placement.checked

@@ -8,6 +8,7 @@ import pytest
 from tests.conftest import TISSUE, block
 from tetlux.fem import Medium, PencilBeam, PointSource, System, solve
 from tetlux.fem.body.body import Body
+from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.exact import half_space
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import MOST_IMAGE_CHARGES, charges_of
@@ -241,11 +242,11 @@ def test_an_image_in_the_body_or_next_to_it_drops_the_patch(height: float) -> No
     everywhere = np.ones(len(mesh.points), dtype=bool)
     for up, sound in ((height, False), (0.5, True)):
         positions = np.array([[0.1, 0.2, -1.5], np.add(above, [0.0, 0.0, up])])
-        charges = Charges(positions, np.array([1.0, -0.5]), 1, 0.01, TISSUE)
+        charges = Charges(equation_of(TISSUE), positions, np.array([1.0, -0.5]), 0.01, sources=1, medium=TISSUE)
         assert patch_of(mesh, charges, everywhere).cells.any() == sound
 
 
-NO_CHARGES = Charges(np.zeros((0, 3)), np.zeros(0), 0, 1.0, TISSUE)
+NO_CHARGES = Charges(equation_of(TISSUE), np.zeros((0, 3)), np.zeros(0), 1.0, sources=0, medium=TISSUE)
 
 
 def turned(face: list[int]) -> tuple[int, ...]:

@@ -12,8 +12,8 @@ from tetlux.meshing.arrays import FloatArray, NumberArray
 class ChargeField:
     """The field of charges, which solves the equation wherever there is no charge.
 
-    Fits use this class: strengths may be complex and of many lights, and the residual needs normals of the surface. A
-    mesh uses `tetlux.fem.known.charges.Charges`: real strengths of one light, limited near the charges, with gradients.
+    The one type of charges: fitted ones, images in a plane, beams as points. `tetlux.fem.known.charges.Charges` is a
+    field of one light with what a mesh has to know to subtract it.
 
     Attributes
     ----------
@@ -21,15 +21,22 @@ class ChargeField:
     positions : (c, 3) ndarray
     strengths : (c, ...) ndarray
         W; a column for each light.
+    closest : float
+        Least distance from a charge at which fluence and gradient are evaluated, unit.
     """
 
     equation: Equation
     positions: FloatArray
     strengths: NumberArray
+    closest: float = 0.0
 
     def fluence(self, points: FloatArray) -> NumberArray:
         """Fluence at points (n, 3), (n, ...), W/unit²."""
-        return self.equation.fluence(points, self.positions, self.strengths)
+        return self.equation.fluence(points, self.positions, self.strengths, self.closest)
+
+    def fluence_and_gradient(self, points: FloatArray) -> tuple[NumberArray, NumberArray]:
+        """Fluence (n,), W/unit², and its gradient (n, 3), W/unit³, of one light."""
+        return self.equation.fluence_and_gradient(points, self.positions, self.strengths, self.closest)
 
     def exitance(self, points: FloatArray) -> NumberArray:
         """``phi/(2A)`` at points (n, 3) of the surface, (n, ...), W/unit²."""

@@ -71,15 +71,39 @@ class Equation:
         run_in_blocks(work, len(points), _rows(positions))
         return matrix
 
-    def fluence(self, points: FloatArray, positions: FloatArray, strengths: NumberArray) -> NumberArray:
-        """Fluence of charges of given strengths (c, ...), W, at points (n, 3), (n, ...), W/unit²."""
+    def fluence(
+        self, points: FloatArray, positions: FloatArray, strengths: NumberArray, closest: float = 0.0
+    ) -> NumberArray:
+        """Fluence of charges of given strengths (c, ...), W, at points (n, 3), (n, ...), W/unit².
+
+        Points nearer to a charge than `closest` have its fluence at that distance.
+        """
         sums = np.empty((len(points), *strengths.shape[1:]), dtype=np.result_type(self.dtype, strengths))
 
         def work(rows: slice) -> None:
-            sums[rows] = self._unit_fluence(_distances(points[rows], positions)) @ strengths
+            sums[rows] = self._unit_fluence(_distances(points[rows], positions, closest)) @ strengths
 
         run_in_blocks(work, len(points), _rows(positions))
         return sums
+
+    def fluence_and_gradient(
+        self, points: FloatArray, positions: FloatArray, strengths: NumberArray, closest: float = 0.0
+    ) -> tuple[NumberArray, NumberArray]:
+        """Fluence (n,), W/unit², and its gradient (n, 3), W/unit³, of charges of given strengths (c,), W."""
+        dtype = np.result_type(self.dtype, strengths)
+        fluence, gradient = np.empty(len(points), dtype=dtype), np.empty((len(points), 3), dtype=dtype)
+        # Coordinates relative to a nearby point lose fewer digits.
+        charges = positions - positions[0]
+
+        def work(rows: slice) -> None:
+            distance = _distances(points[rows], positions, closest)
+            each = self._unit_fluence(distance) * strengths
+            fluence[rows] = each.sum(axis=1)
+            each *= (self.wave_number + 1.0 / distance) / distance
+            gradient[rows] = each @ charges - each.sum(axis=1)[:, None] * (points[rows] - positions[0])
+
+        run_in_blocks(work, len(points), _rows(positions))
+        return fluence, gradient
 
     def traces(
         self, points: FloatArray, normals: FloatArray, positions: FloatArray, strengths: NumberArray
@@ -115,13 +139,14 @@ class Equation:
         return fluence, flux
 
 
-def _distances(points: FloatArray, positions: FloatArray) -> FloatArray:
-    """Distances between points (n, 3) and positions (c, 3), (n, c)."""
+def _distances(points: FloatArray, positions: FloatArray, closest: float = 0.0) -> FloatArray:
+    """Distances between points (n, 3) and positions (c, 3), at least `closest`, (n, c)."""
     # |x - p|² from |x|² + |p|² - 2 x.p would lose digits close to a charge.
     square: FloatArray = np.square(points[:, :1] - positions[:, 0])
     square += np.square(points[:, 1:2] - positions[:, 1])
     square += np.square(points[:, 2:] - positions[:, 2])
-    return np.asarray(np.sqrt(square, out=square))
+    np.sqrt(square, out=square)
+    return square if closest == 0.0 else np.maximum(square, closest, out=square)
 
 
 def _rows(positions: FloatArray) -> int:

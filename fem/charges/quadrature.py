@@ -20,14 +20,18 @@ LARGEST_ONE_POINT_PIECE = 0.5
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
+def group_size(count: int) -> float:
+    """The largest size of a group of triangles that has one point, in spacings of `count` charges."""
+    return float(np.clip(LARGEST_GROUP * np.sqrt(count / 100.0), LARGEST_GROUP, LARGEST_GROUP_OF_MANY))
+
+
 def quadrature(surface: Surface, spacing: Spacing, count: int = 100) -> Samples:
     """Points and weights on the smooth surface, to integrate the field of `count` charges a spacing apart.
 
     A group of triangles has one point, the one nearest to its centroid: the points are as many as the spacing asks for,
     however many triangles there are.
     """
-    size = float(np.clip(LARGEST_GROUP * np.sqrt(count / 100.0), LARGEST_GROUP, LARGEST_GROUP_OF_MANY))
-    cells = cells_of(surface, spacing, size, LARGEST_PIECE)
+    cells = cells_of(surface, spacing, group_size(count), LARGEST_PIECE)
     grouped = cells.is_group
     points, normals = surface.project(cells.centroids[grouped])
     of_groups = points, normals, cells.areas[grouped], cells.spacing[grouped]

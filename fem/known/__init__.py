@@ -18,7 +18,7 @@ and is plain P1 where there is no patch. In the weak form the patch adds ``-a(G 
 
 A beam without width is a sum of such sources too, some of them negative.
 
-    charges          screened point charges and their field
+    charges          a field of screened charges that is subtracted
     fitted           charges fitted to one light on the true surface, and their residual there
     fitted_patch     these on a mesh: the load of what is missing, and what the mesh does not see of it
     kept_fits        fits kept with a mesh

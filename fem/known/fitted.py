@@ -20,7 +20,7 @@ from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_for_remain
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
-from tetlux.fem.charges.quadrature import quadrature
+from tetlux.fem.charges.quadrature import group_size, quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
@@ -176,16 +176,16 @@ def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges
     depths = surface.distances(sources)
     heights = np.asarray(cKDTree(fitted.placement.fitted.points).query(fitted.placement.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
-    return Charges(field.positions, field.strengths[:, 0], len(sources), closest, medium)
+    return Charges(field.equation, field.positions, field.strengths[:, 0], closest, sources=len(sources), medium=medium)
 
 
 def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spacing | None = None) -> Samples:
     """Points at which a residual is integrated; they do not depend on the coefficients."""
-    samples = placement.fitted
+    samples, size = placement.fitted, group_size(len(placement.charges))
 
     def spacing(queries: FloatArray) -> FloatArray:
         own = EQUATION_REFINEMENT * samples.spacing[samples.tree.query(queries)[1]]
-        return own if wanted is None else np.minimum(own, wanted(queries))
+        return own if wanted is None else np.minimum(own, wanted(queries) / size)
 
     points = quadrature(surface, spacing, len(placement.charges))
     # Many runs may have these points on one mesh, which then finds them once.
@@ -204,10 +204,7 @@ def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | Non
         same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
         exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
         new = new[~same]
-    equation = equation_of(charges.medium)
-    fluence, flux = equation.traces(points.points[new], points.normals[new], charges.positions, charges.strengths)
-    exitance[new] = equation.robin * fluence
-    values[new] = flux + exitance[new]
+    exitance[new], values[new] = charges.exitance_and_residual(points.points[new], points.normals[new])
     outflow = float(points.areas @ (exitance - values))
     return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
 
@@ -221,6 +218,6 @@ def _missed(charges: Charges, points: Samples, outflow: float) -> float:
     power = float(charges.strengths[: charges.sources].sum())
     if power - outflow > LITTLE * power:
         return 0.0
-    equation = replace(equation_of(charges.medium), wave_number=0.0)
-    _, flux = equation.traces(points.points, points.normals, charges.positions, charges.strengths)
-    return outflow * (power / -float(points.areas @ flux) - 1.0)
+    unabsorbed = replace(charges, equation=replace(charges.equation, wave_number=0.0))
+    exitance, values = unabsorbed.exitance_and_residual(points.points, points.normals)
+    return outflow * (power / float(points.areas @ (exitance - values)) - 1.0)

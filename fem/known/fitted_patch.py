@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
-from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
 from tetlux.fem.known.patch import Patch, holds_sources
@@ -23,10 +22,12 @@ from tetlux.meshing.tets.mesh import TetMesh
 SHORTER = 0.65
 # Facets shorter than this times the distance of the points at which the residual is integrated have more points.
 FINE = 0.7
-# The points are then so many times as far apart as the facets are long, so that these may be split once.
-FINER = 0.7
-# Points are chosen anew if this share of the small facets has too few.
-MOST_SMALL = 0.1
+# Largest size of a group of triangles that has one of these points, over the lengths of facets, which may then be split
+# once.
+FINER = 0.5
+# Points are chosen anew if more facets than this share of the small ones have too few, and more than this number: a
+# detector has dozens of small facets around it.
+MOST_SMALL, FEWEST_SMALL = 0.1, 10
 # A part of the surface is as fine as the smallest of so many facets around its middle asks for.
 BESIDE = 4
 
@@ -85,7 +86,7 @@ class FittedPatch(Patch):
         seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
         length = SHORTER * np.minimum(self.residual.points.spacing, sides[self.facets])
-        missed = exitance_error(equation_of(self.charges.medium), self.residual.values - seen, length)
+        missed = exitance_error(self.charges.equation, self.residual.values - seen, length)
         square = self.areas * missed**2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
 
@@ -113,7 +114,8 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
         at_nodes = np.concatenate([coarse.at_nodes, new])
     residual = light.residual if coarse is None else coarse.residual
     small = _are_small(mesh, light.residual)
-    anew = bool((small & _are_small(mesh, residual)).sum() > MOST_SMALL * small.sum())
+    lacking = int((small & _are_small(mesh, residual)).sum())
+    anew = lacking > max(MOST_SMALL * int(small.sum()), FEWEST_SMALL)
     if anew:
         residual = residual_at(_finer_points(mesh, light, small), light.charges, light.residual)
     if coarse is None or anew:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
@@ -30,7 +31,7 @@ def charges_of(
     images: bool | BoolArray,
     most: int = MOST_IMAGE_CHARGES,
     region: int | None = None,
-    field: VaryingMedium | None = None,
+    varying: VaryingMedium | None = None,
 ) -> Charges | None:
     """Charges of point sources, each with its images in the tangent plane at the nearest point of the surface.
 
@@ -48,7 +49,7 @@ def charges_of(
         Largest number of charges.
     region : int, optional
         The region that the sources lie in, if the body has several media.
-    field : VaryingMedium, optional
+    varying : VaryingMedium, optional
         The medium of that region if it varies; `medium` is what it is at the sources.
 
     Returns
@@ -76,7 +77,16 @@ def charges_of(
     if count > most:
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
-    return Charges(np.vstack(positions), np.concatenate(strengths), len(points), closest, medium, region, field)
+    return Charges(
+        equation_of(medium),
+        np.vstack(positions),
+        np.concatenate(strengths),
+        closest,
+        sources=len(points),
+        medium=medium,
+        region=region,
+        varying=varying,
+    )
 
 
 def _image_line(depth: float, zb: float) -> tuple[FloatArray, FloatArray]:

@@ -56,7 +56,7 @@ def kept_patch(mesh: TetMesh, charges: Charges, at_nodes: FloatArray, elements: 
 def keep_patch(patch: Patch, elements: Elements) -> None:
     """Keep a patch with its mesh, for charges that have a name and a medium that does not vary."""
     charges = patch.charges
-    if charges.name and charges.field is None:
+    if charges.name and charges.varying is None:
         choices = _OF_MESHES.setdefault(patch.mesh, {})
         known = choices.get(_key(charges, elements))
         if known is None or not known.serves(charges.medium):

@@ -86,19 +86,19 @@ def patch_of(mesh: TetMesh, charges: Charges, accurate: BoolArray, at_nodes: Flo
     cells: BoolArray = np.asarray(accurate[mesh.tetrahedra].all(axis=1))
     if charges.region is not None:
         cells &= mesh.regions == charges.region
-    if charges.field is not None:
-        cells[cells] = _has_medium(mesh.points[mesh.tetrahedra[cells]], charges.medium, charges.field)
+    if charges.varying is not None:
+        cells[cells] = _has_medium(mesh.points[mesh.tetrahedra[cells]], charges.medium, charges.varying)
     patch = Patch(mesh, charges, cells, charges.fluence(mesh.points) if at_nodes is None else at_nodes)
     return patch if is_sound(patch) else replace(patch, cells=np.zeros(len(cells), dtype=bool))
 
 
-def _has_medium(corners: FloatArray, medium: Medium, field: VaryingMedium) -> BoolArray:
+def _has_medium(corners: FloatArray, medium: Medium, varying: VaryingMedium) -> BoolArray:
     """Whether a medium that varies is one medium throughout each of some tetrahedra (m, 4, 3), (m,).
 
     The charges solve the equation of that medium only. The points are those by which the tetrahedra get their
     coefficients.
     """
-    sigma_a, reduced = field.at((WITHIN @ corners).reshape(-1, 3))
+    sigma_a, reduced = varying.at((WITHIN @ corners).reshape(-1, 3))
     same = np.abs(sigma_a - medium.sigma_a) <= SAME * medium.sigma_a
     same &= np.abs(reduced - medium.reduced_scattering) <= SAME * medium.reduced_scattering
     return np.asarray(same.reshape(-1, 4).all(axis=1))

@@ -232,7 +232,7 @@ def _charges_in_several(
                 images=images & outermost[inside],
                 most=most,
                 region=region if len(body.media) > 1 else None,
-                field=None if isinstance(of_region, Medium) else of_region,
+                varying=None if isinstance(of_region, Medium) else of_region,
             )
             if some is not None:
                 most -= len(some.positions)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
-from tetlux.fem.charges.adapt import MOST_CHARGES
+from tetlux.fem.charges.adapt import MOST_CHARGES, NEGLIGIBLE_DIP
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import check_lights
@@ -31,8 +31,6 @@ from tetlux.meshing.tets.nesting import check_regions
 # Least distance of a source from the surface of a region, in mean free paths. The error is .1 % at this distance and 50
 # % on the surface.
 LEAST_DISTANCE_TO_INTERFACE = 1e-3
-# Negative exitance of less than this share of its maximum gives no warning.
-NEGLIGIBLE_DIP = 1e-6
 _INSTEAD = 'solve it with model "full".'
 
 

@@ -32,7 +32,7 @@ def head_rows() -> Iterator[str]:
     points = RADII[0] * np.column_stack([np.sin(ANGLES), np.zeros(5), np.cos(ANGLES)])
     right = layered_ball.point_exitance(LAYERS[::-1], RADII[::-1], source_radius=depth, gamma=ANGLES)
     surfaces = [sphere(radius) for radius in RADII]
-    for most in (700, 1050):
+    for most in (700, 1050, 1400):
         yield layered_row("spheres", surfaces, LAYERS, depth, points, right, most)
 
 
@@ -51,13 +51,13 @@ def ellipsoid_rows() -> Iterator[str]:
         regions=[Region(surface, medium) for surface, medium in zip(surfaces[1:], media[1:], strict=True)],
         tolerance=None,
         detectors=[PointDetector(tuple(point)) for point in points.tolist()],
-        detector_tolerance=0.01,
+        detector_tolerance=0.001,
     )
     right = np.array([reading.exitance for reading in solution.readings])
     bars = " | ".join(f"± {reading.relative_error:.3%}" for reading in solution.readings)
     seconds = time.process_time() - started
     yield f"| ellipsoids | finite elements, {len(solution.mesh.points):,} nodes | {seconds:.1f} | | {bars} |"
-    for most in (700, 1050):
+    for most in (700, 1050, 1400):
         yield layered_row("ellipsoids", surfaces, media, depth, points, right, most)
 
 
