@@ -42,6 +42,8 @@ class Options(TypedDict, total=False):
     most_tetrahedra: int
     cache: bool
     report: Report
+    frequency: float
+    outside_index: float
 
 
 @overload
@@ -97,6 +99,8 @@ def solve(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Report = no_report,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
     model: Literal["full", "charges"] = "full",
 ) -> Solution | list[Solution] | ChargeSolution:
     """Solve the diffusion approximation for the light in a body.
@@ -152,6 +156,12 @@ def solve(
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
         Called with a line of text as each stage ends.
+    frequency : float
+        At which the lights are modulated, Hz; 0 for steady light. Fluence, exitance, power and readings of the solution
+        then are complex amplitudes, by the convention ``exp(i omega t)``; see its `amplitude_at` and `phase_at`.
+        Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
+    outside_index : float
+        Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
     model : {"full", "charges"}
         The method: both solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
@@ -202,6 +212,8 @@ def solve(
                 "most_tetrahedra": most_tetrahedra != MOST_TETRAHEDRA,
                 "cache": not cache,
                 "report": report is not no_report,
+                "frequency": frequency != 0,
+                "outside_index": outside_index != 1,
             },
         )
         assert tolerance is not None
@@ -225,6 +237,8 @@ def solve(
         most_tetrahedra=most_tetrahedra,
         cache=cache,
         report=report,
+        frequency=frequency,
+        outside_index=outside_index,
     )
     return solutions if several else solutions[0]
 

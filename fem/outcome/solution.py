@@ -1,7 +1,7 @@
 """`Solution`: fluence, exitance, and where the power went."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
+from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import fluence_with_error
@@ -69,6 +70,8 @@ class Solution:
         Relative errors that the exitance is within at some 95 % of the surface, and the fluence inside, in each range
         of brightness down to a millionth of the largest: see `tetlux.fem.quadratic.field_error`. nan where there is no
         tolerance of these.
+    frequency : float
+        Of modulated light, Hz: fluence, exitance, power and readings then are complex amplitudes. 0 for steady light.
     """
 
     mesh: TetMesh
@@ -91,6 +94,7 @@ class Solution:
     is_quadratic: bool = False
     everywhere_error: float = np.nan
     volume_error: float = np.nan
+    frequency: float = 0.0
 
     @cached_property
     def exitance(self) -> NumberArray:
@@ -115,6 +119,14 @@ class Solution:
             W/unit²; nan at points that are not finite.
         """
         return self._at_nearest(points, self.exitance_on)
+
+    def amplitude_at(self, points: FloatArray) -> FloatArray:
+        """Modulus of `exitance_at`, (q,), W/unit²."""
+        return np.abs(self.exitance_at(points))
+
+    def phase_at(self, points: FloatArray) -> FloatArray:
+        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        return lag(self.exitance_at(points))
 
     def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], NumberArray]) -> NumberArray:
         """Values at the points of the surface nearest to given points; nan where those are not finite."""
@@ -175,7 +187,7 @@ class Solution:
     def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> NumberArray:
         """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
         linear = (weights * self.fluence[nodes]).sum(axis=1)
-        subtracted, interpolated = np.zeros(len(points)), np.zeros(len(points))
+        subtracted, interpolated = np.zeros((2, len(points)), self.fluence.dtype)
         for patch in self.patches:
             inside = patch.cells[cells]
             subtracted[inside] += patch.charges.fluence(points[inside])
@@ -222,10 +234,8 @@ class Solution:
             fluence[places] = self._interpolated(queries[places], cells[places], nodes, weights[places])
 
         fill(np.flatnonzero(cells >= 0))
-        if np.iscomplexobj(fluence):
-            return fluence
         # Extrapolation beyond the facets may not go below zero.
-        below = lost[fluence[lost] < 0]
+        below = lost[:0] if np.iscomplexobj(fluence) else lost[fluence[lost] < 0]
         weights[below] = np.maximum(weights[below], 0.0)
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
@@ -235,7 +245,7 @@ class Solution:
             fluence[inside] = self.quadratic.fluence_inside(queries[inside], fluence[inside])
         return fluence
 
-    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[NumberArray, FloatArray]:
         """Fluence by quadratic elements, and how far it may be off; each point needs a dual solution of its own.
 
         Parameters
@@ -250,13 +260,13 @@ class Solution:
             Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
         """
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
-        found = np.full((2, len(queries)), np.nan)
+        found = np.full((2, len(queries)), np.nan, self.fluence.dtype)
         if self.quadratic is None:
             raise InputError("this solution was not made by solve, and has no errors of single points.")
         inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
         inside = inside[self.surface.contains(queries[inside])]
         found[:, inside] = fluence_with_error(self.quadratic, queries[inside])
-        return found[0], found[1]
+        return found[0], found[1].real
 
     def __repr__(self) -> str:
         modulated = np.iscomplexobj(self.exitance)
@@ -274,19 +284,3 @@ class Solution:
         if self.warnings:
             facts.append(count(len(self.warnings), "warning"))
         return f"Solution({', '.join(facts)})"
-
-
-def sum_solutions(parts: Sequence[Solution]) -> Solution:
-    """The sum of solutions on one mesh, one for each light."""
-    if len(parts) == 1:
-        return parts[0]
-    powers = [astuple(part.power) for part in parts]
-    return replace(
-        parts[0],
-        fluence=np.sum([part.fluence for part in parts], axis=0),
-        power=Power(*(sum(column) for column in zip(*powers, strict=True))),
-        patches=tuple(patch for part in parts for patch in part.patches),
-        transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
-        limited_power=sum(part.limited_power for part in parts),
-        of_lights=tuple(parts),
-    )
