@@ -210,6 +210,21 @@ def test_a_table_that_cannot_be_written_fails_in_one_sentence(tmp_path: Path) ->
     assert [path.name for path in tmp_path.iterdir() if "partial" in path.name] == []
 
 
+def test_a_page_of_something_else_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("<!DOCTYPE html>\n<title>My garden</title>\n")
+    with pytest.raises(InputError, match=r"index.html is no page of tetlux; move it, or choose another folder"):
+        Batch(tmp_path, ["a"])
+    assert "garden" in (tmp_path / "index.html").read_text()
+
+
+def test_a_page_is_replaced_by_that_of_the_next_batch(tmp_path: Path) -> None:
+    for run in ("a", "b"):
+        batch = Batch(tmp_path, [run])
+        batch.finish(0, {})
+        batch.end()
+        assert f'"{run}"' in (tmp_path / "index.html").read_text()
+
+
 @pytest.mark.parametrize("name", ["results.csv", "readings.csv"])
 def test_a_table_of_something_else_is_not_replaced(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("time,voltage\n1,2\n")

@@ -10,10 +10,29 @@ from typing import Any
 
 from tetlux.cases.results.rows import FIGURES, READING, SECONDS, Row, swept_keys
 from tetlux.cases.results.table_file import replace_file
+from tetlux.meshing.errors import InputError
 
 # Height of a thumbnail in pixels, and how many there are: 200 take about 2 MB.
 HEIGHT, MOST_THUMBNAILS = 96, 200
 PICTURE = "picture.png"
+# By which a page is known to be one.
+TITLE = "<title>tetlux results</title>"
+
+
+def check_page(path: Path) -> None:
+    """Refuse to replace a file that is no page of a batch.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            first = file.read(4096)
+    except OSError:
+        return
+    if first.strip() and TITLE not in first:
+        raise InputError(f"{path} is no page of tetlux; move it, or choose another folder with --out.")
 
 
 def write_page(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> None:
