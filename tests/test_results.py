@@ -185,7 +185,7 @@ def test_the_page_holds_everything_itself(tmp_path: Path) -> None:
     assert data["swept"] == ["medium.sigma_a", "up"]
     assert [row[data["columns"].index("medium.sigma_a")] for row in data["rows"]] == [1, 2, 3]
     assert data["rows"][0][data["columns"].index("up")] == "[0, 0, 1]"
-    assert data["units"]["exited"] == "W"
+    assert (data["units"]["exited"], data["units"]["medium.sigma_a"], data["units"]["up"]) == ("W", "1/unit", "")
     assert list(data["pictures"]) == ["a/x=1"]
     assert data["pictures"]["a/x=1"].startswith("data:image/jpeg;base64,")
 

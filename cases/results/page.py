@@ -15,6 +15,14 @@ from tetlux.meshing.errors import InputError
 # Height of a thumbnail in pixels, and how many there are: 200 take about 2 MB.
 HEIGHT, MOST_THUMBNAILS = 96, 200
 PICTURE = "picture.png"
+# Units of swept keys, by the last part of their names.
+SWEPT_UNITS = {
+    **dict.fromkeys(("sigma_a", "sigma_s", "sigma_s_prime"), "1/unit"),
+    **dict.fromkeys(("radius", "depth", "width", "height", "position", "origin", "center"), "unit"),
+    "power": "W",
+    "irradiance": "W/unit²",
+    "density": "W/unit³",
+}
 # By which a page is known to be one.
 TITLE = "<title>tetlux results</title>"
 
@@ -69,7 +77,7 @@ def _unit(column: str) -> str:
         return "s"
     if column.startswith(READING):
         return "1" if column.endswith(".relative_error") else "W, or W/unit² at a point"
-    unit = FIGURES.get(column, "")
+    unit = FIGURES.get(column) or SWEPT_UNITS.get(column.rstrip(".0123456789").rpartition(".")[2], "")
     return "" if unit in ("1", "unit of length") else unit
 
 
