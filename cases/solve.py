@@ -32,6 +32,8 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
         volume_tolerance=case.volume_tolerance,
         cache=cache,
         report=report,
+        frequency=case.frequencies,
+        outside_index=case.outside_index,
     )
 
 

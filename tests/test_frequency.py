@@ -182,6 +182,7 @@ def test_a_lag_beyond_half_a_turn_is_no_lead() -> None:
         (-1e6, 1.0, r"frequency is -1e\+06; give a frequency in Hz, 0 for steady light\."),
         (np.nan, 1.0, "frequency is nan"),
         (np.inf, 1.0, "frequency is inf"),
+        (1e12, 1.0, r"frequency is 1e\+12 Hz, at which light does not diffuse: omega is 29 of v sigma_t'"),
         (1e8, 0.5, r"outside_index is 0\.5; give the refractive index of what surrounds the body, 1 or more\."),
         (1e8, np.nan, "outside_index is nan"),
     ],

@@ -12,12 +12,13 @@ from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
@@ -26,7 +27,7 @@ AnySolution = Solution | ChargeSolution
 
 @dataclass(frozen=True, eq=False)
 class _ChannelSum:
-    """The exitance summed over channels, as a `ResolvedField`; media may differ between channels."""
+    """The exitance summed over channels, as a `ResolvedField`: of modulated light its modulus; media may differ."""
 
     channels: tuple[AnySolution, ...]
 
@@ -49,7 +50,7 @@ class _ChannelSum:
         return min(channel.error_estimate for channel in self.channels)
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
-        return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
+        return np.asarray(sum(modulus(channel.exitance_on(queries)) for channel in self.channels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,17 +65,29 @@ class Results:
     surface : Surface
         The case's surface, with vertices added where its triangles are too large to show the exitance.
     parts : dict of (v,) ndarray
-        Exitance at the surface's vertices by channel and light, W/unit².
+        Exitance at the surface's vertices by channel and light, W/unit²; complex of modulated light.
     """
 
     case: Case
     solutions: tuple[AnySolution, ...]
     surface: Surface
-    parts: dict[tuple[str, str], FloatArray]
+    parts: dict[tuple[str, str], NumberArray]
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
-        """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit²."""
-        chosen = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
+        """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit².
+
+        Of modulated light it is the modulus of each channel, in which lights interfere.
+        """
+        names = self.case.channel_names if channel == ALL else (channel,)
+        of_channels = [modulus(self._amplitude(name, light)) for name in names]
+        return reduce(np.add, of_channels, np.zeros(len(self.surface.points)))
+
+    def phase(self, channel: str, light: str = ALL) -> FloatArray:
+        """How far the exitance of a channel and a light, or of all lights, lags at the vertices, (v,), degrees."""
+        return lag(self._amplitude(channel, light))
+
+    def _amplitude(self, channel: str, light: str) -> NumberArray:
+        chosen = [part for (c, name), part in self.parts.items() if channel == c and light in (name, ALL)]
         return reduce(np.add, chosen, np.zeros(len(self.surface.points)))
 
     @property
@@ -111,7 +124,8 @@ def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[st
 
 def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
     """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
-    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
+    simple = len(solutions) == 1 and not case.frequencies[0]
+    whole: ResolvedField = solutions[0] if simple else _ChannelSum(tuple(solutions))
     parts = {}
     if not _shows_surface(case) and all(isinstance(solution, Solution) for solution in solutions):
         surface, total = _extremes([solution for solution in solutions if isinstance(solution, Solution)])
@@ -132,7 +146,7 @@ def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
     first = solutions[0].surface
     points = np.vstack([extreme_places(solution) for solution in solutions])
-    total = sum(each.exitance_on(points) for each in solutions)
+    total = sum(modulus(each.exitance_on(points)) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
 
 
@@ -140,15 +154,21 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
     """The arrays of ``surface.ply`` and ``surface.vtp`` at the vertices."""
     case = results.case
     channels, lights = case.channel_names, case.light_names
-    values: dict[str, npt.NDArray[np.generic]] = {"exitance": results.exitance()}
+    wanted = [("", ALL, ALL)]
     if len(channels) > 1:
-        values |= {f"exitance_{channel}": results.exitance(channel) for channel in channels}
+        wanted += [(f"_{channel}", channel, ALL) for channel in channels]
     if len(lights) > 1:
-        values |= {f"exitance_{light}": results.exitance(light=light) for light in lights}
+        wanted += [(f"_{light}", ALL, light) for light in lights]
     if len(channels) > 1 and len(lights) > 1:
-        values |= {
-            f"exitance_{light}_{channel}": results.exitance(channel, light) for light in lights for channel in channels
-        }
+        wanted += [(f"_{light}_{channel}", channel, light) for light in lights for channel in channels]
+    values: dict[str, npt.NDArray[np.generic]] = {
+        f"exitance{suffix}": results.exitance(channel, light) for suffix, channel, light in wanted
+    }
+    for suffix, channel, light in wanted:
+        # Phases of several channels have no sum.
+        name = channels[0] if len(channels) == 1 else channel
+        if name != ALL and case.frequencies[channels.index(name)]:
+            values[f"phase{suffix}"] = results.phase(name, light)
     if results.mesh_solutions:
         # The least over channels. It is computed on the facets of a mesh.
         values["valid"] = np.min(
@@ -170,7 +190,10 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
 
 def volume_values(results: Results) -> dict[str, FloatArray]:
     """The arrays of ``volume.vtu`` at the nodes."""
-    names = results.case.channel_names
-    if len(names) == 1:
-        return {"fluence": results.mesh_solutions[0].fluence}
-    return {f"fluence_{name}": solution.fluence for name, solution in zip(names, results.mesh_solutions, strict=True)}
+    names, values = results.case.channel_names, {}
+    for name, solution in zip(names, results.mesh_solutions, strict=True):
+        suffix = "" if len(names) == 1 else f"_{name}"
+        values[f"fluence{suffix}"] = modulus(solution.fluence)
+        if solution.frequency:
+            values[f"phase{suffix}"] = lag(solution.fluence)
+    return values
