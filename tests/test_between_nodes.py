@@ -7,6 +7,7 @@ import pytest
 
 from tetlux.fem import Medium, PencilBeam, PointSource, solve
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.sources.light import Light
 from tetlux.meshing import box, tetrahedralize
 from tetlux.meshing.arrays import NumberArray
 
@@ -17,7 +18,7 @@ SIDES = [[0.3, -5.0, 1.7], [5.0, 2.2, -3.1], [-1.3, 5.0, 4.4], [-5.0, -4.1, -0.2
 @pytest.fixture(scope="module")
 def solution() -> Solution:
     block = box((10.0, 10.0, 10.0))
-    lights = [PencilBeam((0.0, 0.0, 9.0), (0.0, 0.0, -1.0)), PointSource((2.0, 1.0, -1.0))]
+    lights: list[Light] = [PencilBeam((0.0, 0.0, 9.0), (0.0, 0.0, -1.0)), PointSource((2.0, 1.0, -1.0))]
     return solve(tetrahedralize(block, edge_length=2.5), MEDIUM, lights, subtract="nothing")
 
 
