@@ -22,13 +22,15 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
 from tetlux.fem.outcome.detectors import read
+from tetlux.fem.outcome.plan import Candidate, Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner import plan
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint
@@ -40,7 +42,9 @@ from tetlux.fem.system import System
 
 __all__ = [
     "Body",
+    "Candidate",
     "ChargeSolution",
+    "ClosedFormSolution",
     "CollimatedBeam",
     "Deposit",
     "DiffuseLight",
@@ -58,6 +62,7 @@ __all__ = [
     "Medium",
     "MeshHints",
     "PencilBeam",
+    "Plan",
     "PointDetector",
     "PointSource",
     "Power",
@@ -73,6 +78,7 @@ __all__ = [
     "henyey_greenstein",
     "material",
     "mesh_field",
+    "plan",
     "radiance",
     "read",
     "solve",
