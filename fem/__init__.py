@@ -21,6 +21,8 @@ from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
+from tetlux.fem.media.spectra import Spectrum
+from tetlux.fem.media.tissue import tissue
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
@@ -72,6 +74,7 @@ __all__ = [
     "Segments",
     "Solution",
     "SourceTerms",
+    "Spectrum",
     "System",
     "VaryingMedium",
     "grid_field",
@@ -84,5 +87,6 @@ __all__ = [
     "solve",
     "solve_each",
     "table",
+    "tissue",
     "two_term",
 ]
