@@ -14,7 +14,6 @@ from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -187,9 +186,7 @@ def solution_of(
                 value=exact.error,
             )
         )
-    return ClosedFormSolution(
-        surface, medium, exact, tuple(deposits), Stopwatch().read(), list(dict.fromkeys(warnings))
-    )
+    return ClosedFormSolution(surface, medium, exact, tuple(deposits), warnings=list(dict.fromkeys(warnings)))
 
 
 def homogeneous(body: Body) -> Medium:

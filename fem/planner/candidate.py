@@ -9,8 +9,12 @@ from tetlux.meshing.errors import InputError
 
 def impossible(model: Model, error: InputError) -> Candidate:
     """A candidate that cannot solve the scene, for the reason of an error, without its remedy."""
-    reason = error.text.split(";")[0].split(", and model")[0].rstrip(".")
-    return Candidate(model, math.nan, math.nan, math.nan, reason, suits=False)
+    return Candidate(model, math.nan, math.nan, math.nan, reason_of(error), suits=False)
+
+
+def reason_of(error: InputError) -> str:
+    """What is wrong, without the remedy."""
+    return error.text.split(";")[0].split(", and model")[0].rstrip(".")
 
 
 def refuse_mesh(request: Request) -> None:

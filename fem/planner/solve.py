@@ -10,9 +10,12 @@ from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.plan import Plan, percent, seconds_in_words
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.candidate import reason_of
 from tetlux.fem.planner.charges import most_charges
 from tetlux.fem.planner.choose import plan_of
+from tetlux.fem.planner.closed_form import closed_form_candidate
 from tetlux.fem.planner.request import Request
+from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 
@@ -34,7 +37,7 @@ def solve_by_plan(
     solve_fully : callable
         Solves by finite elements.
     report : callable
-        Called with the plan, and each change of it.
+        Called with each line of the plan, and each change of it.
     plan : Plan, optional
         One that was made before, such as that of a group of runs.
 
@@ -45,21 +48,29 @@ def solve_by_plan(
     """
     if plan is None:
         plan = plan_of(request)
-        report(str(plan))
-    found: Sequence[AnySolution]
+        report_plan(plan, report)
+    found: Sequence[AnySolution] = ()
+    missed = ""
     if plan.chosen == "closed-form":
-        found = solve_closed_forms(request)
+        # The plan may be that of another run of a group.
+        candidate = closed_form_candidate(request)
+        missed = "" if candidate.suits else candidate.reason
+        found = solve_closed_forms(request) if candidate.suits else ()
     elif plan.chosen == "charges":
-        found = _try_charges(request, plan)
-        missed = "; ".join(dict.fromkeys(filter(None, (_missed(request, each) for each in found))))
-        if missed:
-            taken = seconds_in_words(sum(each.seconds["total"] for each in found))
-            plan = plan.without("charges", f"tried in {taken}: {missed}")
-            report(f"charges: {plan['charges'].reason}; going on with {plan.chosen}")
-            return solve_by_plan(request, solve_fully, report, plan=plan)
+        found, missed = _try_charges(request, plan)
     else:
         found = solve_fully()
+    if missed:
+        plan = plan.without(plan.chosen, missed)
+        report(f"{missed}: going on with {plan.chosen}")
+        return solve_by_plan(request, solve_fully, report, plan=plan)
     return [replace(solution, plan=plan) for solution in found]
+
+
+def report_plan(plan: Plan, report: Report) -> None:
+    """Report a plan line by line."""
+    for line in str(plan).splitlines():
+        report(line)
 
 
 def solve_closed_forms(request: Request) -> list[ClosedFormSolution]:
@@ -72,6 +83,7 @@ def solve_closed_forms(request: Request) -> list[ClosedFormSolution]:
     """
     if request.need_of_mesh:
         raise InputError(f'{request.need_of_mesh}, and model "closed-form" makes none', remedy='give model="full"')
+    watch = Stopwatch()
     try:
         fields = request.exact_fields
     except InputError as error:
@@ -80,12 +92,23 @@ def solve_closed_forms(request: Request) -> list[ClosedFormSolution]:
     for body, deposits, exact in zip(request.bodies, request.deposits, fields, strict=True):
         solution = solution_of(exact, request.surface, body.outer, deposits, tolerance=request.exitance_tolerance)
         found.append(replace(solution, readings=read_all(request.detectors, solution)))
-    return found
+    seconds = watch.read()
+    return [replace(solution, seconds=seconds) for solution in found]
 
 
-def _try_charges(request: Request, plan: Plan) -> list[ChargeSolution]:
+def _try_charges(request: Request, plan: Plan) -> tuple[list[ChargeSolution], str]:
+    """Solve each scene by charges, and say what the solutions miss; "" if nothing."""
+    try:
+        found = _fit_charges(request, most_charges(request, plan["charges"], plan["full"].seconds))
+    except InputError as error:
+        return [], reason_of(error)
+    missed = "; ".join(dict.fromkeys(filter(None, (_missed(request, each) for each in found))))
+    taken = seconds_in_words(sum(each.seconds["total"] for each in found))
+    return found, f"tried in {taken}: {missed}" if missed else ""
+
+
+def _fit_charges(request: Request, most: int) -> list[ChargeSolution]:
     """Fit charges to each scene, at most as many as take as long as finite elements are expected to."""
-    most = most_charges(request, plan["charges"], plan["full"].seconds)
     found = []
     for body, lights in zip(request.bodies, request.lights, strict=True):
         outer, *media = body.by_label.values()
