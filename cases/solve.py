@@ -4,9 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
+from tetlux.cases.planning import AUTO, plan_case, request_of
 from tetlux.cases.write.results import AnySolution
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.solve import report_plan, solve_by_plan, solve_closed_forms
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
@@ -17,8 +20,22 @@ Report = Callable[[str], None]
 
 def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | None = None) -> Sequence[AnySolution]:
     """Solve each channel by the model of the case; `start` is the mesh that finite elements begin with."""
-    if case.spec.model == "charges":
-        return _solve_with_charges(case, report)
+    model = case.spec.model
+
+    def solve_fully() -> list[Solution]:
+        return _solve_fully(case, report, cache=cache, start=start)
+
+    if model == AUTO:
+        plan = case.plan or plan_case(case)
+        report_plan(plan, report)
+        return solve_by_plan(request_of(case, plan.runs), solve_fully, report, plan=plan)
+    if model == "closed-form":
+        return solve_closed_forms(request_of(case))
+    return _solve_with_charges(case, report) if model == "charges" else solve_fully()
+
+
+def _solve_fully(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> list[Solution]:
+    """Solve all channels by finite elements, on one mesh."""
     return solve_each(
         case.mesh or case.surface,
         [channel.media for channel in case.channels],

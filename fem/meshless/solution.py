@@ -20,6 +20,7 @@ from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless.reading_error import LEAST_RELATIVE_ERROR, reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.meshing.arrays import FloatArray
@@ -73,6 +74,8 @@ class ChargeSolution:
     warnings : list of str
     readings : tuple of Reading
         Of the detectors that were given to `tetlux.fem.solve`, in their order.
+    plan : Plan, optional
+        Why this model was chosen, if it was.
     """
 
     surface: Surface
@@ -86,6 +89,7 @@ class ChargeSolution:
     seconds: dict[str, float] = field(default_factory=dict)
     warnings: list[str] = field(default_factory=list)
     readings: tuple[Reading, ...] = ()
+    plan: Plan | None = None
 
     mesh = None
     model = "charges"

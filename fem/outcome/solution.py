@@ -12,6 +12,7 @@ from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
 from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
+from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import fluence_with_error
@@ -70,6 +71,8 @@ class Solution:
         Relative errors that the exitance is within at some 95 % of the surface, and the fluence inside, in each range
         of brightness down to a millionth of the largest: see `tetlux.fem.quadratic.field_error`. nan where there is no
         tolerance of these.
+    plan : Plan, optional
+        Why this model was chosen, if it was.
     """
 
     mesh: TetMesh
@@ -92,6 +95,9 @@ class Solution:
     is_quadratic: bool = False
     everywhere_error: float = np.nan
     volume_error: float = np.nan
+    plan: Plan | None = None
+
+    model = "full"
 
     @cached_property
     def exitance(self) -> NumberArray:
