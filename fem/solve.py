@@ -118,6 +118,8 @@ def solve(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Report = no_report,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
     model: Literal["full", "auto", "closed-form", "charges"] = "full",
 ) -> AnySolution | Sequence[AnySolution]:
     """Solve the diffusion approximation for the light in a body.
@@ -173,6 +175,12 @@ def solve(
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
         Called with a line of text as each stage ends.
+    frequency : float
+        At which the lights are modulated, Hz; 0 for steady light. Fluence, exitance, power and readings of the solution
+        then are complex amplitudes, by the convention ``exp(i omega t)``; see its `amplitude_at` and `phase_at`.
+        Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
+    outside_index : float
+        Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
     model : {"full", "auto", "closed-form", "charges"}
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
@@ -227,6 +235,8 @@ def solve(
         most_tetrahedra=most_tetrahedra,
         cache=cache,
         report=report,
+        frequency=frequency,
+        outside_index=outside_index,
     )
     if model in ("closed-form", "charges"):
         check_options_without_mesh(model, options)
@@ -264,6 +274,7 @@ def _solve_channels(
             ),
             detectors=options["detectors"],
             mesh=options["mesh"],
+            need_of_mesh="modulated light is solved on a mesh" if options["frequency"] else "",
         )
         if model == "closed-form":
             solutions = solve_closed_forms(request)

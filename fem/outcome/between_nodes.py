@@ -43,7 +43,7 @@ def interpolate(
         W/unit².
     """
     linear = (weights * fluence[nodes]).sum(axis=1)
-    subtracted, interpolated = np.zeros(len(points)), np.zeros(len(points))
+    subtracted, interpolated = np.zeros((2, len(points)), fluence.dtype)
     for patch in patches:
         inside = patch.cells[cells]
         subtracted[inside] += patch.charges.fluence(points[inside])

@@ -96,9 +96,9 @@ def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingErr
     if len(solution.of_lights) > 1:
         parts = [estimate_reading(part, measurement) for part in solution.of_lights]
         return ReadingError.add(parts)
-    value = float(measurement.weights @ solution.exitance_on(measurement.points))
+    value = (measurement.weights @ solution.exitance_on(measurement.points)).item()
     squares = np.zeros(len(found.squares))
-    squares[cells[0]] = (value - found.value) ** 2
+    squares[cells[0]] = abs(value - found.value) ** 2
     return ReadingError(value, squares, 0.0, 0.0)
 
 

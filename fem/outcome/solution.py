@@ -1,7 +1,7 @@
 """`Solution`: fluence, exitance, and where the power went."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
+from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
@@ -73,6 +74,8 @@ class Solution:
         tolerance of these.
     plan : Plan, optional
         Why this model was chosen, if it was.
+    frequency : float
+        Of modulated light, Hz: fluence, exitance, power and readings then are complex amplitudes. 0 for steady light.
     """
 
     mesh: TetMesh
@@ -96,6 +99,7 @@ class Solution:
     everywhere_error: float = np.nan
     volume_error: float = np.nan
     plan: Plan | None = None
+    frequency: float = 0.0
 
     model = "full"
 
@@ -122,6 +126,14 @@ class Solution:
             W/unit²; nan at points that are not finite.
         """
         return self._at_nearest(points, self.exitance_on)
+
+    def amplitude_at(self, points: FloatArray) -> FloatArray:
+        """Modulus of `exitance_at`, (q,), W/unit²."""
+        return np.abs(self.exitance_at(points))
+
+    def phase_at(self, points: FloatArray) -> FloatArray:
+        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        return lag(self.exitance_at(points))
 
     def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], NumberArray]) -> NumberArray:
         """Values at the points of the surface nearest to given points; nan where those are not finite."""
@@ -216,10 +228,8 @@ class Solution:
             )
 
         fill(np.flatnonzero(cells >= 0))
-        if np.iscomplexobj(fluence):
-            return fluence
         # Extrapolation beyond the facets may not go below zero.
-        below = lost[fluence[lost] < 0]
+        below = lost[:0] if np.iscomplexobj(fluence) else lost[fluence[lost] < 0]
         weights[below] = np.maximum(weights[below], 0.0)
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
@@ -229,7 +239,7 @@ class Solution:
             fluence[inside] = self.quadratic.fluence_inside(queries[inside], fluence[inside])
         return fluence
 
-    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[NumberArray, FloatArray]:
         """Fluence by quadratic elements, and how far it may be off; each point needs a dual solution of its own.
 
         Parameters
@@ -244,13 +254,13 @@ class Solution:
             Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
         """
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
-        found = np.full((2, len(queries)), np.nan)
+        found = np.full((2, len(queries)), np.nan, self.fluence.dtype)
         if self.quadratic is None:
             raise InputError("this solution was not made by solve, and has no errors of single points.")
         inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
         inside = inside[self.surface.contains(queries[inside])]
         found[:, inside] = fluence_with_error(self.quadratic, queries[inside])
-        return found[0], found[1]
+        return found[0], found[1].real
 
     def __repr__(self) -> str:
         modulated = np.iscomplexobj(self.exitance)
@@ -268,19 +278,3 @@ class Solution:
         if self.warnings:
             facts.append(count(len(self.warnings), "warning"))
         return f"Solution({', '.join(facts)})"
-
-
-def sum_solutions(parts: Sequence[Solution]) -> Solution:
-    """The sum of solutions on one mesh, one for each light."""
-    if len(parts) == 1:
-        return parts[0]
-    powers = [astuple(part.power) for part in parts]
-    return replace(
-        parts[0],
-        fluence=np.sum([part.fluence for part in parts], axis=0),
-        power=Power(*(sum(column) for column in zip(*powers, strict=True))),
-        patches=tuple(patch for part in parts for patch in part.patches),
-        transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
-        limited_power=sum(part.limited_power for part in parts),
-        of_lights=tuple(parts),
-    )

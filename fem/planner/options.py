@@ -29,6 +29,8 @@ class Options(TypedDict, total=False):
     most_tetrahedra: int
     cache: bool
     report: Report
+    frequency: float
+    outside_index: float
 
 
 # Arguments for finite elements alone, with their defaults.
@@ -42,6 +44,8 @@ OF_FINITE_ELEMENTS: Mapping[str, Any] = {
     "most_tetrahedra": MOST_TETRAHEDRA,
     "cache": True,
     "report": no_report,
+    "frequency": 0.0,
+    "outside_index": 1.0,
 }
 
 
