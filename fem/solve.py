@@ -1,7 +1,6 @@
 """`solve`: the public function that solves for the light in a body."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Literal, TypedDict, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
@@ -14,7 +13,6 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import Report, no_report, solve_each
@@ -74,8 +72,9 @@ def solve(
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
     detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
 ) -> ChargeSolution: ...
 
 
@@ -121,7 +120,8 @@ def solve(
     detectors : sequence of detectors
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
-        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them, nor are
+        charges fitted for them.
     everywhere_tolerance : float, optional
         Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
         of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
@@ -156,7 +156,8 @@ def solve(
         The method: both solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
-        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest.
+        arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance`, and refuses
+        the rest.
 
     Returns
     -------
@@ -191,9 +192,7 @@ def solve(
         raise InputError(f'model is "{model}"; give "full" or "charges".')
     if model == "charges":
         _check_options_of_charges(
-            tolerance,
             {
-                "detector_tolerance": detector_tolerance is not None,
                 "everywhere_tolerance": everywhere_tolerance is not None,
                 "volume_tolerance": volume_tolerance is not None,
                 "mass": mass != "lumped",
@@ -204,9 +203,15 @@ def solve(
                 "report": report is not no_report,
             },
         )
-        assert tolerance is not None
-        found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-        return replace(found, readings=read_all(detectors, found))
+        return solve_with_charges(
+            body if mesh is None else mesh,
+            medium,
+            lights,
+            regions=regions,
+            tolerance=tolerance,
+            detectors=detectors,
+            detector_tolerance=detector_tolerance,
+        )
     channels, several = media_by_channel(body, mesh, medium)
     solutions = solve_each(
         body,
@@ -229,15 +234,13 @@ def solve(
     return solutions if several else solutions[0]
 
 
-def _check_options_of_charges(tolerance: float | None, given: Mapping[str, bool]) -> None:
+def _check_options_of_charges(given: Mapping[str, bool]) -> None:
     """Refuse arguments that are for finite elements alone; `given` says of each whether it was changed.
 
     Raises
     ------
     InputError
     """
-    if tolerance is None:
-        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
     names = [name for name, changed in given.items() if changed]
     if names:
         raise InputError(

@@ -42,8 +42,9 @@ def measure(scene: Scene, tolerance: float, *, charges: bool = False) -> tuple[F
             lights,
             regions=regions,
             model="charges",
-            tolerance=tolerance,
+            tolerance=tolerance if regions else None,
             detectors=detectors,
+            detector_tolerance=None if regions else tolerance,
         )
     else:
         solution = solve(
@@ -141,7 +142,9 @@ def print_fits(how: str) -> None:
         medium = Medium(sigma_a=sigma_a, sigma_s_prime=sigma_s, eta=1.4)
         solution: Solution | ChargeSolution
         if how == "charges":
-            solution = solve(surface, medium, [beam], model="charges", tolerance=0.005, detectors=detectors)
+            solution = solve(
+                surface, medium, [beam], model="charges", tolerance=None, detectors=detectors, detector_tolerance=0.005
+            )
         else:
             solution = solve(
                 surface, medium, [beam], mesh=mesh, tolerance=None, detectors=detectors, detector_tolerance=0.005
@@ -192,7 +195,7 @@ def main() -> None:
     elif given.cube:
         print_cube()
     elif given.fits:
-        for how in ("kept mesh", "meshes made anew", "charges"):
+        for how in (("charges",) if given.charges else ("kept mesh", "meshes made anew", "charges")):
             print_fits(how)
     else:
         print_scenes(given.first, given.scenes, given.tolerance, charges=given.charges, each=given.each)
