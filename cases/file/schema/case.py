@@ -180,20 +180,28 @@ class CaseSpec(Section):
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
         given = {name: value for name, value in self.tolerances if value is not None}
-        if not given or (self.model == "charges" and "exitance" not in given):
-            needed = "of the exitance" if self.model == "charges" else "of exitance, detectors, everywhere or volume"
+        if not given:
+            needed = "of exitance or detectors"
+            if self.model == "full":
+                needed = "of exitance, detectors, everywhere or volume"
             raise PydanticCustomError(
                 "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
             )
         if "detectors" in given and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
         for name in given:
-            if name != "exitance" and self.model == "charges":
+            if name not in ("exitance", "detectors") and self.model == "charges":
                 raise PydanticCustomError(
                     "tolerance",
                     'tolerance.{name} is for finite elements, not for model "charges"; leave it out',
                     {"name": name},
                 )
+        if "detectors" in given and self.regions and self.model == "charges":
+            raise PydanticCustomError(
+                "tolerance",
+                'tolerance.detectors with model "charges" is for a body without regions; leave it out, or write '
+                "model: full",
+            )
         return self
 
     @model_validator(mode="before")
