@@ -5,6 +5,7 @@ import numpy as np
 from tetlux.fem.charges.adapt import (
     COUNT_FACTOR,
     FEWEST_CHARGES,
+    SMOOTH_ESTIMATE,
     FittedCharges,
     LightSources,
     error_of_each,
@@ -12,7 +13,7 @@ from tetlux.fem.charges.adapt import (
     refine_spacing,
 )
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.placement import EQUATION_REFINEMENT, HEIGHT_SMOOTH, place_charges
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT, HEIGHT_ROUGH, HEIGHT_SMOOTH, place_charges
 from tetlux.fem.charges.readings import ReadingGoal
 from tetlux.meshing.surface.surface import Surface
 
@@ -50,15 +51,16 @@ def fit_for_readings(
         The fit that is nearest to the tolerances.
     """
     spacing, weight, count = goal.spacing(), goal.weight(), FEWEST_CHARGES
-    best, least = None, np.inf
+    best, least, height = None, np.inf, HEIGHT_SMOOTH
     while True:
-        fitted = fit_placed_charges(place_charges(surface, spacing, weight, count, HEIGHT_SMOOTH), equation, lights)
+        fitted = fit_placed_charges(place_charges(surface, spacing, weight, count, height), equation, lights)
         excess = _excess(fitted, goal, tolerance)
         if best is None or excess < least:
             best, least = fitted, excess
         if excess <= 1.0 or count >= most:
             return best
         count = min(round(COUNT_FACTOR * count), most)
+        height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
         checked = fitted.placement.checked
         effects = error_of_each(fitted) * weight(checked.points)
         spacing = refine_spacing(checked, effects, LEAST_CHANGE, MOST_CHANGE)

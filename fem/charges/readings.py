@@ -1,13 +1,15 @@
 """What detectors read, as a goal of a fit: where charges and equations matter for it, and the error of each reading.
 
 A residual r of the boundary condition acts like a source of that power on the surface. Along a flat surface its
-exitance falls off as ``(1 + k d) e^{-k d}/d³`` with the distance d (Farrell, Patterson & Wilson 1992, Med. Phys. 19,
-879-888, far from the source), and so does that of the light. Their ratio is the relative effect of r on a reading. It
-is the same all along the way from the light to the detector, and larger near the detector: there r must be small beside
-the faint light. Beside the way it falls off as ``e^{-k s}`` with the detour s.
+exitance is ``zb/(2 pi) (1 + k d) e^{-k d}/d³`` of its power at a distance d (Farrell, Patterson & Wilson 1992, Med.
+Phys. 19, 879-888, far from the source), with zb = 2 A D, and that of the light falls off alike. Their ratio is the
+relative effect of r on a reading. It is the same all along the way from the light to the detector, and larger near the
+detector: there r must be small beside the faint light. Beside the way it falls off as ``e^{-k s}`` with the detour s.
 
 The error of a reading has two parts, and their squares are added: that of the ripples of r around the detector, see
-`tetlux.fem.charges.check`; and that of r everywhere, of random sign in each square of the spacing, by its effect.
+`tetlux.fem.charges.check`; and that of r everywhere, of random sign in each square of the spacing, by its effect. Of
+320 readings of 32 random scenes of one medium (``python -m tests.benchmarks.readings --charges --even``), all within
+the tolerance of .01, 98 % lie within twice the bar, and 94 % of those that are off by more than 1e-4.
 """
 
 from dataclasses import dataclass, replace
@@ -76,17 +78,13 @@ class ReadingGoal:
         """Rate at which the light fades, 1/unit."""
         return float(np.real(self.equation.wave_number))
 
-    def effects(self, points: FloatArray) -> FloatArray:
-        """Relative changes of each reading by a source on the surface at each point (n, 3), (d, n), 1/W."""
+    def exitance_of_each(self, points: FloatArray) -> FloatArray:
+        """Exitance at the detectors by a source on the surface at each point (n, 3), as if flat, (d, n), 1/unit²."""
         length = SMOOTHED_SHARE * self._coarsest_spacing(self.detectors)[:, None]
-        light = self._decay(np.hypot(cdist(self.detectors, self.sources), length)) @ self.injected
-        light += np.pi / (self.equation.boundary_factor * self.equation.diffusion) * self.diffuse
-        with np.errstate(divide="ignore"):
-            return np.asarray(self._decay(np.hypot(cdist(self.detectors, points), length)) / light[:, None])
-
-    def _decay(self, distance: FloatArray) -> FloatArray:
+        distance = np.hypot(cdist(self.detectors, points), length)
         path = self.fading * distance
-        return np.asarray((1.0 + path) * np.exp(-path) / distance**3)
+        zb = 2.0 * self.equation.boundary_factor * self.equation.diffusion
+        return np.asarray(zb / (2.0 * np.pi) * (1.0 + path) * np.exp(-path) / distance**3)
 
     def _coarsest_spacing(self, points: FloatArray) -> FloatArray:
         """Spacing of charges at points (n, 3) that matter as much as any, up to a factor, (n,)."""
@@ -94,14 +92,19 @@ class ReadingGoal:
         return np.asarray(away / (1.0 + self.fading * away / SPACING_OF_FADING))
 
     def weight(self) -> Weight:
-        """Weights of equations, up to a factor."""
-        by_distance = weight_by_distance(self.distance)
+        """Weights of equations, up to a factor: the largest relative effect on a reading.
+
+        Times a power of the distance from the light, as for the exitance, readings of a hare by 1,560 charges are off
+        by 3.6 % in the median in place of 1.7.
+        """
         if len(self.sources) == 0:
-            return by_distance
+            return weight_by_distance(self.distance)
+        light = self.exitance_of_each(self.sources) @ self.injected + self.diffuse
 
         def weight(points: FloatArray) -> FloatArray:
-            effects = self.effects(points).max(axis=0) * self.injected.sum()
-            return np.asarray(np.clip(effects, LEAST_WEIGHT, MOST_WEIGHT) * by_distance(points))
+            with np.errstate(divide="ignore"):
+                effects = (self.exitance_of_each(points) / light[:, None]).max(axis=0) * self.injected.sum()
+            return np.asarray(np.clip(effects, LEAST_WEIGHT, MOST_WEIGHT))
 
         return weight
 
@@ -148,11 +151,11 @@ class ReadingGoal:
         """
         ripples = ripple_errors(self.equation, samples, spacing, residual, self.detectors)
         with np.errstate(divide="ignore", invalid="ignore"):
-            around = ripples / np.abs(exitance)
             if len(self.sources) == 0:
-                return np.asarray(around)
+                return np.asarray(ripples / np.abs(exitance))
             squares = np.abs(residual * spacing) ** 2 * samples.areas
-            return np.asarray(np.hypot(around, np.sqrt(self.effects(samples.points) ** 2 @ squares)))
+            elsewhere = np.sqrt(self.exitance_of_each(samples.points) ** 2 @ squares)
+            return np.asarray(np.hypot(ripples, elsewhere) / np.abs(exitance))
 
 
 def ripple_errors(
