@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tests.benchmarks.readings import places_on_ball
+from tests.benchmarks.reading_scenes import places_on_ball
 from tests.conftest import TISSUE
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder

@@ -195,6 +195,4 @@ def reading_goal(
     zb = 2.0 * equation.boundary_factor * equation.diffusion
     depths = surface.distances(sources) if len(sources) else np.zeros(0)
     injected = np.abs(powers) * (1.0 + depths / zb)
-    return ReadingGoal(
-        equation, distance_from(surface, sources), sources, injected, abs(diffuse), detectors, tolerance
-    )
+    return ReadingGoal(equation, distance_from(surface, sources), sources, injected, abs(diffuse), detectors, tolerance)

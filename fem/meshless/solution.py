@@ -241,8 +241,7 @@ def charge_solution(
     *,
     inner: Sequence[tuple[Surface, Medium]] = (),
     tolerance: float | None = DEFAULT_TOLERANCE,
-    detectors: FloatArray | None = None,
-    detector_tolerance: float | None = None,
+    readings: tuple[FloatArray, float] | None = None,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for point sources and diffuse light in a body of homogeneous regions.
@@ -262,10 +261,8 @@ def charge_solution(
         Regions of the body.
     tolerance : float, optional
         Wanted relative L2 error of the exitance.
-    detectors : (d, 3) ndarray, optional
-        Points of the surface that are read.
-    detector_tolerance : float, optional
-        Wanted relative error of each reading, in a body without regions.
+    readings : (d, 3) ndarray and float, optional
+        Points that are read and wanted relative error of each reading, in a body without regions.
     most : int
         Approximate number of charges at which fitting ends in any case.
 
@@ -278,9 +275,8 @@ def charge_solution(
         transmitted = np.array([ledger.transmitted for ledger in ledgers])
         boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
         lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium), None
-        if detectors is not None and detector_tolerance is not None:
-            total = powers.sum(axis=1), float(boundary_source.sum())
-            goal = reading_goal(surface, equation, points, *total, detectors, detector_tolerance)
+        if readings is not None:
+            goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
             fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
         else:
             assert tolerance is not None

@@ -1,6 +1,6 @@
 """Lights in a body of homogeneous regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -87,18 +87,9 @@ def solve_with_charges(
     >>> solution.error_estimate < 0.02
     True
     """
-    if isinstance(surface, TetMesh):
-        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
-    if not isinstance(medium, AnyMedium):
-        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
-    check_tolerances(Tolerances(tolerance, detector_tolerance), detectors)
-    if detector_tolerance is not None and len(regions):
-        raise InputError(
-            f'model "charges" takes detector_tolerance in a body without regions only; leave it out, or {_INSTEAD}'
-        )
-    check_lights(lights)
-    if len(lights) == 0:
-        raise InputError("there is no light; give at least one.")
+    _check_arguments(surface, medium, lights, detectors, regions, Tolerances(tolerance, detector_tolerance))
+    assert isinstance(surface, Surface)
+    assert isinstance(medium, AnyMedium)
     watch = Stopwatch()
     with watch.stage("surface"):
         inner = [(region.surface, homogeneous_medium(only_medium(region))) for region in regions]
@@ -111,43 +102,66 @@ def solve_with_charges(
         deposits = [light.deposit_in(whole) for light in lights]
         for light, deposit in zip(lights, deposits, strict=True):
             check_deposit(light, deposit, whole, [each for each, _ in inner])
-        placed = [place_detector(each, Dark(surface, body)) for each in detectors]
+        places = [place_detector(each, Dark(surface, body)).position for each in detectors]
+        readings = None if detector_tolerance is None else (np.array(places), detector_tolerance)
     with watch.stage("solve"):
-        terms = [deposit.terms for deposit in deposits]
-        owners = np.repeat(np.arange(len(terms)), [len(each.points) for each in terms])
-        powers = np.zeros((len(owners), len(terms)))
-        powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
-        points = np.vstack([each.points for each in terms])
+        points, powers = _point_sources(deposits)
         ledgers = [_light_ledger(deposit) for deposit in deposits]
         solution = charge_solution(
-            surface,
-            body,
-            points,
-            powers,
-            ledgers,
-            inner=inner,
-            tolerance=tolerance,
-            detectors=np.array([each.position for each in placed]),
-            detector_tolerance=detector_tolerance,
-            most=most,
+            surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, readings=readings, most=most
         )
         solution = replace(solution, readings=read_all(detectors, solution))
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
-    if tolerance is not None and not solution.error_estimate <= tolerance:
-        warnings.append(
-            Note(
-                "tolerance-missed",
-                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
-                f"with {solution.charges} charges; {_INSTEAD}",
-                value=solution.error_estimate,
-            )
-        )
-    warnings += notes_on_readings(
-        solution.readings, detector_tolerance, f"with {solution.charges:,} charges; {_INSTEAD.rstrip('.')}"
-    )
+    warnings += _notes_on_tolerances(solution, tolerance, detector_tolerance)
     if tolerance is not None:
         warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
+
+
+def _check_arguments(
+    surface: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    lights: Sequence[Light],
+    detectors: Sequence[Detector],
+    regions: Sequence[Region],
+    tolerances: Tolerances,
+) -> None:
+    if isinstance(surface, TetMesh):
+        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
+    if not isinstance(medium, AnyMedium):
+        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
+    check_tolerances(tolerances, detectors)
+    if tolerances.readings is not None and len(regions):
+        raise InputError(
+            f'model "charges" takes detector_tolerance in a body without regions only; leave it out, or {_INSTEAD}'
+        )
+    check_lights(lights)
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
+
+
+def _point_sources(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
+    """Positions (p, 3) of all point sources, and their powers in each light (p, s), W."""
+    terms = [deposit.terms for deposit in deposits]
+    owners = np.repeat(np.arange(len(terms)), [len(each.points) for each in terms])
+    powers = np.zeros((len(owners), len(terms)))
+    powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
+    return np.vstack([each.points for each in terms]), powers
+
+
+def _notes_on_tolerances(
+    solution: ChargeSolution, tolerance: float | None, detector_tolerance: float | None
+) -> Iterator[Note]:
+    """Notes on tolerances that were missed."""
+    if tolerance is not None and not solution.error_estimate <= tolerance:
+        yield Note(
+            "tolerance-missed",
+            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
+            f"with {solution.charges} charges; {_INSTEAD}",
+            value=solution.error_estimate,
+        )
+    where = f"with {solution.charges:,} charges; {_INSTEAD.removesuffix('.')}"
+    yield from notes_on_readings(solution.readings, detector_tolerance, where)
 
 
 def _below_zero(solution: ChargeSolution) -> list[str]:

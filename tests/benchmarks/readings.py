@@ -100,10 +100,10 @@ def print_scenes(numbers: Iterable[int], tolerance: float, *, charges: bool, eac
                 print(f"    {np.round(place, 2).tolist()}: error {own:.3%}, bar {given:.3%}")
     print(_summary(errors, bars, tolerance))
     for least in (1e-4, 1e-3):
-        off = errors > least
-        if off.any():
-            within = np.mean(errors[off] <= 2 * bars[off])
-            print(f"of {off.sum()} that are off by more than {least:g}: within twice the bar {within:.1%}")
+        beyond = errors > least
+        if beyond.any():
+            within = np.mean(errors[beyond] <= 2 * bars[beyond])
+            print(f"of {beyond.sum()} that are off by more than {least:g}: within twice the bar {within:.1%}")
 
 
 def _summary(errors: FloatArray, bars: FloatArray, tolerance: float) -> str:
