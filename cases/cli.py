@@ -13,6 +13,7 @@ from tetlux.cases.start import mark_start
 
 if TYPE_CHECKING:
     from tetlux.cases.batch.events import Listener
+    from tetlux.cases.batch.launch import Launcher
 
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
@@ -173,38 +174,47 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch.launch import Launcher, seem_many  # noqa: PLC0415
+    from tetlux.meshing.host.blocks import CORES  # noqa: PLC0415
+
+    with Launcher() as launcher:
+        starts_early = options.scheduler is None and not options.resume
+        if starts_early and seem_many(options.cases):
+            # Its libraries load while those of this process do.
+            launcher.start_first(options.jobs or CORES)
+        return _run_with(launcher, options, starts_early=starts_early)
+
+
+def _run_with(launcher: "Launcher", options: argparse.Namespace, *, starts_early: bool) -> int:
     from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
     from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
     from tetlux.cases.batch.engine import run_batch, worker_count  # noqa: PLC0415
-    from tetlux.cases.batch.launch import Launcher  # noqa: PLC0415
     from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
     from tetlux.cases.results.batch_tables import BatchTables, results_file  # noqa: PLC0415
     from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
-    with Launcher() as launcher:
+    def expect(runs: int) -> None:
+        if starts_early:
+            launcher.prepare(worker_count(options.jobs, runs))
 
-        def expect(runs: int) -> None:
-            if options.scheduler is None and not options.resume:
-                launcher.prepare(worker_count(options.jobs, runs))
-
-        cases = load_all(options.cases, expect)
-        listeners: list[Listener] = [choose_display(len(cases), quiet=options.quiet)]
-        # The summary of a single run says all that tables would, unless there are tables that it belongs into.
-        if len(cases) > 1 or results_file(options.out).path.exists():
-            listeners += [RunLogs(), BatchTables()]
-        try:
-            ended = run_batch(
-                cases,
-                options.out,
-                jobs=options.jobs,
-                resume=options.resume,
-                scheduler=options.scheduler,
-                cache=not options.no_cache,
-                listeners=listeners,
-                launcher=launcher,
-            )
-        except RunError as error:
-            return _report(str(error), 1)
+    cases = load_all(options.cases, expect)
+    listeners: list[Listener] = [choose_display(len(cases), quiet=options.quiet)]
+    # The summary of a single run says all that tables would, unless there are tables that it belongs into.
+    if len(cases) > 1 or results_file(options.out).path.exists():
+        listeners += [RunLogs(), BatchTables()]
+    try:
+        ended = run_batch(
+            cases,
+            options.out,
+            jobs=options.jobs,
+            resume=options.resume,
+            scheduler=options.scheduler,
+            cache=not options.no_cache,
+            listeners=listeners,
+            launcher=launcher,
+        )
+    except RunError as error:
+        return _report(str(error), 1)
     return 1 if ended.failed or ended.left else 0
 
 

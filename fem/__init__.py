@@ -21,6 +21,8 @@ from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
 from tetlux.fem.media.region import Region
+from tetlux.fem.media.spectra import Spectrum
+from tetlux.fem.media.tissue import tissue
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
@@ -67,6 +69,7 @@ __all__ = [
     "Segments",
     "Solution",
     "SourceTerms",
+    "Spectrum",
     "System",
     "VaryingMedium",
     "grid_field",
@@ -78,5 +81,6 @@ __all__ = [
     "solve",
     "solve_each",
     "table",
+    "tissue",
     "two_term",
 ]

@@ -135,9 +135,8 @@ def solve_each(
     watch = Stopwatch()
     with watch.stage("surface"):
         checked = build_scenes(body, mesh, medium, regions, len(scenes))
-        kept = _kept_for(mesh, start)
-        if isinstance(body, TetMesh):
-            subtract = replace_fitted(subtract)
+    with watch.stage("assemble"):
+        kept, subtract = _kept_for(mesh, start), replace_fitted(subtract) if isinstance(body, TetMesh) else subtract
         wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
         split = [
             split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene)

@@ -16,7 +16,7 @@ import pytest
 from tetlux.cases.batch import workshop
 from tetlux.cases.batch.engine import run_batch, worker_count
 from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
-from tetlux.cases.batch.launch import Launcher
+from tetlux.cases.batch.launch import Launcher, seem_many
 from tetlux.cases.batch.requests import load_all
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
@@ -224,8 +224,11 @@ def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
 
 def test_prepared_workers_are_used_or_ended() -> None:
     with Launcher() as launcher:
+        launcher.start_first(3)
+        unwanted = list(launcher._early.values())
+        launcher.start_first(2)
         launcher.prepare(2)
-        launcher.prepare(3)
+        launcher.prepare(2)
         taken = launcher.take("1", 2)
         again = launcher.take("1", 2)
         others = list(launcher._early.values())
@@ -234,7 +237,30 @@ def test_prepared_workers_are_used_or_ended() -> None:
             process.kill()
             process.communicate()
     assert taken.pid != again.pid
-    assert [process.returncode for process in others] == [-signal.SIGKILL]
+    assert [process.returncode for process in (*others, *unwanted)] == [-signal.SIGKILL] * 2
+
+
+def test_another_number_of_workers_than_expected_starts_anew() -> None:
+    with Launcher() as launcher:
+        launcher.start_first(3)
+        unwanted = list(launcher._early.values())
+        launcher.prepare(2)
+        assert sorted(launcher._early) == ["1", "2"]
+        assert [process.returncode for process in unwanted] == [-signal.SIGKILL]
+        launcher.prepare(1)
+        assert not launcher._early
+
+
+@pytest.mark.parametrize(
+    ("text", "many"),
+    [("unit: mm\nsweep:\n  unit: [mm, cm]\n", True), ("name: sweep\n# sweep:\n", False), (None, False)],
+)
+def test_a_sweep_is_seen_before_its_file_is_read(tmp_path: Path, text: str | None, many: bool) -> None:
+    if text is not None:
+        (tmp_path / "case.yaml").write_text(text)
+    assert seem_many([str(tmp_path / "case.yaml")]) == many
+    assert seem_many([str(tmp_path / "case.yaml")] * 2)
+    assert seem_many([str(tmp_path / "*.yaml")])
 
 
 def test_a_wrong_case_leaves_no_workers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,11 +19,14 @@ from tetlux.cases.file.detectors import read_detectors
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import run_case
 from tetlux.cases.write.results import Results, collect_results
-from tetlux.fem import PointDetector, read, solve
+from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, read, solve
+from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.fem.solve_scenes import solve_each
-from tetlux.meshing import Surface, box
+from tetlux.fem.sources.light import Light
+from tetlux.meshing import Surface, box, sphere, torus
 from tetlux.meshing.arrays import FloatArray
 
 COLOURS = """\
@@ -302,3 +305,20 @@ def test_white_is_what_99_percent_of_the_area_stay_below() -> None:
     colours, white = preview(cube, np.zeros((8, 3)))
     assert white == 0
     assert not colours.any()
+
+
+@pytest.mark.parametrize("kind", ["two lights", "flat", "shape with parts"])
+def test_the_extremes_without_vertices_are_those_of_the_surface_written(kind: str) -> None:
+    medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    ball, block, ring = sphere(10.0), box((20.0, 30.0, 10.0)), torus(10.0, 4.0)
+    scenes: dict[str, tuple[Surface, list[Light]]] = {
+        "two lights": (ball, [PencilBeam((0.0, 0.0, 20.0), (0.2, 0.1, -1.0)), PointSource((3.0, 0.0, -7.0))]),
+        "flat": (block, [PencilBeam((3.0, 2.0, 20.0), (0.0, 0.0, -1.0))]),
+        "shape with parts": (ring, [PointSource((10.0, 0.0, 2.0))]),
+    }
+    surface, lights = scenes[kind]
+    solution = solve(surface, medium, lights, tolerance=0.1)
+    values = solution.exitance_on(extreme_places(solution))
+    everywhere = surface_exitance(solution)[1]
+    assert values.max() == pytest.approx(everywhere.max(), rel=0.01)
+    assert values.min() == pytest.approx(everywhere.min(), rel=0.1)

@@ -185,7 +185,7 @@ def test_the_page_holds_everything_itself(tmp_path: Path) -> None:
     assert data["swept"] == ["medium.sigma_a", "up"]
     assert [row[data["columns"].index("medium.sigma_a")] for row in data["rows"]] == [1, 2, 3]
     assert data["rows"][0][data["columns"].index("up")] == "[0, 0, 1]"
-    assert data["units"]["exited"] == "W"
+    assert (data["units"]["exited"], data["units"]["medium.sigma_a"], data["units"]["up"]) == ("W", "1/unit", "")
     assert list(data["pictures"]) == ["a/x=1"]
     assert data["pictures"]["a/x=1"].startswith("data:image/jpeg;base64,")
 
@@ -208,6 +208,21 @@ def test_a_table_that_cannot_be_written_fails_in_one_sentence(tmp_path: Path) ->
     with pytest.raises(RunError, match="results cannot be written to"):
         batch.end()
     assert [path.name for path in tmp_path.iterdir() if "partial" in path.name] == []
+
+
+def test_a_page_of_something_else_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "index.html").write_text("<!DOCTYPE html>\n<title>My garden</title>\n")
+    with pytest.raises(InputError, match=r"index.html is no page of tetlux; move it, or choose another folder"):
+        Batch(tmp_path, ["a"])
+    assert "garden" in (tmp_path / "index.html").read_text()
+
+
+def test_a_page_is_replaced_by_that_of_the_next_batch(tmp_path: Path) -> None:
+    for run in ("a", "b"):
+        batch = Batch(tmp_path, [run])
+        batch.finish(0, {})
+        batch.end()
+        assert f'"{run}"' in (tmp_path / "index.html").read_text()
 
 
 @pytest.mark.parametrize("name", ["results.csv", "readings.csv"])

@@ -1,8 +1,12 @@
 """Starts worker processes, also before it is known what they are to do: libraries load while cases are read."""
 
+import glob
 import os
+import re
 import subprocess
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 
 from tetlux.meshing.host.blocks import THREADS_VARIABLE
@@ -39,13 +43,23 @@ class Launcher:
 
     def __init__(self) -> None:
         self._count = 0
+        self._unstarted: list[str] = []
         self._early: dict[str, subprocess.Popen[bytes]] = {}
 
+    def start_first(self, count: int) -> None:
+        """Start the process of the first of so many workers, before it is known how many there will be."""
+        self._end()
+        if count > 1:
+            self._count, self._unstarted = count, worker_names(count)[1:]
+            self._early = {"1": _start("1", count)}
+
     def prepare(self, count: int) -> None:
-        """Start the processes of so many workers, unless that has been done."""
-        if self._count == 0 and count > 1:
-            self._count = count
-            self._early = {name: _start(name, count) for name in worker_names(count)}
+        """Start the processes of so many workers, those that have not been started."""
+        if count != self._count:
+            self._end()
+            self._count, self._unstarted = count, worker_names(count) if count > 1 else []
+        self._early |= {name: _start(name, count) for name in self._unstarted}
+        self._unstarted = []
 
     def take(self, name: str, count: int) -> "subprocess.Popen[bytes]":
         """The process of a worker, one of so many: a prepared one, or a new one."""
@@ -60,11 +74,24 @@ class Launcher:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the processes that nobody has taken."""
+        self._end()
+
+    def _end(self) -> None:
         for process in self._early.values():
             process.kill()
             with process:  # closes its pipes and waits
                 pass
         self._early = {}
+
+
+def seem_many(requests: Sequence[str]) -> bool:
+    """Whether case files are likely to have many runs, found without reading them: several files, or a sweep."""
+    if len(requests) != 1 or glob.has_magic(requests[0]):
+        return True
+    try:
+        return re.search(r"^sweep:", Path(requests[0]).read_text(encoding="utf-8"), re.MULTILINE) is not None
+    except (OSError, ValueError):
+        return False
 
 
 def worker_names(count: int) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from tetlux.cases.file.colours import RGB
 from tetlux.cases.file.documents.document import Document, Key, format_key
 from tetlux.cases.file.schema.case import CaseSpec
-from tetlux.cases.file.schema.media import MaterialSpec, Media
+from tetlux.cases.file.schema.media import MaterialSpec, Media, TissueSpec
 
 # The name of a single channel, and that of the sum of all lights.
 ALL = "all"
@@ -34,6 +34,9 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
                 "value for each channel, or a single one for all.",
             )
     count = first[1] if first else 1
+    wavelengths = _wavelengths(document, spec)
+    if spec.channels is None and wavelengths:
+        return wavelengths
     if spec.channels is None:
         return RGB if count == 3 else (ALL,) if count == 1 else tuple(str(i) for i in range(1, count + 1))
     check_unique_names(document, "channels", spec.channels)
@@ -54,6 +57,42 @@ def check_unique_names(document: Document, section: str, names: list[str] | tupl
             raise document.error((section, i), f'the name "{name}" is given twice; give one of them another name.')
 
 
+def _wavelengths(document: Document, spec: CaseSpec) -> tuple[str, ...]:
+    """The wavelengths of media by chromophores, in words; none without such media.
+
+    Raises
+    ------
+    InputError
+        If media differ in them, or one is given twice.
+    """
+    first: tuple[Key, tuple[str, ...]] | None = None
+    for key, medium in _media(spec):
+        if not isinstance(medium, TissueSpec):
+            continue
+        names = tuple(f"{wavelength:.10g}" for wavelength in medium.wavelengths)
+        first = first or (key, names)
+        if names != first[1]:
+            raise document.error(
+                (*key, "wavelengths"),
+                f"these are {', '.join(names)} nm, and {format_key(first[0])} has {', '.join(first[1])} nm; give all "
+                "media the same wavelengths.",
+            )
+        if len(set(names)) < len(names):
+            raise document.error((*key, "wavelengths"), "a wavelength is given twice; leave one of the two out.")
+    return first[1] if first else ()
+
+
+def _media(spec: CaseSpec) -> Iterator[tuple[Key, Media]]:
+    """All media of a case, with their keys."""
+    if spec.medium is not None:
+        yield ("medium",), spec.medium
+    if spec.mesh is not None:
+        for label, medium in spec.mesh.labels.items():
+            yield ("mesh", "labels", label), medium
+    for i, region in enumerate(spec.regions):
+        yield ("regions", i, "medium"), region.medium
+
+
 def _describe(length: int) -> str:
     return "1 channel" if length == 1 else f"{length} channels"
 
@@ -62,13 +101,8 @@ def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
     """The keys of all values that are lists by channel, and their lengths."""
     if spec.channels is not None:
         yield ("channels",), len(spec.channels)
-    if spec.medium is not None:
-        yield from _lists_of_medium(("medium",), spec.medium)
-    if spec.mesh is not None:
-        for label, medium in spec.mesh.labels.items():
-            yield from _lists_of_medium(("mesh", "labels", label), medium)
-    for i, region in enumerate(spec.regions):
-        yield from _lists_of_medium(("regions", i, "medium"), region.medium)
+    for key, medium in _media(spec):
+        yield from _lists_of_medium(key, medium)
     for i, light in enumerate(spec.lights):
         for name, value in getattr(light, light.kind):
             if isinstance(value, list):
@@ -78,6 +112,9 @@ def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
 def _lists_of_medium(key: Key, medium: Media) -> Iterator[tuple[Key, int]]:
     if isinstance(medium, MaterialSpec):
         yield (*key, "material"), len(RGB)
+        return
+    if isinstance(medium, TissueSpec):
+        yield (*key, "wavelengths"), len(medium.wavelengths)
         return
     if isinstance(medium, list):
         yield key, len(medium)

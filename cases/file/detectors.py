@@ -87,6 +87,12 @@ def _finite(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
 
 
+def _percent(share: float) -> str:
+    """A share in per cent, with two digits."""
+    figure = 100.0 * share
+    return f"{figure:.2g} %" if figure < 99.5 else f"{figure:.0f} %"
+
+
 def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
     """Lines on what is read of all lights together, for the terminal."""
     whole = [row for row in rows if row["light"] == ALL]
@@ -95,8 +101,8 @@ def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
     for row in whole[:MOST_LINES]:
         value, what = (row["exitance"], f"W/{unit}²") if row["power"] is None else (row["power"], "W")
         name = f"{row['name']}, {row['channel']}" if several else row["name"]
-        error = "" if row["relative_error"] is None else f" ± {row['relative_error']:.2g} of it"
-        model = "" if row["model_error"] is None else f" (diffusion itself: ± {row['model_error']:.2g})"
+        error = "" if row["relative_error"] is None else f" ± {_percent(row['relative_error'])}"
+        model = "" if row["model_error"] is None else f" (diffusion itself: ± {_percent(row['model_error'])})"
         lines.append(f"{name}: {value:.5g} {what}{error}{model}")
     if len(whole) > MOST_LINES:
         lines.append(f"and {len(whole) - MOST_LINES} more readings")

@@ -3,11 +3,13 @@
 from tetlux.cases.file.channels import value_in_channel
 from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.reader import Reader
-from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec
+from tetlux.cases.file.schema.media import FieldSpec, MaterialSpec, Media, MediumSpec, PhaseSpec, TissueSpec
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import PhaseFunction, henyey_greenstein, table, two_term
+from tetlux.fem.media.spectra import SPECTRA, Spectrum
+from tetlux.fem.media.tissue import tissue
 from tetlux.fem.media.varying import Field, VaryingMedium
 from tetlux.fem.validity.notes import check_scattering
 from tetlux.meshing.arrays import FloatArray
@@ -23,7 +25,7 @@ def read_media(
     document : Document
     key : Key
         The key of the medium in it.
-    spec : MediumSpec, MaterialSpec or list of MediumSpec
+    spec : MediumSpec, MaterialSpec, TissueSpec or list of MediumSpec
     points : (n, 3) ndarray
         Vertices of the body or region, or nodes of the label: coefficients that vary must be known at all of them.
     unit : str
@@ -45,6 +47,8 @@ def read_media(
     if isinstance(spec, MaterialSpec):
         with document.at((*key, "material")):
             return material(spec.material, unit=unit)
+    if isinstance(spec, TissueSpec):
+        return _tissue(document, key, spec, unit, reader)
     if isinstance(spec, list):
         return tuple(_medium(document, (*key, i), each, points, i, reader) for i, each in enumerate(spec))
     return tuple(_medium(document, key, spec, points, channel, reader) for channel in range(count))
@@ -73,6 +77,29 @@ def _medium(
         varying = VaryingMedium(base=medium, **fields)
         varying.at(points)
         return varying
+
+
+def _tissue(document: Document, key: Key, spec: TissueSpec, unit: str, reader: Reader) -> tuple[AnyMedium, ...]:
+    others: dict[str, tuple[Spectrum, float]] = {}
+    keys: dict[str, Key] = {name: ("chromophores", name) for name in SPECTRA}
+    for name, substance in spec.chromophores.others.items():
+        keys.setdefault(name, ("chromophores", "others", name))
+        with document.at((*key, *keys[name])):
+            others[name] = reader.spectrum(substance)
+    keys |= {"a": ("scattering", "a"), "b": ("scattering", "b")}
+    with document.at(key, keys | {name: (name,) for name in TissueSpec.model_fields}):
+        media = tissue(
+            wavelengths=spec.wavelengths,
+            **{name: getattr(spec.chromophores, name) for name in SPECTRA},
+            others=others,
+            **dict(spec.scattering),
+            eta=spec.eta,
+            unit=unit,
+            boundary=spec.boundary,
+        )
+        for medium in media:
+            check_scattering(medium)
+    return tuple(media)
 
 
 def _phase(spec: PhaseSpec) -> PhaseFunction:

@@ -7,9 +7,11 @@ from pathlib import Path
 from tetlux.cases.file.fields import read_array_field, read_image_field, read_mesh_field
 from tetlux.cases.file.images import read_pixels
 from tetlux.cases.file.schema.case import MeshSpec, SurfaceSpec
-from tetlux.cases.file.schema.media import FieldSpec
+from tetlux.cases.file.schema.media import FieldSpec, SubstanceSpec
 from tetlux.cases.file.schema.parts import Encoding
+from tetlux.cases.file.spectra import read_spectrum
 from tetlux.fem.lights import Light
+from tetlux.fem.media.spectra import Spectrum, SpectrumKind
 from tetlux.fem.media.varying import Field
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray
@@ -26,7 +28,7 @@ class FilesRead:
 
     Attributes
     ----------
-    surfaces, meshes, fields, pixels : dict
+    surfaces, meshes, fields, spectra, pixels : dict
     regions : dict
         Surfaces of regions, under the names of these.
     nested : set
@@ -38,6 +40,7 @@ class FilesRead:
     surfaces: dict[object, Surface] = field(default_factory=dict)
     meshes: dict[object, TetMesh] = field(default_factory=dict)
     fields: dict[object, Field] = field(default_factory=dict)
+    spectra: dict[object, Spectrum] = field(default_factory=dict)
     pixels: dict[object, FloatArray] = field(default_factory=dict)
     regions: dict[object, Surface] = field(default_factory=dict)
     nested: set[tuple[int, ...]] = field(default_factory=set)
@@ -90,6 +93,17 @@ class Reader:
         if label not in self.files.fields:
             self.files.fields[label] = _field(spec, self.folder)
         return self.files.fields[label]
+
+    def spectrum(self, spec: SubstanceSpec) -> tuple[Spectrum, float]:
+        """Read the spectrum of a substance, and its amount."""
+        is_molar = spec.concentration is not None
+        amount = spec.concentration if is_molar else spec.fraction
+        assert amount is not None
+        label = (self._label(), spec.file, is_molar)
+        if label not in self.files.spectra:
+            kind: SpectrumKind = "extinction" if is_molar else "absorption"
+            self.files.spectra[label] = read_spectrum(self.folder / spec.file, kind)
+        return self.files.spectra[label], amount
 
     def pixels(self, file: str, encoding: Encoding) -> FloatArray:
         """Read an image as linear light, (rows, columns, 3)."""

@@ -5,7 +5,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, RunFailed, RunFinished
-from tetlux.cases.results.page import write_page
+from tetlux.cases.results.page import check_page, write_page
 from tetlux.cases.results.parquet import parquet_of
 from tetlux.cases.results.rows import (
     FIGURES,
@@ -78,6 +78,7 @@ class BatchTables:
         results, readings = results_file(self._out), readings_file(self._out)
         for table in (results, readings):
             table.check()
+        check_page(self._out / PAGE)
         kept = [row for row in results.read() if row["case"] not in cases and (self._out / row["run"]).is_dir()]
         runs = {row["run"] for row in kept}
         self._kept = kept, [row for row in readings.read() if row["run"] in runs]

@@ -10,10 +10,37 @@ from typing import Any
 
 from tetlux.cases.results.rows import FIGURES, READING, SECONDS, Row, swept_keys
 from tetlux.cases.results.table_file import replace_file
+from tetlux.meshing.errors import InputError
 
 # Height of a thumbnail in pixels, and how many there are: 200 take about 2 MB.
 HEIGHT, MOST_THUMBNAILS = 96, 200
 PICTURE = "picture.png"
+# Units of swept keys, by the last part of their names.
+SWEPT_UNITS = {
+    **dict.fromkeys(("sigma_a", "sigma_s", "sigma_s_prime"), "1/unit"),
+    **dict.fromkeys(("radius", "depth", "width", "height", "position", "origin", "center"), "unit"),
+    "power": "W",
+    "irradiance": "W/unit²",
+    "density": "W/unit³",
+}
+# By which a page is known to be one.
+TITLE = "<title>tetlux results</title>"
+
+
+def check_page(path: Path) -> None:
+    """Refuse to replace a file that is no page of a batch.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            first = file.read(4096)
+    except OSError:
+        return
+    if first.strip() and TITLE not in first:
+        raise InputError(f"{path} is no page of tetlux; move it, or choose another folder with --out.")
 
 
 def write_page(path: Path, rows: Sequence[Row], columns: Sequence[str]) -> None:
@@ -50,7 +77,7 @@ def _unit(column: str) -> str:
         return "s"
     if column.startswith(READING):
         return "1" if column.endswith(".relative_error") else "W, or W/unit² at a point"
-    unit = FIGURES.get(column, "")
+    unit = FIGURES.get(column) or SWEPT_UNITS.get(column.rstrip(".0123456789").rpartition(".")[2], "")
     return "" if unit in ("1", "unit of length") else unit
 
 

@@ -13,7 +13,7 @@ from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
-from tetlux.fem.outcome.extremes import extreme_places, vertices_of
+from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
@@ -131,15 +131,8 @@ def _shows_surface(case: Case) -> bool:
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
     first = solutions[0].surface
-    if len(solutions) == 1:
-        points = extreme_places(solutions[0])
-    else:
-        brightest = [extreme_places(solution)[len(first.points) :] for solution in solutions]
-        points = np.vstack([first.points, *brightest])
-    vertices = vertices_of(first)
-    total = sum(
-        np.concatenate([each.exitance_on(vertices), each.exitance_on(points[len(vertices) :])]) for each in solutions
-    )
+    points = np.vstack([extreme_places(solution) for solution in solutions])
+    total = sum(each.exitance_on(points) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
 
 

@@ -2,12 +2,14 @@
 
 from typing import Annotated, Any
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.parts import (
     TAG,
     Choice,
     Each,
+    Label,
     Length,
     Number,
     Numbers,
@@ -96,21 +98,78 @@ class MediumSpec(Section):
     boundary: BoundaryKind = "exact"
 
 
+class SubstanceSpec(Section):
+    """A substance by a spectrum of your own: a text file of wavelengths, nm, and values."""
+
+    file: str = Field(
+        description="two columns: nm, and molar extinction, 1/(cm mol/l), base 10 (with concentration), or absorption "
+        "of the pure substance, 1/mm, base e (with fraction)"
+    )
+    concentration: Number | None = Field(None, description="mol/l")
+    fraction: Number | None = Field(None, description="share of the volume")
+
+    @model_validator(mode="after")
+    def _one_amount(self) -> "SubstanceSpec":
+        if (self.concentration is None) == (self.fraction is None):
+            raise PydanticCustomError(
+                "one_of",
+                "give either concentration, with a file of molar extinction, or fraction, with a file of absorption",
+            )
+        return self
+
+
+class ChromophoresSpec(Section):
+    """What absorbs in tissue, see `tetlux.fem.tissue`."""
+
+    hbo2: Number = Field(0.0, description="oxygenated haemoglobin, mol/l of tissue")
+    hhb: Number = Field(0.0, description="deoxygenated haemoglobin, mol/l of tissue")
+    water: Number = Field(0.0, description="share of the volume")
+    fat: Number = Field(0.0, description="share of the volume")
+    others: dict[Label, SubstanceSpec] = Field({}, description="substances of your own, by name")
+
+
+class ScatteringSpec(Section):
+    """Reduced scattering a (wavelength/500 nm)^-b."""
+
+    a: Number = Field(description="reduced scattering at 500 nm, 1/mm")
+    b: Number = Field(description="its power")
+
+
+class TissueSpec(Section):
+    """A medium by what it consists of: a channel for each wavelength."""
+
+    chromophores: ChromophoresSpec
+    scattering: ScatteringSpec
+    wavelengths: Numbers = Field(description="nm; each makes a channel of this name")
+    eta: Number = Field(description="refractive index relative to the outside")
+    boundary: BoundaryKind = "exact"
+
+
 class MaterialSpec(Section):
     """A measured material: three channels, red, green and blue."""
 
     material: str = Field(description="see tetlux.fem.media.materials")
 
 
+# Keys that only media by chromophores have.
+OF_TISSUE = ("chromophores", "wavelengths")
+
+
 def _kind(value: Any) -> str:
-    named = "material" in value if isinstance(value, dict) else isinstance(value, MaterialSpec)
-    return TAG + ("material" if named else "list" if isinstance(value, list | tuple) else "mapping")
+    if isinstance(value, list | tuple):
+        return TAG + "list"
+    if isinstance(value, MaterialSpec) or (isinstance(value, dict) and "material" in value):
+        return TAG + "material"
+    if isinstance(value, TissueSpec) or (isinstance(value, dict) and not value.keys().isdisjoint(OF_TISSUE)):
+        return TAG + "tissue"
+    return TAG + "mapping"
 
 
 # A medium for all channels, or a list with one for each.
 Media = Annotated[
     Annotated[MediumSpec, Tag(TAG + "mapping")]
     | Annotated[MaterialSpec, Tag(TAG + "material")]
+    | Annotated[TissueSpec, Tag(TAG + "tissue")]
     | Annotated[list[MediumSpec], Tag(TAG + "list"), Field(min_length=1)],
     Discriminator(_kind),
 ]
