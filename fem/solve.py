@@ -1,7 +1,6 @@
 """`solve`: the public function that solves for the light in a body."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Literal, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
@@ -16,7 +15,6 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner.options import Options, check_options_without_mesh
 from tetlux.fem.planner.request import make_request
@@ -61,8 +59,9 @@ def solve(
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
     detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
 ) -> ChargeSolution: ...
 
 
@@ -144,7 +143,8 @@ def solve(
     detectors : sequence of detectors
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
-        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them, nor are
+        charges fitted for them.
     everywhere_tolerance : float, optional
         Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
         of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
@@ -185,10 +185,10 @@ def solve(
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
-        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest. "closed-form" is the exact
-        series of balls and slabs of one homogeneous medium, with points, beams that are points, and in balls diffuse
-        light; it takes `tolerance` and `detectors`. "auto" takes the fastest of these that gives what is asked for, see
-        `tetlux.fem.plan`; its other arguments are for finite elements.
+        arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance`, and refuses
+        the rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with points, beams
+        that are points, and in balls diffuse light; it takes `tolerance` and `detectors`. "auto" takes the fastest of
+        these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite elements.
 
     Returns
     -------
@@ -241,9 +241,15 @@ def solve(
     if model in ("closed-form", "charges"):
         check_options_without_mesh(model, options)
     if model == "charges":
-        assert tolerance is not None
-        found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-        return replace(found, readings=read_all(detectors, found))
+        return solve_with_charges(
+            body if mesh is None else mesh,
+            medium,
+            lights,
+            regions=regions,
+            tolerance=tolerance,
+            detectors=detectors,
+            detector_tolerance=detector_tolerance,
+        )
     return _solve_channels(body, medium, lights, model, options)
 
 

@@ -50,15 +50,17 @@ OF_FINITE_ELEMENTS: Mapping[str, Any] = {
 
 
 def check_options_without_mesh(model: str, options: Options) -> None:
-    """Refuse arguments that are for finite elements alone, and no tolerance of charges.
+    """Refuse arguments that are for finite elements alone.
 
     Raises
     ------
     InputError
     """
-    if model == "charges" and options.get("tolerance") is None:
-        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
-    names = [name for name, default in OF_FINITE_ELEMENTS.items() if options.get(name, default) != default]
+    names = [
+        name
+        for name, default in OF_FINITE_ELEMENTS.items()
+        if options.get(name, default) != default and (model, name) != ("charges", "detector_tolerance")
+    ]
     if names:
         raise InputError(
             f'model "{model}" does not take {" and ".join(names)}; leave out what it does not take, or give '
