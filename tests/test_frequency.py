@@ -209,3 +209,14 @@ def test_modulation_that_is_too_fast_for_diffusion_is_reported() -> None:
     assert not any(
         getattr(each, "code", "") == "frequency-high" for each in solve(mesh, TISSUE, light, frequency=6e9).warnings
     )
+
+
+def test_modulated_light_is_planned_for_finite_elements() -> None:
+    ball, lights = sphere(10.0), [PointSource((0.0, 0.0, 5.0))]
+    planned = solve(ball, TISSUE, lights, tolerance=0.1, frequency=1e8, model="auto")
+    assert isinstance(planned, Solution)
+    assert planned.plan is not None
+    assert planned.plan["closed-form"].reason == "modulated light is solved on a mesh"
+    for model in ("charges", "closed-form"):
+        with pytest.raises(InputError, match=f'model "{model}" does not take frequency'):
+            solve(ball, TISSUE, lights, frequency=1e8, model=model)  # type: ignore[call-overload]

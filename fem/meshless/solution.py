@@ -56,8 +56,7 @@ class ChargeSolution:
 
     Attributes
     ----------
-    surface : Surface
-    medium : Medium
+    surface, medium : Surface, Medium
         Of the body.
     interfaces : tuple of Interface
         The body's surface, then those of its regions.
@@ -96,8 +95,7 @@ class ChargeSolution:
     plan: Plan | None = None
     goal: ReadingGoal | None = None
 
-    mesh = None
-    model = "charges"
+    mesh, model = None, "charges"
 
     @property
     def error_estimate(self) -> float:
