@@ -134,11 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
-    check = commands.add_parser("check", help="check case files and the files they name, without solving")
-    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
-    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
-    check.set_defaults(command=_check)
-
+    _add_previews(commands)
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
     listing.set_defaults(command=_list)
 
@@ -150,6 +146,18 @@ def _parser() -> argparse.ArgumentParser:
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
     schema.set_defaults(command=_schema)
     return parser
+
+
+def _add_previews(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    """Add the commands that read cases and solve nothing."""
+    check = commands.add_parser("check", help="check case files and the files they name, without solving")
+    check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
+    check.set_defaults(command=_check)
+
+    plan = commands.add_parser("plan", help="print which model fits each case, what each model costs, and why")
+    plan.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
+    plan.set_defaults(command=_plan)
 
 
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -222,6 +230,12 @@ def _check(options: argparse.Namespace) -> int:
     from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
     return check_all(options.cases, plan=options.plan)
+
+
+def _plan(options: argparse.Namespace) -> int:
+    from tetlux.cases.batch.requests import print_models  # noqa: PLC0415
+
+    return print_models(options.cases)
 
 
 def _list(_: argparse.Namespace) -> int:

@@ -4,9 +4,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
+from tetlux.cases.planning import AUTO, plan_case, request_of
 from tetlux.cases.write.results import AnySolution
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.solve import report_plan, solve_by_plan, solve_closed_forms
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
@@ -17,8 +20,22 @@ Report = Callable[[str], None]
 
 def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | None = None) -> Sequence[AnySolution]:
     """Solve each channel by the model of the case; `start` is the mesh that finite elements begin with."""
-    if case.spec.model == "charges":
-        return _solve_with_charges(case, report)
+    model = case.spec.model
+
+    def solve_fully() -> list[Solution]:
+        return _solve_fully(case, report, cache=cache, start=start)
+
+    if model == AUTO:
+        plan = case.plan or plan_case(case)
+        report_plan(plan, report)
+        return solve_by_plan(request_of(case, plan.runs), solve_fully, report, plan=plan)
+    if model == "closed-form":
+        return solve_closed_forms(request_of(case))
+    return _solve_with_charges(case, report) if model == "charges" else solve_fully()
+
+
+def _solve_fully(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> list[Solution]:
+    """Solve all channels by finite elements, on one mesh."""
     return solve_each(
         case.mesh or case.surface,
         [channel.media for channel in case.channels],
@@ -40,12 +57,20 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     """Solve each channel by charges; the seconds of each solution are those of all channels together."""
     solutions = []
-    assert case.tolerance is not None
     media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
         lights = list(channel.lights.values())
-        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
+        solution = solve(
+            case.surface,
+            body,
+            lights,
+            regions=regions,
+            tolerance=case.tolerance,
+            detectors=[entry.detector for entry in case.detectors] if case.detector_tolerance else (),
+            detector_tolerance=case.detector_tolerance,
+            model="charges",
+        )
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
         solutions.append(solution)

@@ -24,13 +24,15 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.media.spectra import Spectrum
 from tetlux.fem.media.tissue import tissue
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
 from tetlux.fem.outcome.detectors import read
+from tetlux.fem.outcome.plan import Candidate, Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner import plan
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint
@@ -42,7 +44,9 @@ from tetlux.fem.system import System
 
 __all__ = [
     "Body",
+    "Candidate",
     "ChargeSolution",
+    "ClosedFormSolution",
     "CollimatedBeam",
     "Deposit",
     "DiffuseLight",
@@ -60,6 +64,7 @@ __all__ = [
     "Medium",
     "MeshHints",
     "PencilBeam",
+    "Plan",
     "PointDetector",
     "PointSource",
     "Power",
@@ -76,6 +81,7 @@ __all__ = [
     "henyey_greenstein",
     "material",
     "mesh_field",
+    "plan",
     "radiance",
     "read",
     "solve",

@@ -1,21 +1,24 @@
 """`solve`: the public function that solves for the light in a body."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any, Literal, TypedDict, Unpack, overload
+from typing import Any, Literal, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
+from tetlux.fem.meshless.closed_form import ClosedFormSolution
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.options import Options, check_options_without_mesh
+from tetlux.fem.planner.request import make_request
+from tetlux.fem.planner.solve import AnySolution, solve_by_plan, solve_closed_forms
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import Report, no_report, solve_each
 from tetlux.fem.sources.light import Light
@@ -24,26 +27,6 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 __all__ = ["solve", "solve_each"]
-
-
-class Options(TypedDict, total=False):
-    """Arguments of `solve` by finite elements that have a default, for the types of what it returns."""
-
-    regions: Sequence[Region]
-    tolerance: float | None
-    detectors: Sequence[Detector]
-    detector_tolerance: float | None
-    everywhere_tolerance: float | None
-    volume_tolerance: float | None
-    mesh: TetMesh | None
-    mass: Lumping
-    subtract: Subtract
-    limit: bool
-    most_tetrahedra: int
-    cache: bool
-    report: Report
-    frequency: float
-    outside_index: float
 
 
 @overload
@@ -76,9 +59,44 @@ def solve(
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
     detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
 ) -> ChargeSolution: ...
+
+
+@overload
+def solve(
+    body: Surface,
+    medium: AnyMedium,
+    lights: Sequence[Light],
+    *,
+    model: Literal["closed-form"],
+    tolerance: float | None = ...,
+    detectors: Sequence[Detector] = ...,
+) -> ClosedFormSolution: ...
+
+
+@overload
+def solve(  # type: ignore[overload-overlap]  # as above
+    body: Surface | TetMesh,
+    medium: AnyMedium | Mapping[Any, AnyMedium],
+    lights: Sequence[Light],
+    *,
+    model: Literal["auto"],
+    **options: Unpack[Options],
+) -> AnySolution: ...
+
+
+@overload
+def solve(
+    body: Surface | TetMesh,
+    medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
+    lights: Sequence[Light],
+    *,
+    model: Literal["auto"],
+    **options: Unpack[Options],
+) -> list[AnySolution]: ...
 
 
 def solve(
@@ -101,8 +119,8 @@ def solve(
     report: Report = no_report,
     frequency: float = 0.0,
     outside_index: float = 1.0,
-    model: Literal["full", "charges"] = "full",
-) -> Solution | list[Solution] | ChargeSolution:
+    model: Literal["full", "auto", "closed-form", "charges"] = "full",
+) -> AnySolution | Sequence[AnySolution]:
     """Solve the diffusion approximation for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
@@ -125,7 +143,8 @@ def solve(
     detectors : sequence of detectors
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
-        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them, nor are
+        charges fitted for them.
     everywhere_tolerance : float, optional
         Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
         of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
@@ -162,17 +181,20 @@ def solve(
         Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
     outside_index : float
         Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
-    model : {"full", "charges"}
-        The method: both solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
+    model : {"full", "auto", "closed-form", "charges"}
+        The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
-        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest.
+        arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance`, and refuses
+        the rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with points, beams
+        that are points, and in balls diffuse light; it takes `tolerance` and `detectors`. "auto" takes the fastest of
+        these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite elements.
 
     Returns
     -------
-    Solution, list of Solution, or ChargeSolution
-        A list with a solution for each channel if `medium` is a sequence or holds one for a label. A ChargeSolution
-        for ``model="charges"``.
+    Solution, ChargeSolution or ClosedFormSolution, or list of these
+        A list with a solution for each channel if `medium` is a sequence or holds one for a label. Its `model` says
+        how it was solved and, for ``model="auto"``, its `plan` why; its `mesh` is None where none was made.
 
     Raises
     ------
@@ -197,33 +219,9 @@ def solve(
     >>> solution.error_estimate < 0.05
     True
     """
-    if model not in ("full", "charges"):
-        raise InputError(f'model is "{model}"; give "full" or "charges".')
-    if model == "charges":
-        _check_options_of_charges(
-            tolerance,
-            {
-                "detector_tolerance": detector_tolerance is not None,
-                "everywhere_tolerance": everywhere_tolerance is not None,
-                "volume_tolerance": volume_tolerance is not None,
-                "mass": mass != "lumped",
-                "subtract": subtract != "fitted",
-                "limit": not limit,
-                "most_tetrahedra": most_tetrahedra != MOST_TETRAHEDRA,
-                "cache": not cache,
-                "report": report is not no_report,
-                "frequency": frequency != 0,
-                "outside_index": outside_index != 1,
-            },
-        )
-        assert tolerance is not None
-        found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-        return replace(found, readings=read_all(detectors, found))
-    channels, several = media_by_channel(body, mesh, medium)
-    solutions = solve_each(
-        body,
-        channels,
-        [lights] * len(channels),
+    if model not in ("full", "auto", "closed-form", "charges"):
+        raise InputError(f'model is "{model}"; give "full", "auto", "closed-form" or "charges".')
+    options = Options(
         regions=regions,
         tolerance=tolerance,
         detectors=detectors,
@@ -240,21 +238,52 @@ def solve(
         frequency=frequency,
         outside_index=outside_index,
     )
-    return solutions if several else solutions[0]
-
-
-def _check_options_of_charges(tolerance: float | None, given: Mapping[str, bool]) -> None:
-    """Refuse arguments that are for finite elements alone; `given` says of each whether it was changed.
-
-    Raises
-    ------
-    InputError
-    """
-    if tolerance is None:
-        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
-    names = [name for name, changed in given.items() if changed]
-    if names:
-        raise InputError(
-            f'model "charges" does not take {" and ".join(names)}; leave out what it does not take, or give '
-            'model="full".'
+    if model in ("closed-form", "charges"):
+        check_options_without_mesh(model, options)
+    if model == "charges":
+        return solve_with_charges(
+            body if mesh is None else mesh,
+            medium,
+            lights,
+            regions=regions,
+            tolerance=tolerance,
+            detectors=detectors,
+            detector_tolerance=detector_tolerance,
         )
+    return _solve_channels(body, medium, lights, model, options)
+
+
+def _solve_channels(
+    body: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    lights: Sequence[Light],
+    model: Literal["full", "auto", "closed-form"],
+    options: Options,
+) -> AnySolution | Sequence[AnySolution]:
+    """Solve each channel: all on one mesh, or all by one closed form."""
+    channels, several = media_by_channel(body, options["mesh"], medium)
+    scenes = [lights] * len(channels)
+    solutions: Sequence[AnySolution]
+    if model == "full":
+        solutions = solve_each(body, channels, scenes, **options)
+    else:
+        request = make_request(
+            body,
+            channels,
+            scenes,
+            regions=options["regions"],
+            tolerances=Tolerances(
+                options["tolerance"],
+                options["detector_tolerance"],
+                everywhere=options["everywhere_tolerance"],
+                volume=options["volume_tolerance"],
+            ),
+            detectors=options["detectors"],
+            mesh=options["mesh"],
+            need_of_mesh="modulated light is solved on a mesh" if options["frequency"] else "",
+        )
+        if model == "closed-form":
+            solutions = solve_closed_forms(request)
+        else:
+            solutions = solve_by_plan(request, lambda: solve_each(body, channels, scenes, **options), options["report"])
+    return solutions if several else solutions[0]

@@ -51,7 +51,8 @@ def lags(values: np.ndarray) -> list[float]:
 
 def test_the_speed_of_light_is_that_in_the_medium() -> None:
     assert shift_of_frequency(500e6, TISSUE, "mm") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 299.792458, rel=1e-12)
-    assert shift_of_frequency(500e6, TISSUE, "m") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 0.299792458, rel=1e-12)
+    in_metres = Medium(sigma_a=10.0, sigma_s_prime=1000.0, eta=1.4)
+    assert shift_of_frequency(500e6, in_metres, "m") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 0.299792458, rel=1e-12)
     in_water = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4 / 1.33)
     assert shift_of_frequency(1e8, in_water, "mm", 1.33) == pytest.approx(shift_of_frequency(1e8, TISSUE, "mm"))
     assert shift_of_frequency(0.0, TISSUE, "mm") == 0
@@ -210,3 +211,14 @@ def test_modulation_that_is_too_fast_for_diffusion_is_reported() -> None:
     assert not any(
         getattr(each, "code", "") == "frequency-high" for each in solve(mesh, TISSUE, light, frequency=6e9).warnings
     )
+
+
+def test_modulated_light_is_planned_for_finite_elements() -> None:
+    ball, lights = sphere(10.0), [PointSource((0.0, 0.0, 5.0))]
+    planned = solve(ball, TISSUE, lights, tolerance=0.1, frequency=1e8, model="auto")
+    assert isinstance(planned, Solution)
+    assert planned.plan is not None
+    assert planned.plan["closed-form"].reason == "modulated light is solved on a mesh"
+    for model in ("charges", "closed-form"):
+        with pytest.raises(InputError, match=f'model "{model}" does not take frequency'):
+            solve(ball, TISSUE, lights, frequency=1e8, model=model)  # type: ignore[call-overload]

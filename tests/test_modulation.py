@@ -70,6 +70,7 @@ def test_surface_and_volume_have_amplitudes_and_phases(finished: Path) -> None:
     assert values["exitance"] == pytest.approx(values["exitance_0MHz"] + values["exitance_500MHz"])
     assert "phase" not in values
     assert "phase_0MHz" not in values
+    assert result.points is not None
     far = int(np.argmin(result.points[:, 2]))
     assert values["phase_500MHz"][far] == pytest.approx(79.1, abs=3.0)
     assert values["exitance_500MHz"][far] == pytest.approx(2.08e-5, rel=0.1)
@@ -119,6 +120,14 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path, frequency: str, mo
     (tmp_path / "ball.yaml").write_text(CASE.replace("FREQUENCY", frequency) + more)
     with pytest.raises(InputError, match=words):
         load_cases(tmp_path / "ball.yaml")
+
+
+def test_the_planner_takes_a_mesh(tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(CASE.replace("FREQUENCY", "1e8") + "model: auto\noutputs: []\n")
+    assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path), "--quiet", "--jobs", "1"]) == 0
+    summary = json.loads((tmp_path / "ball" / "summary.json").read_text())
+    assert summary["model"] == "fem"
+    assert summary["detectors"][0]["phase"] == pytest.approx(11.118, abs=0.1)
 
 
 def test_charges_alone_refuse_modulation(tmp_path: Path) -> None:

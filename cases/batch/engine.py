@@ -17,6 +17,7 @@ from tetlux.cases.batch.processes import run_in_processes
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.batch.workshop import Workshop
 from tetlux.cases.file.case import Case
+from tetlux.cases.planning import plan_models
 from tetlux.cases.run import SUMMARY
 from tetlux.cases.write.content import content_of
 from tetlux.cases.write.publish import check_writable
@@ -79,6 +80,7 @@ def run_batch(
     check_writable(out)
     contents = [content_of(case) for case in cases]
     kept = _finished(cases, out, contents) if resume else {}
+    cases = plan_models(cases)
     plan = make_plan(cases)
     batch = Batch(plan, cases, frozenset(kept), str(out.absolute()), cache, MeshStore(out, plan, contents))
     with _workers(scheduler, worker_count(jobs, len(cases) - len(kept)), launcher) as (workers, run_on):

@@ -42,7 +42,7 @@ def make_plan(cases: Sequence[Case]) -> Plan:
     for number, case in enumerate(cases):
         body = keys.of(case)
         planned = surfaces.setdefault(body, PlannedSurface(len(surfaces), _name(case), len(case.surface.faces)))
-        key: Hashable = (body, *_wanted(case)) if _can_share(case) else (body, number)
+        key: Hashable = (body, *_wanted(case)) if _makes_mesh(case) else (body, number)
         groups.setdefault(key, []).append(number)
         surface_of[key] = planned.number
     meshes: list[PlannedMesh] = []
@@ -90,9 +90,10 @@ def _name(case: Case) -> str:
     return case.surface.name
 
 
-def _can_share(case: Case) -> bool:
-    """Whether the run makes a mesh at all."""
-    return case.mesh is None and case.spec.model == "full"
+def _makes_mesh(case: Case) -> bool:
+    """Whether the run makes a mesh."""
+    model = case.spec.model if case.plan is None else case.plan.chosen
+    return case.mesh is None and model == "full"
 
 
 def _wanted(case: Case) -> tuple[Hashable, ...]:

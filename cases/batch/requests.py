@@ -13,6 +13,7 @@ from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.reader import FilesRead
+from tetlux.cases.planning import AUTO, plan_groups, plan_models
 from tetlux.cases.shipped import find_case_files
 from tetlux.meshing.errors import InputError
 
@@ -74,7 +75,7 @@ def check_all(requests: Sequence[str], *, plan: bool = False) -> int:
         0 if all are valid, else 2.
     """
     if plan:
-        print_plan(make_plan(load_all(requests)))
+        print_plan(make_plan(plan_models(load_all(requests))))
         return 0
     wrong = 0
     files = FilesRead()
@@ -91,8 +92,19 @@ def check_all(requests: Sequence[str], *, plan: bool = False) -> int:
             print(f"tetlux: {error}", file=sys.stderr)
             wrong += 1
     if len(valid) > 1:
+        valid = plan_models(valid)
         print(describe_plan(make_plan(valid), valid))
     return 2 if wrong else 0
+
+
+def print_models(requests: Sequence[str]) -> int:
+    """Print how `model: auto` would solve the runs of case files, a plan for each group of like runs; return 0."""
+    for case, plan in plan_groups(load_all(requests)):
+        model, others = case.spec.model, f" and {plan.runs - 1:,} others" if plan.runs > 1 else ""
+        print(f"{case.name}{others}: {plan}")
+        if model not in (AUTO, plan.chosen):
+            print(f"  the case names model {model}, which is taken")
+    return 0
 
 
 def _describe(cases: Sequence[Case]) -> str:

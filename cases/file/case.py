@@ -12,6 +12,7 @@ from tetlux.fem.lights import Light
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
+from tetlux.fem.outcome.plan import Plan
 from tetlux.meshing.arrays import FloatArray, Vector
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.notes import Note, in_region
@@ -91,6 +92,8 @@ class Case:
         The validated case file of this run.
     sweep_values : mapping
         The values of this run of a sweep, plain data by dotted key; empty without a sweep.
+    plan : Plan, optional
+        Which model solves it, where the case file leaves that to the program.
     """
 
     name: str
@@ -114,6 +117,7 @@ class Case:
     reading_seconds: float = 0.0
     comparison: "Comparison | None" = None
     mesh: TetMesh | None = None
+    plan: Plan | None = None
 
     @property
     def channel_names(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """`load_cases`: from a case file to its runs, with all that can be checked before meshing."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,8 @@ from tetlux.cases.start import take_start_seconds
 from tetlux.fem.inputs import unit_vector
 from tetlux.fem.lights import Deposit, Light
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.closed_form import homogeneous
+from tetlux.fem.meshless.exact_field import exact_field
 from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
 from tetlux.fem.models.modulation import shifts_of_scenes
 from tetlux.meshing.arrays import FloatArray
@@ -98,6 +100,8 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     _check_value_names(document, channels, names)
     frequencies = _build_frequencies(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
+    if spec.model == "closed-form":
+        _check_for_closed_form(document, body, deposits)
     return Case(
         name=name,
         source=document.path,
@@ -187,7 +191,7 @@ def _build_lights(
                 lights[channel][names[i]] = light
                 # Whether a light is refused depends on the coefficients for charges only.
                 known = (light, body.shape, body_in_channel.outer.boundary)
-                if spec.model == "full" and not spec.compare and known in reader.files.lights:
+                if spec.model in ("full", "auto") and not spec.compare and known in reader.files.lights:
                     continue
                 deposit = light.deposit_in(body_in_channel)
                 reader.files.lights.add(known)
@@ -220,6 +224,21 @@ def _check_for_charges(document: Document, body: CaseBody) -> None:
         with document.at((*key, "medium")):
             for body_in_channel in body.bodies:
                 homogeneous_medium(body_in_channel.by_label[number])
+
+
+def _check_for_closed_form(document: Document, body: CaseBody, deposits: Sequence[Deposit]) -> None:
+    """Refuse a body or a light without a closed form.
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+    """
+    with document.at(("model",)):
+        try:
+            exact_field(body.surface.shape, homogeneous(body.bodies[0]), deposits)
+        except InputError as error:
+            raise InputError(error.text, remedy="write model: auto, or full") from error
 
 
 def _check_value_names(document: Document, channels: tuple[str, ...], lights: tuple[str, ...]) -> None:

@@ -164,6 +164,7 @@ def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
         detectors=detectors,
         detector_tolerance=TOLERANCE if detectors else None,
         most_tetrahedra=MOST_TETRAHEDRA,
+        model="full",
         **variant.options,
     )
 

@@ -11,7 +11,7 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places
@@ -22,7 +22,7 @@ from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
-AnySolution = Solution | ChargeSolution
+AnySolution = Solution | ChargeSolution | ClosedFormSolution
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Results:
     Attributes
     ----------
     case : Case
-    solutions : tuple of Solution or ChargeSolution
+    solutions : tuple of Solution, ChargeSolution or ClosedFormSolution
         One for each channel.
     surface : Surface
         The case's surface, with vertices added where its triangles are too large to show the exitance.
@@ -92,7 +92,7 @@ class Results:
 
     @property
     def mesh_solutions(self) -> tuple[Solution, ...]:
-        """The solutions that have a mesh: all, or none by charges."""
+        """The solutions that have a mesh: all, or none without a mesh."""
         return tuple(solution for solution in self.solutions if isinstance(solution, Solution))
 
     @property

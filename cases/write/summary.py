@@ -8,11 +8,13 @@ import numpy as np
 
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.write.media_rows import media_rows
+from tetlux.cases.write.plan_record import describe_plan
 from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
 from tetlux.cases.write.run_record import describe_run
-from tetlux.fem.meshless import ChargeSolution
+from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray, Number
@@ -43,7 +45,7 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
     """
     case = results.case
     mesh = results.mesh_solutions[0].mesh if results.mesh_solutions else None
-    several = len(case.light_names) > 1
+    several, plan = len(case.light_names) > 1, results.solutions[0].plan
     channels = [
         _channel(
             channel,
@@ -57,10 +59,11 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
     return {
         "case": case.name,
         "unit": case.surface.unit,
-        "model": "fem" if mesh else "charges",
+        "model": "fem" if mesh else results.solutions[0].model,
         "tolerance": case.tolerance,
         **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
+        **({"plan": describe_plan(plan, results.solutions)} if plan else {}),
         **({"mesh": _mesh(case, mesh)} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
@@ -87,7 +90,7 @@ def _mesh(case: Case, mesh: TetMesh) -> dict[str, Any]:
 def _channel(
     channel: Channel, solution: AnySolution, exitance: FloatArray, several: bool, media: list[dict[str, Any]]
 ) -> dict[str, Any]:
-    area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
+    area = solution.mesh.area if isinstance(solution, Solution) else solution.area
     figures: dict[str, Any] = {
         "name": channel.name,
         **({"frequency": channel.frequency} if channel.frequency else {}),
@@ -112,7 +115,9 @@ def _channel(
 
 
 def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
-    """The figures that only one of the two models has."""
+    """The figures that only one of the models has."""
+    if isinstance(solution, ClosedFormSolution):
+        return {"closed_form": {"name": solution.exact.name, "bound": _finite(solution.error_bound)}}
     if isinstance(solution, ChargeSolution):
         # The fluence has a pole at each source, so there is no largest value.
         return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}

@@ -12,6 +12,8 @@ from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
 from tetlux.fem.models.modulation import lag
+from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
+from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.quadratic.error import fluence_with_error
@@ -70,6 +72,8 @@ class Solution:
         Relative errors that the exitance is within at some 95 % of the surface, and the fluence inside, in each range
         of brightness down to a millionth of the largest: see `tetlux.fem.quadratic.field_error`. nan where there is no
         tolerance of these.
+    plan : Plan, optional
+        Why this model was chosen, if it was.
     frequency : float
         Of modulated light, Hz: fluence, exitance, power and readings then are complex amplitudes. 0 for steady light.
     """
@@ -94,7 +98,10 @@ class Solution:
     is_quadratic: bool = False
     everywhere_error: float = np.nan
     volume_error: float = np.nan
+    plan: Plan | None = None
     frequency: float = 0.0
+
+    model = "full"
 
     @cached_property
     def exitance(self) -> NumberArray:
@@ -138,14 +145,22 @@ class Solution:
         return values
 
     def exitance_on(self, queries: FloatArray) -> NumberArray:
-        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
+        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit².
+
+        Between nodes see `tetlux.fem.outcome.between_nodes`; of each light by itself, so that lights add up.
+        """
+        if self.of_lights and not self.is_quadratic:
+            return np.asarray(sum(light.exitance_on(queries) for light in self.of_lights))
         _, face, weights = self.mesh.closest_boundary(queries)
         weights = np.maximum(weights, 0.0)  # rounding
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        linear = self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        fluence = interpolate(self.fluence, self.patches, queries, cells, corners, weights)
+        is_far = ~np.any([np.zeros(len(queries), bool), *(patch.cells[cells] for patch in self.patches)], axis=0)
+        fluence[is_far] = follow_fading(fluence[is_far], self.fluence[corners[is_far]], weights[is_far])
+        linear = self.boundary_condition.exitance(fluence, transmitted)
         if not self.is_quadratic:
             return linear
         assert self.quadratic is not None
@@ -184,29 +199,6 @@ class Solution:
             raise InputError("validity is that of all lights together; ask the whole solution, not one of of_lights.")
         return self.validity.at(queries)
 
-    def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> NumberArray:
-        """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
-        linear = (weights * self.fluence[nodes]).sum(axis=1)
-        subtracted, interpolated = np.zeros((2, len(points)), self.fluence.dtype)
-        for patch in self.patches:
-            inside = patch.cells[cells]
-            subtracted[inside] += patch.charges.fluence(points[inside])
-            interpolated[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
-        fluence = linear + (subtracted - interpolated)
-        if np.iscomplexobj(fluence):
-            return np.asarray(fluence)
-        # Where light fades within a tetrahedron, adding the difference may give a negative value; scaling by the ratio
-        # cannot.
-        below = (fluence < 0) & (linear >= 0)
-        shares = below & (subtracted >= 0) & (interpolated > 0)
-        fluence[shares] = linear[shares] * subtracted[shares] / interpolated[shares]
-        if any(isinstance(patch, FittedPatch) for patch in self.patches):
-            # They may be below zero where they are off by more than there is light; beside a bright node the linear
-            # function is far larger than either.
-            rest = below & ~shares
-            fluence[rest] = np.minimum(linear[rest], np.abs(subtracted[rest]))
-        return np.asarray(fluence)
-
     def fluence_at(self, points: FloatArray) -> NumberArray:
         """Fluence at given points.
 
@@ -231,7 +223,9 @@ class Solution:
 
         def fill(places: IntArray) -> None:
             nodes = self.mesh.tetrahedra[cells[places]]
-            fluence[places] = self._interpolated(queries[places], cells[places], nodes, weights[places])
+            fluence[places] = interpolate(
+                self.fluence, self.patches, queries[places], cells[places], nodes, weights[places]
+            )
 
         fill(np.flatnonzero(cells >= 0))
         # Extrapolation beyond the facets may not go below zero.

@@ -115,7 +115,10 @@ class ModulationSpec(Section):
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture"]
-Model = Literal["full", "charges"]
+Model = Literal["full", "auto", "closed-form", "charges"]
+# Models that make no mesh.
+WITHOUT_MESH = ("closed-form", "charges")
+TOLERANCES_WITHOUT_MESH = {"closed-form": ("exitance",), "charges": ("exitance", "detectors")}
 
 
 Relative = Annotated[float, Field(strict=True, ge=1e-4, lt=1)]
@@ -159,7 +162,9 @@ class CaseSpec(Section):
         None, description="lights are modulated at a frequency: results are amplitudes and phases"
     )
     model: Model = Field(
-        "full", description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh"
+        "full",
+        description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh; closed-form: "
+        "the exact series of a sphere or slab; auto: the fastest of these that gives what is asked for",
     )
     tolerance: Tolerance = Field(
         DEFAULT_TOLERANCE,
@@ -169,7 +174,7 @@ class CaseSpec(Section):
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
     up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
     outputs: list[Output] = Field(
-        ["surface", "volume", "picture"], description="default: all; with model charges all but volume"
+        ["surface", "volume", "picture"], description="default: all; with another model than full all but volume"
     )
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,
@@ -192,32 +197,40 @@ class CaseSpec(Section):
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
         given = {name: value for name, value in self.tolerances if value is not None}
-        if not given or (self.model == "charges" and "exitance" not in given):
-            needed = "of the exitance" if self.model == "charges" else "of exitance, detectors, everywhere or volume"
+        if not given or (self.model == "closed-form" and "exitance" not in given):
+            needed = {"closed-form": "of the exitance", "charges": "of exitance or detectors"}.get(
+                self.model, "of exitance, detectors, everywhere or volume"
+            )
             raise PydanticCustomError(
                 "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
             )
         if "detectors" in given and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
         for name in given:
-            if name != "exitance" and self.model == "charges":
+            if name not in TOLERANCES_WITHOUT_MESH.get(self.model, given):
                 raise PydanticCustomError(
                     "tolerance",
-                    'tolerance.{name} is for finite elements, not for model "charges"; leave it out',
-                    {"name": name},
+                    'tolerance.{name} is for finite elements, not for model "{model}"; leave it out',
+                    {"name": name, "model": self.model},
                 )
+        if "detectors" in given and self.regions and self.model == "charges":
+            raise PydanticCustomError(
+                "tolerance",
+                'tolerance.detectors with model "charges" is for a body without regions; leave it out, or write '
+                "model: full",
+            )
         return self
 
     @model_validator(mode="before")
     @classmethod
     def _outputs_of_model(cls, data: Any) -> Any:
-        if isinstance(data, dict) and data.get("model") == "charges" and "outputs" not in data:
+        if isinstance(data, dict) and data.get("model") in (*WITHOUT_MESH, "auto") and "outputs" not in data:
             return {**data, "outputs": ["surface", "picture"]}
         return data
 
     @model_validator(mode="after")
     def _without_mesh(self) -> "CaseSpec":
-        if self.model == "charges":
+        if self.model in WITHOUT_MESH:
             for key, what, given in (
                 ("mesh", "a mesh", self.mesh),
                 ("outputs", "volume", "volume" in self.outputs),
@@ -227,9 +240,9 @@ class CaseSpec(Section):
                 if given:
                     raise PydanticCustomError(
                         "no_mesh",
-                        '{what} needs finite elements, which model "charges" does not use; leave it out, or write '
-                        "model: full",
-                        {"key": key, "what": what},
+                        '{what} needs finite elements, which model "{model}" does not use; leave it out, or '
+                        "write model: full",
+                        {"key": key, "what": what, "model": self.model},
                     )
         return self
 
