@@ -41,6 +41,7 @@ from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
+from tetlux.fem.transient.moments import Moments, moments
 
 __all__ = [
     "Body",
@@ -63,6 +64,7 @@ __all__ = [
     "Light",
     "Medium",
     "MeshHints",
+    "Moments",
     "PencilBeam",
     "Plan",
     "PointDetector",
@@ -81,6 +83,7 @@ __all__ = [
     "henyey_greenstein",
     "material",
     "mesh_field",
+    "moments",
     "plan",
     "radiance",
     "read",
