@@ -42,6 +42,7 @@ from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 from tetlux.fem.transient.moments import Moments, moments
+from tetlux.fem.transient.pulse import Transient, read_pulse
 
 __all__ = [
     "Body",
@@ -78,6 +79,7 @@ __all__ = [
     "SourceTerms",
     "Spectrum",
     "System",
+    "Transient",
     "VaryingMedium",
     "grid_field",
     "henyey_greenstein",
@@ -87,6 +89,7 @@ __all__ = [
     "plan",
     "radiance",
     "read",
+    "read_pulse",
     "solve",
     "solve_each",
     "table",

@@ -124,9 +124,7 @@ def moments(
     values = np.array([_read(system, shift, lights, detectors) for shift in circle.tolist()])
     powers = np.exp(-1j * np.outer(np.arange(order + 1), angles)) / radius ** np.arange(order + 1)[:, None]
     coefficients = np.real(np.tensordot(powers, values, axes=1)) * 2.0 / POINTS
-    factors = [
-        (-1) ** m * math.factorial(m) * _seconds_per_length(system, outside_index) ** m for m in range(order + 1)
-    ]
+    factors = [(-1) ** m * math.factorial(m) * seconds_per_length(system, outside_index) ** m for m in range(order + 1)]
     raw = coefficients * np.array(factors)[:, None, None] / coefficients[0]
     return Moments(raw, coefficients[0])
 
@@ -150,7 +148,7 @@ def _nearest_pole(coefficients: Coefficients, diagonal: float) -> float:
     return float(np.min(coefficients.sigma_a)) + 1.0 / length
 
 
-def _seconds_per_length(system: System, outside_index: float) -> float:
+def seconds_per_length(system: System, outside_index: float) -> float:
     """``n/c``, s/unit."""
     index = system.coefficients.outer.eta * outside_index
     return float(index * MILLIMETRES[system.mesh.unit] / SPEED_OF_LIGHT)
