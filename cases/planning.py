@@ -52,6 +52,8 @@ def request_of(case: Case, runs: int = 1) -> Request:
         need = "the output volume is the fluence on a mesh"
     elif case.comparison is not None:
         need = "compare is of finite elements"
+    elif any(case.frequencies):
+        need = "modulated light is solved on a mesh"
     return make_request(
         case.mesh or case.surface,
         [channel.media for channel in case.channels],
@@ -82,5 +84,5 @@ def _key(case: Case) -> Hashable:
     surfaces = (case.surface, case.mesh, *(region.surface for region in case.regions))
     kinds = tuple((type(channel.medium), *map(type, channel.lights.values())) for channel in case.channels)
     tolerances = (case.tolerance, case.detector_tolerance, case.everywhere_tolerance, case.volume_tolerance)
-    outputs = ("volume" in case.outputs, case.comparison is not None, len(case.detectors))
+    outputs = ("volume" in case.outputs, case.comparison is not None, len(case.detectors), any(case.frequencies))
     return case.spec.model, tuple(map(id, surfaces)), kinds, tolerances, outputs

@@ -49,6 +49,8 @@ def _solve_fully(case: Case, report: Report, *, cache: bool, start: SharedMesh |
         volume_tolerance=case.volume_tolerance,
         cache=cache,
         report=report,
+        frequency=case.frequencies,
+        outside_index=case.outside_index,
     )
 
 

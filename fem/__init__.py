@@ -41,6 +41,8 @@ from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
+from tetlux.fem.transient.moments import Moments, moments
+from tetlux.fem.transient.pulse import Transient, read_pulse
 
 __all__ = [
     "Body",
@@ -63,6 +65,7 @@ __all__ = [
     "Light",
     "Medium",
     "MeshHints",
+    "Moments",
     "PencilBeam",
     "Plan",
     "PointDetector",
@@ -76,14 +79,17 @@ __all__ = [
     "SourceTerms",
     "Spectrum",
     "System",
+    "Transient",
     "VaryingMedium",
     "grid_field",
     "henyey_greenstein",
     "material",
     "mesh_field",
+    "moments",
     "plan",
     "radiance",
     "read",
+    "read_pulse",
     "solve",
     "solve_each",
     "table",

@@ -29,6 +29,8 @@ SLACK = 1.3
 PROGRESS_AFTER_SECONDS = 8.0
 
 Report = Callable[[str], None]
+# The media and the shift of a system.
+SystemKind = tuple[tuple[AnyMedium, ...], complex]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
 SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
 
@@ -62,32 +64,34 @@ class Problem:
     others: Sequence[Deposit] = ()
 
     @property
-    def media(self) -> list[tuple[AnyMedium, ...]]:
-        """The media of each scene."""
-        return self.scenes.media
+    def kinds(self) -> list[SystemKind]:
+        """The media and the shift of each scene: scenes of the same have one system."""
+        return list(zip(self.scenes.media, self.scenes.shifts, strict=True))
 
     @property
     def size(self) -> tuple[int, int]:
         """The numbers of matrices and of lights, which decide how much memory a mesh needs."""
-        return len(set(self.media)), sum(len(split.deposits) for split in self.lights)
+        return len(set(self.kinds)), sum(len(split.deposits) for split in self.lights)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
-        """A solver for single scenes on a mesh; scenes of the same media share a matrix."""
-        each = dict.fromkeys(self.media)
+        """A solver for single scenes on a mesh; scenes of the same media and shift share a matrix."""
+        each = dict.fromkeys(self.kinds)
         if self.shared is not None and mesh is self.shared.mesh:
-            systems = {media: self._shared_system(self.shared, media) for media in each}
+            systems = {kind: self._shared_system(self.shared, kind) for kind in each}
         else:
             assembly = Assembly(mesh)
             systems = {
-                media: self.scenes.system_on(mesh, media, self.lumping, assembly, limit=self.limit) for media in each
+                (media, shift): self.scenes.system_on(mesh, media, self.lumping, assembly, shift, limit=self.limit)
+                for media, shift in each
             }
-        return lambda scene, coarser: systems[self.media[scene]].step(self.lights[scene], self.watch, coarser)
+        return lambda scene, coarser: systems[self.kinds[scene]].step(self.lights[scene], self.watch, coarser)
 
-    def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
+    def _shared_system(self, shared: SharedMesh, kind: SystemKind) -> System:
+        media, shift = kind
         return shared.system(
-            (media, self.lumping, self.limit, self.scenes.shift),
+            (media, self.lumping, self.limit, shift),
             lambda: self.scenes.system_on(
-                shared.mesh, media, self.lumping, shared.assembly, limit=self.limit, expected=EXPECTED_LIGHTS
+                shared.mesh, media, self.lumping, shared.assembly, shift, limit=self.limit, expected=EXPECTED_LIGHTS
             ),
         )
 
@@ -114,7 +118,7 @@ def first_mesh(
         if tolerances.readings is not None:
             detector_points = np.array([placed.position for placed in tolerances.placed])
             all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
-            for media in dict.fromkeys(problem.media):
+            for media, shift in dict.fromkeys(problem.kinds):
                 mesh = grade_between(
                     mesh,
                     scenes.surface,
@@ -124,7 +128,7 @@ def first_mesh(
                     detector_points,
                     tolerances.readings,
                     most_tetrahedra,
-                    scenes.shift,
+                    shift,
                 )
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")

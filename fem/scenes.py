@@ -8,7 +8,7 @@ from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labels import GivenMedia, check_single_label, resolve_media, warnings_for_cavities, warnings_for_labels
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
-from tetlux.fem.models.modulation import notes_on_frequency, shift_of_frequency
+from tetlux.fem.models.modulation import notes_on_frequency, shifts_of_scenes
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.system import System
@@ -40,9 +40,9 @@ class Scenes:
         For each scene the body with its media; scenes of equal media share one.
     mesh_is_body : bool
         Whether the user gave a mesh in place of a surface, so that its conformity is reported too.
-    frequency : float
-        At which lights are modulated, Hz; 0 for steady light.
-    shift : complex
+    frequencies : tuple of float
+        At which the lights of each scene are modulated, Hz; 0 for steady light.
+    shifts : tuple of complex
         What that adds to sigma_a, 1/unit.
     """
 
@@ -53,8 +53,8 @@ class Scenes:
     mesh: TetMesh | None
     bodies: list[Body]
     mesh_is_body: bool
-    frequency: float = 0.0
-    shift: complex = 0.0
+    frequencies: tuple[float, ...]
+    shifts: tuple[complex, ...]
 
     def system_on(
         self,
@@ -62,6 +62,7 @@ class Scenes:
         media: tuple[AnyMedium, ...],
         lumping: Lumping,
         assembly: Assembly,
+        shift: complex = 0.0,
         *,
         limit: bool,
         expected: int = 0,
@@ -73,9 +74,9 @@ class Scenes:
         expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
-            return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit, shift=self.shift)
+            return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit, shift=shift)
         regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
-        return System(mesh, media[0], self.surface, lumping, expected, regions, assembly, limit, shift=self.shift)
+        return System(mesh, media[0], self.surface, lumping, expected, regions, assembly, limit, shift=shift)
 
     def warnings(self, number: int, solution: Solution, *, given: bool) -> list[str]:
         """Notes on the regions or labels of scene `number`, and on the mesh if the user gave it."""
@@ -83,7 +84,7 @@ class Scenes:
             found = warnings_for_labels(solution.mesh, self.bodies[number].by_label)
         else:
             found = warnings_for_regions(self.inner, self.media[number])
-        found = [*found, *notes_on_frequency(self.frequency, self.shift, self.media[number])]
+        found = [*found, *notes_on_frequency(self.frequencies[number], self.shifts[number], self.media[number])]
         if not given:
             return found
         mesh = solution.mesh
@@ -98,7 +99,7 @@ def build_scenes(
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     regions: Sequence[Region],
     scenes: int,
-    frequency: float = 0.0,
+    frequency: float | Sequence[float] = 0.0,
     outside_index: float = 1.0,
 ) -> Scenes:
     """Check a body, its media and the modulation of lights, and assign the media to the scenes.
@@ -125,9 +126,9 @@ def build_scenes(
         else:
             bodies[each] = Body(surface, each, SurfacePartition(inner))
         check_media(bodies[each])
-    each_body, mesh_is_body = [bodies[each] for each in media], isinstance(body, TetMesh)
-    shift = shift_of_frequency(frequency, each_body[0].outer, surface.unit, outside_index)
-    return Scenes(surface, inner, media, labels, mesh, each_body, mesh_is_body, frequency, shift)
+    of_scenes = [bodies[each] for each in media]
+    modulation = shifts_of_scenes(frequency, [each.outer for each in of_scenes], surface.unit, outside_index)
+    return Scenes(surface, inner, media, labels, mesh, of_scenes, isinstance(body, TetMesh), *modulation)
 
 
 def media_by_channel(

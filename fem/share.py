@@ -44,6 +44,8 @@ def share_mesh(
     volume_tolerance: float | None = None,
     cache: bool = True,
     report: Report = no_report,
+    frequency: float | Sequence[float] = 0.0,
+    outside_index: float = 1.0,
 ) -> SharedMesh:
     """Mesh a body for many scenes, so that most of them need no finer mesh.
 
@@ -53,7 +55,7 @@ def share_mesh(
     pilots : int
         So many scenes, the first ones, are solved for and stand for the others. The mesh is graded for the lights of
         all.
-    medium, scenes, regions, detectors, cache, report
+    medium, scenes, regions, detectors, cache, report, frequency, outside_index
     tolerance, detector_tolerance, everywhere_tolerance, volume_tolerance
         As in `solve_each`.
 
@@ -83,17 +85,23 @@ def share_mesh(
         Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance), detectors
     )
     wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
-    checked = build_scenes(surface, None, medium, regions, len(scenes))
+    checked = build_scenes(surface, None, medium, regions, len(scenes), frequency, outside_index)
     split = [
-        split_lights(lights, body, "fitted", tolerance=wanted, kept=KeptFits())
-        for lights, body in zip(scenes[:pilots], checked.bodies, strict=False)
+        split_lights(lights, body, "fitted", tolerance=wanted, kept=KeptFits(), shift=shift)
+        for lights, body, shift in zip(scenes[:pilots], checked.bodies, checked.shifts, strict=False)
     ]
     others = [
         light.deposit_in(body)
         for lights, body in zip(scenes[pilots:], checked.bodies[pilots:], strict=True)
         for light in lights
     ]
-    checked = replace(checked, media=checked.media[:pilots], bodies=checked.bodies[:pilots])
+    checked = replace(
+        checked,
+        media=checked.media[:pilots],
+        bodies=checked.bodies[:pilots],
+        frequencies=checked.frequencies[:pilots],
+        shifts=checked.shifts[:pilots],
+    )
     dark = Dark(checked.surface, checked.bodies[0].outer)
     tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
     problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)

@@ -51,7 +51,8 @@ def lags(values: np.ndarray) -> list[float]:
 
 def test_the_speed_of_light_is_that_in_the_medium() -> None:
     assert shift_of_frequency(500e6, TISSUE, "mm") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 299.792458, rel=1e-12)
-    assert shift_of_frequency(500e6, TISSUE, "m") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 0.299792458, rel=1e-12)
+    in_metres = Medium(sigma_a=10.0, sigma_s_prime=1000.0, eta=1.4)
+    assert shift_of_frequency(500e6, in_metres, "m") == pytest.approx(2j * np.pi * 0.5 * 1.4 / 0.299792458, rel=1e-12)
     in_water = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4 / 1.33)
     assert shift_of_frequency(1e8, in_water, "mm", 1.33) == pytest.approx(shift_of_frequency(1e8, TISSUE, "mm"))
     assert shift_of_frequency(0.0, TISSUE, "mm") == 0
@@ -182,6 +183,7 @@ def test_a_lag_beyond_half_a_turn_is_no_lead() -> None:
         (-1e6, 1.0, r"frequency is -1e\+06; give a frequency in Hz, 0 for steady light\."),
         (np.nan, 1.0, "frequency is nan"),
         (np.inf, 1.0, "frequency is inf"),
+        (1e12, 1.0, r"frequency is 1e\+12 Hz, at which light does not diffuse: omega is 29 of v sigma_t'"),
         (1e8, 0.5, r"outside_index is 0\.5; give the refractive index of what surrounds the body, 1 or more\."),
         (1e8, np.nan, "outside_index is nan"),
     ],

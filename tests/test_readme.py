@@ -120,6 +120,7 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("DetectorSpec", ["detectors[]."]),
         ("FibreSpec", ["detectors[].fibre."]),
         ("CameraSpec", ["camera."]),
+        ("ModulationSpec", ["modulation."]),
     ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
             for prefix in prefixes:

@@ -100,7 +100,7 @@ def _wanted(case: Case) -> tuple[Hashable, ...]:
     """What a mesh is refined for, besides lights and media."""
     detectors = tuple(repr(entry.detector) for entry in case.detectors) if case.detector_tolerance else ()
     tolerances = (case.tolerance, case.detector_tolerance, case.everywhere_tolerance, case.volume_tolerance)
-    return case.surface.unit, *tolerances, detectors
+    return case.surface.unit, *tolerances, detectors, case.frequencies, case.outside_index
 
 
 def _pilots(runs: Sequence[int]) -> tuple[int, ...]:

@@ -79,6 +79,8 @@ class MeshJob:
             everywhere_tolerance=first.everywhere_tolerance,
             volume_tolerance=first.volume_tolerance,
             cache=self.cache,
+            frequency=[channel.frequency for _, channel in channels],
+            outside_index=first.outside_index,
         )
         return MeshData.of(found.mesh)
 

@@ -36,12 +36,15 @@ class Channel:
         The lights that are not dark in this channel, by name.
     media : Medium, VaryingMedium, or mapping of int to these
         The medium of the body, or the media of a mesh by label.
+    frequency : float
+        At which its lights are modulated, Hz; 0 for steady light.
     """
 
     name: str
     medium: AnyMedium
     lights: Mapping[str, Light]
     media: AnyMedium | MediaByLabel
+    frequency: float = 0.0
 
     __repr__ = one_line
 
@@ -120,6 +123,16 @@ class Case:
     def channel_names(self) -> tuple[str, ...]:
         """Names of the channels."""
         return tuple(channel.name for channel in self.channels)
+
+    @property
+    def frequencies(self) -> tuple[float, ...]:
+        """The frequency of each channel, Hz."""
+        return tuple(channel.frequency for channel in self.channels)
+
+    @property
+    def outside_index(self) -> float:
+        """Refractive index of what surrounds the body."""
+        return self.spec.modulation.outside_index if self.spec.modulation else 1.0
 
     @property
     def repairs(self) -> tuple[str, ...]:

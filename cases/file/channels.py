@@ -35,8 +35,9 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
             )
     count = first[1] if first else 1
     wavelengths = _wavelengths(document, spec)
-    if spec.channels is None and wavelengths:
-        return wavelengths
+    frequencies = _frequencies(document, spec)
+    if spec.channels is None and (wavelengths or frequencies):
+        return wavelengths or frequencies
     if spec.channels is None:
         return RGB if count == 3 else (ALL,) if count == 1 else tuple(str(i) for i in range(1, count + 1))
     check_unique_names(document, "channels", spec.channels)
@@ -82,6 +83,16 @@ def _wavelengths(document: Document, spec: CaseSpec) -> tuple[str, ...]:
     return first[1] if first else ()
 
 
+def _frequencies(document: Document, spec: CaseSpec) -> tuple[str, ...]:
+    """The frequencies of a list of them, in words; none without a list."""
+    given = spec.modulation.frequency if spec.modulation else 0.0
+    if not isinstance(given, list):
+        return ()
+    if len(set(given)) < len(given) and spec.channels is None and not _wavelengths(document, spec):
+        raise document.error(("modulation", "frequency"), "a frequency is given twice; leave one of the two out.")
+    return tuple(f"{frequency / 1e6:.10g}MHz" for frequency in given)
+
+
 def _media(spec: CaseSpec) -> Iterator[tuple[Key, Media]]:
     """All media of a case, with their keys."""
     if spec.medium is not None:
@@ -103,6 +114,8 @@ def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
         yield ("channels",), len(spec.channels)
     for key, medium in _media(spec):
         yield from _lists_of_medium(key, medium)
+    if spec.modulation is not None and isinstance(spec.modulation.frequency, list):
+        yield ("modulation", "frequency"), len(spec.modulation.frequency)
     for i, light in enumerate(spec.lights):
         for name, value in getattr(light, light.kind):
             if isinstance(value, list):

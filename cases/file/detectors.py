@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.schema.detectors import DetectorSpec
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import read, read_all
 from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
@@ -59,7 +62,8 @@ def read_detectors(
     -------
     list of dict
         A row for each detector and solution: ``name, kind, channel, light, position`` (unit), ``exitance`` (W/unit²),
-        ``power`` (W; None for a point), ``relative_error`` and ``model_error`` (None where they are not known).
+        ``power`` (W; None for a point), ``relative_error`` and ``model_error`` (None where they are not known). Of
+        modulated light these are amplitudes, and there is a ``phase``, how far they lag (degrees).
     """
     rows = []
     plain = [entry.detector for entry in detectors]
@@ -67,6 +71,7 @@ def read_detectors(
     for number, entry in enumerate(detectors):
         for (channel, light, _), readings in zip(solutions, by_solution, strict=True):
             reading = readings[number]
+            modulated = isinstance(reading.exitance, complex)
             rows.append(
                 {
                     "name": entry.name,
@@ -74,8 +79,9 @@ def read_detectors(
                     "channel": channel,
                     "light": light,
                     "position": list(reading.position),
-                    "exitance": reading.exitance,
-                    "power": reading.power,
+                    "exitance": abs(reading.exitance) if modulated else reading.exitance,
+                    "power": abs(reading.power) if modulated and reading.power is not None else reading.power,
+                    **({"phase": float(lag(np.asarray(reading.exitance)))} if modulated else {}),
                     "relative_error": _finite(reading.relative_error),
                     "model_error": _finite(reading.model_error),
                 }
@@ -103,7 +109,8 @@ def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
         name = f"{row['name']}, {row['channel']}" if several else row["name"]
         error = "" if row["relative_error"] is None else f" ± {_percent(row['relative_error'])}"
         model = "" if row["model_error"] is None else f" (diffusion itself: ± {_percent(row['model_error'])})"
-        lines.append(f"{name}: {value:.5g} {what}{error}{model}")
+        phase = f", {row['phase']:.4g}° behind" if "phase" in row else ""
+        lines.append(f"{name}: {value:.5g} {what}{error}{phase}{model}")
     if len(whole) > MOST_LINES:
         lines.append(f"and {len(whole) - MOST_LINES} more readings")
     return lines
@@ -114,10 +121,13 @@ def write_readings(rows: Sequence[dict[str, Any]], unit: str, path: Path) -> Non
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         axes = [f"{axis} [{unit}]" for axis in "xyz"]
-        writer.writerow(["name", "kind", "channel", "light", *axes, f"exitance [W/{unit}²]", "power [W]", *ERRORS])
+        of_phase = ["phase [degrees]"] if any("phase" in row for row in rows) else []
+        quantities = [f"exitance [W/{unit}²]", "power [W]", *of_phase]
+        writer.writerow(["name", "kind", "channel", "light", *axes, *quantities, *ERRORS])
         for row in rows:
             power = "" if row["power"] is None else repr(row["power"])
             names = [row[key] for key in ("name", "kind", "channel", "light")]
             places = [f"{value:.9g}" for value in row["position"]]
             errors = ["" if row[key] is None else f"{row[key]:.3g}" for key in ERRORS]
-            writer.writerow([*names, *places, row["exitance"], power, *errors])
+            phase = [f"{row['phase']:.9g}" if "phase" in row else ""] if of_phase else []
+            writer.writerow([*names, *places, row["exitance"], power, *phase, *errors])

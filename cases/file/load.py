@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 from tetlux.cases.file.body import CaseBody, read_body
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
-from tetlux.cases.file.channels import ALL, channel_names, check_unique_names
+from tetlux.cases.file.channels import ALL, channel_names, check_unique_names, value_in_channel
 from tetlux.cases.file.detectors import NamedDetector, build_detector
 from tetlux.cases.file.documents.base import read_with_base
 from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
 from tetlux.cases.file.reader import FilesRead, Reader
-from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.file.schema.case import CaseSpec, ModulationSpec
 from tetlux.cases.file.sweeps.expand import expand_sweep
 from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
@@ -27,6 +27,7 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless.closed_form import homogeneous
 from tetlux.fem.meshless.exact_field import exact_field
 from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
+from tetlux.fem.models.modulation import shifts_of_scenes
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -97,6 +98,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     names = light_names(spec)
     check_unique_names(document, "lights", names)
     _check_value_names(document, channels, names)
+    frequencies = _build_frequencies(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
     if spec.model == "closed-form":
         _check_for_closed_form(document, body, deposits)
@@ -104,7 +106,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         name=name,
         source=document.path,
         surface=body.surface,
-        channels=tuple(map(Channel, channels, body.media, lights, body.by_label or body.media)),
+        channels=tuple(map(Channel, channels, body.media, lights, body.by_label or body.media, frequencies)),
         light_names=names,
         regions=body.regions,
         mesh=body.mesh,
@@ -123,6 +125,18 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     )
 
 
+def _build_frequencies(document: Document, spec: CaseSpec, body: CaseBody) -> list[float]:
+    """The frequency of each channel, Hz."""
+    modulation = spec.modulation
+    if modulation is None:
+        return [0.0] * len(body.media)
+    frequencies = [value_in_channel(modulation.frequency, channel) for channel in range(len(body.media))]
+    with document.at(("modulation",), {name: (name,) for name in ModulationSpec.model_fields}):
+        outer = [each.outer for each in body.bodies]
+        shifts_of_scenes(frequencies, outer, body.surface.unit, modulation.outside_index)
+    return frequencies
+
+
 def _build_comparison(
     document: Document, spec: CaseSpec, body: CaseBody, deposits: list[Deposit]
 ) -> "Comparison | None":
@@ -132,6 +146,8 @@ def _build_comparison(
     from tetlux.cases.compare.comparison import comparison_for  # noqa: PLC0415
 
     with document.at(("compare",)):
+        if spec.modulation:
+            raise InputError("closed forms here are those of steady light; leave compare or modulation out.")
         if len(body.media) > 1 or body.regions or not isinstance(body.media[0], Medium):
             raise InputError("closed forms exist for one channel and one uniform medium only; leave compare out.")
         return comparison_for(body.surface.shape, body.media[0], deposits, spec.compare)

@@ -19,11 +19,13 @@ FIGURES = {
     "unit": "unit of length",
     "model": "",
     "tolerance": "1",
+    "frequency": "Hz",
     "incident": "W",
     "specular": "W",
     "absorbed": "W",
     "exited": "W",
     "ballistic": "W",
+    "stored": "W",
     "balance_error": "1",
     "exitance_min": "W/unit²",
     "exitance_max": "W/unit²",
@@ -52,6 +54,7 @@ READING_FIGURES = {
     "z": "unit",
     "exitance": "W/unit²",
     "power": "W",
+    "phase": "degrees",
     "relative_error": "1",
     "model_error": "1",
 }
@@ -79,7 +82,7 @@ def result_rows(summary: Mapping[str, Any]) -> list[Row]:
     for channel in summary.get("channels", ()):
         row: Row = {**_head(summary), "channel": channel["name"], "status": "finished"}
         row |= {"unit": summary["unit"], "model": summary["model"], "tolerance": summary.get("tolerance")}
-        row |= channel["power"]
+        row |= {"frequency": channel.get("frequency")} | channel["power"]
         row |= {f"exitance_{name}": value for name, value in channel["exitance"].items()}
         row |= {f"fluence_{name}": value for name, value in channel.get("fluence", {}).items()}
         row |= {name: channel[name] for name in ("error_estimate", "sigma_tr", "albedo")}
@@ -89,6 +92,7 @@ def result_rows(summary: Mapping[str, Any]) -> list[Row]:
             if reading["channel"] == channel["name"] and reading["light"] == ALL:
                 value = reading["exitance"] if reading["power"] is None else reading["power"]
                 row[f"{READING}{reading['name']}"] = value
+                row[f"{READING}{reading['name']}.phase"] = reading.get("phase")
                 row[f"{READING}{reading['name']}.relative_error"] = reading["relative_error"]
         row |= {f"{SECONDS}{stage}": value for stage, value in summary["seconds"].items()}
         row[WARNINGS] = " ".join(summary.get("warning_codes", ()))
@@ -107,7 +111,7 @@ def reading_rows(summary: Mapping[str, Any]) -> list[Row]:
     for reading in summary.get("detectors", ()):
         row = {**_head(summary), "detector": reading["name"], "unit": summary["unit"]}
         row |= {name: reading[name] for name in ("channel", "light", "kind", "exitance", "power")}
-        row |= dict(zip("xyz", reading["position"], strict=True))
+        row |= dict(zip("xyz", reading["position"], strict=True)) | {"phase": reading.get("phase")}
         row |= {name: reading[name] for name in ("relative_error", "model_error")}
         rows.append({name: value for name, value in (summary["as_ran"]["sweep"] | row).items() if value is not None})
     return rows

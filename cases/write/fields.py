@@ -8,6 +8,7 @@ import numpy.typing as npt
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB
 from tetlux.cases.write.results import Results
+from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.meshing.arrays import FloatArray
 
@@ -52,6 +53,7 @@ def surface_fields(results: Results) -> list[Field]:
     ]
     # Sums come before their parts.
     fields.sort(key=lambda field: (field.light != ALL) + (ALL not in (field.light, field.channel)))
+    fields += _phases(results)
     if results.mesh_solutions:
         # The least over channels. It is computed on the facets of a mesh.
         valid = np.min([solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0)
@@ -63,6 +65,18 @@ def surface_fields(results: Results) -> list[Field]:
 
 def _with_all(names: tuple[str, ...]) -> tuple[str, ...]:
     return (ALL, *names) if len(names) > 1 else (ALL,)
+
+
+def _phases(results: Results) -> list[Field]:
+    """How far modulated light of each channel and light lags; phases of several channels have no sum."""
+    case = results.case
+    several = len(case.channels) > 1
+    return [
+        Field("phase", results.phase(channel.name, light), "degrees", channel.name if several else ALL, light, False)
+        for light in _with_all(case.light_names)
+        for channel in case.channels
+        if channel.frequency
+    ]
 
 
 def _radiances(results: Results, camera: FloatArray) -> list[Field]:
@@ -87,14 +101,15 @@ def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
 
 
 def volume_fields(results: Results) -> list[Field]:
-    """The fluence of each channel at the nodes of the mesh."""
+    """The fluence of each channel at the nodes of the mesh, and of modulated light its phase."""
     unit = f"W/{results.case.surface.unit}²"
-    if len(results.mesh_solutions) == 1:
-        return [Field("fluence", results.mesh_solutions[0].fluence, unit)]
-    return [
-        Field("fluence", solution.fluence, unit, name)
-        for name, solution in zip(results.case.channel_names, results.mesh_solutions, strict=True)
-    ]
+    fields = []
+    for name, solution in zip(results.case.channel_names, results.mesh_solutions, strict=False):
+        channel = name if len(results.case.channels) > 1 else ALL
+        fields.append(Field("fluence", modulus(solution.fluence), unit, channel))
+        if solution.frequency:
+            fields.append(Field("phase", lag(solution.fluence), "degrees", channel, logarithmic=False))
+    return fields
 
 
 def volume_values(results: Results) -> dict[str, FloatArray]:

@@ -11,11 +11,12 @@ from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
+from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
@@ -24,7 +25,7 @@ AnySolution = Solution | ChargeSolution | ClosedFormSolution
 
 @dataclass(frozen=True, eq=False)
 class _ChannelSum:
-    """The exitance summed over channels, as a `ResolvedField`; media may differ between channels."""
+    """The exitance summed over channels, as a `ResolvedField`: of modulated light its modulus; media may differ."""
 
     channels: tuple[AnySolution, ...]
 
@@ -47,7 +48,7 @@ class _ChannelSum:
         return min(channel.error_estimate for channel in self.channels)
 
     def exitance_on(self, queries: FloatArray) -> FloatArray:
-        return np.asarray(sum(channel.exitance_on(queries) for channel in self.channels))
+        return np.asarray(sum(modulus(channel.exitance_on(queries)) for channel in self.channels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +63,29 @@ class Results:
     surface : Surface
         The case's surface, with vertices added where its triangles are too large to show the exitance.
     parts : dict of (v,) ndarray
-        Exitance at the surface's vertices by channel and light, W/unit².
+        Exitance at the surface's vertices by channel and light, W/unit²; complex of modulated light.
     """
 
     case: Case
     solutions: tuple[AnySolution, ...]
     surface: Surface
-    parts: dict[tuple[str, str], FloatArray]
+    parts: dict[tuple[str, str], NumberArray]
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
-        """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit²."""
-        chosen = [part for (c, name), part in self.parts.items() if channel in (c, ALL) and light in (name, ALL)]
+        """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit².
+
+        Of modulated light it is the modulus of each channel, in which lights interfere.
+        """
+        names = self.case.channel_names if channel == ALL else (channel,)
+        of_channels = [modulus(self._amplitude(name, light)) for name in names]
+        return reduce(np.add, of_channels, np.zeros(len(self.surface.points)))
+
+    def phase(self, channel: str, light: str = ALL) -> FloatArray:
+        """How far the exitance of a channel and a light, or of all lights, lags at the vertices, (v,), degrees."""
+        return lag(self._amplitude(channel, light))
+
+    def _amplitude(self, channel: str, light: str) -> NumberArray:
+        chosen = [part for (c, name), part in self.parts.items() if channel == c and light in (name, ALL)]
         return reduce(np.add, chosen, np.zeros(len(self.surface.points)))
 
     @property
@@ -109,7 +122,8 @@ def solutions_by_light(names: list[str], solution: AnySolution) -> list[tuple[st
 
 def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
     """Choose vertices that resolve the summed exitance, and evaluate the exitance of each channel and light there."""
-    whole: ResolvedField = solutions[0] if len(solutions) == 1 else _ChannelSum(tuple(solutions))
+    simple = len(solutions) == 1 and not case.frequencies[0]
+    whole: ResolvedField = solutions[0] if simple else _ChannelSum(tuple(solutions))
     parts = {}
     if not _shows_surface(case) and all(isinstance(solution, Solution) for solution in solutions):
         surface, total = _extremes([solution for solution in solutions if isinstance(solution, Solution)])
@@ -130,5 +144,5 @@ def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
     first = solutions[0].surface
     points = np.vstack([extreme_places(solution) for solution in solutions])
-    total = sum(each.exitance_on(points) for each in solutions)
+    total = sum(modulus(each.exitance_on(points)) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)

@@ -12,11 +12,12 @@ from tetlux.cases.write.plan_record import describe_plan
 from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
 from tetlux.cases.write.run_record import describe_run
 from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
+from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, Number
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.notes import Note
@@ -92,15 +93,17 @@ def _channel(
     area = solution.mesh.area if isinstance(solution, Solution) else solution.area
     figures: dict[str, Any] = {
         "name": channel.name,
+        **({"frequency": channel.frequency} if channel.frequency else {}),
         # The first medium is that of the body outside of its regions.
         "sigma_tr": media[0]["sigma_tr"],
         "albedo": media[0]["albedo"],
         "media": media,
         "power": _power(solution.power),
+        **({"power_phase": _phases(solution.power)} if channel.frequency else {}),
         "exitance": {
             "min": float(exitance.min()),
             "max": float(exitance.max()),
-            "mean": solution.power.exited / area,
+            "mean": _size(solution.power.exited) / area,
         },
         "error_estimate": _finite(solution.error_estimate),
         **_figures_of_model(solution),
@@ -119,8 +122,9 @@ def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
         # The fluence has a pole at each source, so there is no largest value.
         return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
     of_fields = {"everywhere_error": solution.everywhere_error, "volume_error": solution.volume_error}
+    fluence = modulus(solution.fluence)
     return {
-        "fluence": {"min": float(solution.fluence.min()), "max": float(solution.fluence.max())},
+        "fluence": {"min": float(fluence.min()), "max": float(fluence.max())},
         **{name: value for name, value in of_fields.items() if math.isfinite(value)},
         **({"validity": _validity(solution.validity)} if solution.validity else {}),
     }
@@ -136,15 +140,21 @@ def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
     return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
 
 
+def _size(value: Number) -> Number:
+    """A power as it is, or the modulus of a complex one."""
+    return abs(value) if isinstance(value, complex) else value
+
+
 def _power(power: Power) -> dict[str, float]:
-    return {
-        "incident": power.incident,
-        "specular": power.specular,
-        "absorbed": power.absorbed,
-        "exited": power.exited,
-        "ballistic": power.ballistic,
-        "balance_error": power.balance_error,
-    }
+    """The ledger; of modulated light moduli, and with what is stored."""
+    names = ["incident", "specular", "absorbed", "exited", "ballistic"]
+    names += ["stored"] if isinstance(power.exited, complex) else []
+    return {name: _size(getattr(power, name)) for name in (*names, "balance_error")}
+
+
+def _phases(power: Power) -> dict[str, float]:
+    """How far powers of modulated light lag, degrees."""
+    return {name: float(lag(np.asarray(getattr(power, name)))) for name in ("absorbed", "exited", "stored")}
 
 
 def _validity(validity: Validity) -> dict[str, float]:

@@ -6,7 +6,7 @@ flux itself lags behind its gradient, ``grad phi = -3 (sigma_t' + i omega n/c) E
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -22,6 +22,8 @@ SPEED_OF_LIGHT = 299_792_458e3
 # A larger omega over v sigma_t' is reported. At this one D with the lag of the flux, ``D/(1 + i omega/(v sigma_t'))``,
 # has 2 % less of a modulus than D, and lags by 11 degrees.
 FASTEST = 0.2
+# Light of a larger one is no longer diffuse by any account, and would need a mesh of millions; it is refused.
+REFUSED = 10.0
 # Lags are given from this angle on, in degrees: rounding may put them below 0.
 LEAST_LAG = -30.0
 
@@ -47,7 +49,7 @@ def shift_of_frequency(frequency: float, medium: Medium, unit: str, outside_inde
     Raises
     ------
     InputError
-        If the frequency is negative or not finite, or the index is not sensible.
+        If the frequency is negative, not finite or far too high, or the index is not sensible.
 
     Examples
     --------
@@ -64,7 +66,28 @@ def shift_of_frequency(frequency: float, medium: Medium, unit: str, outside_inde
         )
     if frequency == 0:
         return 0.0
-    return 2j * math.pi * frequency * medium.eta * outside_index * MILLIMETRES[unit] / SPEED_OF_LIGHT
+    omega_over_v = 2.0 * math.pi * frequency * medium.eta * outside_index * MILLIMETRES[unit] / SPEED_OF_LIGHT
+    if omega_over_v > REFUSED * medium.sigma_t_prime:
+        raise InputError(
+            f"frequency is {frequency:g} Hz, at which light does not diffuse: omega is "
+            f"{omega_over_v / medium.sigma_t_prime:.2g} of v sigma_t'; give less, at most {FASTEST:g} of it.",
+            field="frequency",
+        )
+    return 1j * omega_over_v
+
+
+def shifts_of_scenes(
+    frequency: float | Sequence[float], outer: Sequence[Medium], unit: str, outside_index: float
+) -> tuple[tuple[float, ...], tuple[complex, ...]]:
+    """The frequency and the shift of each scene, by the outer medium of each; one frequency may be that of all."""
+    each = tuple(frequency) if isinstance(frequency, Sequence) else (frequency,) * len(outer)
+    if len(each) != len(outer):
+        raise InputError(
+            f"there are {len(each)} frequencies for {len(outer)} scenes; give one, or one for each.", field="frequency"
+        )
+    return each, tuple(
+        shift_of_frequency(one, medium, unit, outside_index) for one, medium in zip(each, outer, strict=True)
+    )
 
 
 def notes_on_frequency(frequency: float, shift: complex, media: Iterable[AnyMedium]) -> list[Note]:
@@ -81,6 +104,11 @@ def notes_on_frequency(frequency: float, shift: complex, media: Iterable[AnyMedi
             value=ratio,
         )
     ]
+
+
+def modulus(values: NumberArray) -> FloatArray:
+    """Values of steady light as they are, moduli of complex amplitudes."""
+    return np.abs(values) if np.iscomplexobj(values) else values
 
 
 def lag(values: NumberArray) -> FloatArray:

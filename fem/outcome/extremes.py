@@ -4,6 +4,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from tetlux.fem.models.modulation import modulus
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.surface.surface import Surface
@@ -39,7 +40,7 @@ def extreme_places(solution: Solution) -> FloatArray:
     vertices = _vertices_of(solution.surface)
     mesh = solution.mesh
     dim = np.zeros(len(mesh.points), dtype=bool)
-    dimmest = mesh.boundary_nodes[np.argsort(solution.exitance)[:DIMMEST]]
+    dimmest = mesh.boundary_nodes[np.argsort(modulus(solution.exitance))[:DIMMEST]]
     dim[dimmest] = True
     near = dim[mesh.boundary_faces[mesh.closest_boundary(vertices)[1]]].any(axis=1)
     return np.vstack([solution.surface.project(mesh.points[dimmest])[0], vertices[near], _climb(solution)])
@@ -58,7 +59,7 @@ def _peaks(solution: Solution) -> IntArray:
     """The brightest of the nodes that no neighbour on the boundary is brighter than, (p,)."""
     mesh = solution.mesh
     values, around = np.full(len(mesh.points), -np.inf), np.full(len(mesh.points), -np.inf)
-    values[mesh.boundary_nodes] = solution.exitance
+    values[mesh.boundary_nodes] = modulus(solution.exitance)
     np.maximum.at(around, mesh.boundary_faces.ravel(), np.repeat(values[mesh.boundary_faces].max(axis=1), 3))
     nodes: IntArray = mesh.boundary_nodes[values[mesh.boundary_nodes] >= around[mesh.boundary_nodes]]
     nodes = nodes[np.argsort(-values[nodes])[:PEAKS]]
@@ -74,7 +75,7 @@ def _climb(solution: Solution) -> FloatArray:
     np.maximum.at(sides, facets.ravel(), np.repeat(longest_sides(mesh.points[facets]), 3))
     brightest = _peaks(solution)
     places, normals = surface.project(mesh.points[brightest])
-    values, steps = solution.exitance_on(places), sides[brightest]
+    values, steps = modulus(solution.exitance_on(places)), sides[brightest]
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     shorter = 0.5 ** np.arange(LENGTHS)
     climbing = np.arange(len(brightest))
@@ -88,7 +89,7 @@ def _climb(solution: Solution) -> FloatArray:
         # (climbing, lengths, directions, 3)
         tried = places[climbing, None, None] + (steps[climbing, None] * shorter)[..., None, None] * ways[:, None]
         found, found_normals = surface.project(tried.reshape(-1, 3))
-        bright = solution.exitance_on(found).reshape(len(climbing), LENGTHS * DIRECTIONS)
+        bright = modulus(solution.exitance_on(found)).reshape(len(climbing), LENGTHS * DIRECTIONS)
         best = bright.argmax(axis=1)
         row = np.arange(len(climbing)) * LENGTHS * DIRECTIONS + best
         gains = bright.max(axis=1) - values[climbing]

@@ -9,7 +9,7 @@ from tetlux.cases.file.schema.camera import CameraSpec
 from tetlux.cases.file.schema.detectors import DetectorSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Choice, Label, Length, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
 from tetlux.cases.file.schema.sweep import SweepSpec
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
@@ -104,6 +104,15 @@ class MeshSpec(Section):
         return {str(label): medium for label, medium in labels.items()} if isinstance(labels, dict) else labels
 
 
+class ModulationSpec(Section):
+    """Light modulated at a frequency."""
+
+    frequency: Each = Field(description="Hz; 0 for steady light; a list makes a channel of each")
+    outside_index: Number = Field(
+        1.0, description="refractive index of what surrounds the body, to which eta is relative"
+    )
+
+
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture", "viewer"]
 Model = Literal["full", "auto", "closed-form", "charges"]
@@ -149,6 +158,9 @@ class CaseSpec(Section):
     )
     regions: list[RegionSpec] = Field([])
     lights: Annotated[list[LightSpec], Field(min_length=1)]
+    modulation: ModulationSpec | None = Field(
+        None, description="lights are modulated at a frequency: results are amplitudes and phases"
+    )
     model: Model = Field(
         "full",
         description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh; closed-form: "
@@ -224,6 +236,7 @@ class CaseSpec(Section):
                 ("mesh", "a mesh", self.mesh),
                 ("outputs", "volume", "volume" in self.outputs),
                 ("compare", "compare", self.compare),
+                ("modulation", "modulation", self.modulation),
             ):
                 if given:
                     raise PydanticCustomError(

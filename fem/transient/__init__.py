@@ -1,0 +1,1 @@
+"""Light that varies in time: moments of what detectors read after a pulse."""
