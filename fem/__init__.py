@@ -41,6 +41,7 @@ from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
+from tetlux.fem.truncated import TruncatedSolution
 
 __all__ = [
     "Body",
@@ -76,6 +77,7 @@ __all__ = [
     "SourceTerms",
     "Spectrum",
     "System",
+    "TruncatedSolution",
     "VaryingMedium",
     "grid_field",
     "henyey_greenstein",

@@ -90,8 +90,10 @@ def build_scenes(
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     regions: Sequence[Region],
     scenes: int,
+    *,
+    any_size: bool = False,
 ) -> Scenes:
-    """Check a body and its media, and assign the media to the scenes.
+    """Check a body and its media, and assign the media to the scenes; `any_size` as for `check_media`.
 
     Raises
     ------
@@ -114,7 +116,7 @@ def build_scenes(
             bodies[each] = Body(surface, dict(zip(labels, each, strict=True)), MeshPartition(mesh))
         else:
             bodies[each] = Body(surface, each, SurfacePartition(inner))
-        check_media(bodies[each])
+        check_media(bodies[each], any_size=any_size)
     return Scenes(surface, inner, media, labels, mesh, [bodies[each] for each in media], isinstance(body, TetMesh))
 
 

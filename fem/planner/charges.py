@@ -7,6 +7,7 @@ from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_m
 from tetlux.fem.outcome.plan import Candidate
 from tetlux.fem.planner.candidate import impossible, refuse_mesh
 from tetlux.fem.planner.request import Request
+from tetlux.fem.validity.notes import check_size
 from tetlux.meshing.errors import InputError
 
 # Relative L2 error by 300 charges: of the built-in shapes and of others, as scans.
@@ -58,6 +59,8 @@ def _check(request: Request) -> None:
         raise InputError("charges tell no errors of single places")
     for surface in (request.surface, *request.inner):
         check_simple(surface)
+    for body in request.bodies:
+        check_size(body)
     for body, lights, deposits in zip(request.bodies, request.lights, request.deposits, strict=True):
         for medium in body.by_label.values():
             homogeneous_medium(medium)

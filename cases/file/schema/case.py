@@ -106,7 +106,7 @@ class MeshSpec(Section):
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture"]
-Model = Literal["full", "auto", "closed-form", "charges"]
+Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
 
@@ -150,8 +150,9 @@ class CaseSpec(Section):
     lights: Annotated[list[LightSpec], Field(min_length=1)]
     model: Model = Field(
         "full",
-        description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh; closed-form: "
-        "the exact series of a sphere or slab; auto: the fastest of these that gives what is asked for",
+        description="full: finite elements on a mesh; truncated: the same where light reaches; charges: fitted to the "
+        "boundary, without a mesh; closed-form: the exact series of a sphere or slab; auto: the fastest of these that "
+        "gives what is asked for",
     )
     tolerance: Tolerance = Field(
         DEFAULT_TOLERANCE,
