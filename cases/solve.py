@@ -72,12 +72,20 @@ def _solve_fully(
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
     """Solve each channel by charges; the seconds of each solution are those of all channels together."""
     solutions = []
-    assert case.tolerance is not None
     media = media_by_scene([channel.medium for channel in case.channels], case.regions, len(case.channels))
     for channel, (body, *inner) in zip(case.channels, media, strict=True):
         regions = [Region(region.surface, medium) for region, medium in zip(case.regions, inner, strict=True)]
         lights = list(channel.lights.values())
-        solution = solve(case.surface, body, lights, regions=regions, tolerance=case.tolerance, model="charges")
+        solution = solve(
+            case.surface,
+            body,
+            lights,
+            regions=regions,
+            tolerance=case.tolerance,
+            detectors=[entry.detector for entry in case.detectors] if case.detector_tolerance else (),
+            detector_tolerance=case.detector_tolerance,
+            model="charges",
+        )
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")
         solutions.append(solution)

@@ -85,7 +85,7 @@ class Problem:
 
     def _shared_system(self, shared: SharedMesh, media: tuple[AnyMedium, ...]) -> System:
         return shared.system(
-            (media, self.lumping, self.limit),
+            (media, self.lumping, self.limit, self.scenes.shift),
             lambda: self.scenes.system_on(
                 shared.mesh, media, self.lumping, shared.assembly, limit=self.limit, expected=EXPECTED_LIGHTS
             ),
@@ -124,6 +124,7 @@ def first_mesh(
                     detector_points,
                     tolerances.readings,
                     most_tetrahedra,
+                    scenes.shift,
                 )
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")

@@ -1,6 +1,7 @@
 """The first mesh: fine enough near sources for its error to be estimated at all."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -116,6 +117,7 @@ def grade_between(
     detector_points: FloatArray,
     tolerance: float,
     most: int,
+    shift: complex = 0.0,
 ) -> TetMesh:
     """Split tetrahedra that are too coarse for light that fades on its way to detectors.
 
@@ -134,6 +136,8 @@ def grade_between(
         Of readings.
     most : int
         Tetrahedra at which it stops.
+    shift : complex
+        What is added to sigma_a, 1/unit: 0 for steady light.
 
     Returns
     -------
@@ -142,8 +146,8 @@ def grade_between(
     some = source_points[:: max(1, -(-len(source_points) // MOST_SOURCE_POINTS))]
     lengths = cdist(some, detector_points)
     while len(some):
-        coefficients = coefficients_on(mesh, media)
-        decay = np.broadcast_to(np.sqrt(coefficients.sigma_a / coefficients.diffusion), len(mesh.tetrahedra))
+        coefficients = replace(coefficients_on(mesh, media), shift=shift)
+        decay = np.broadcast_to(coefficients.decay, len(mesh.tetrahedra))
         middles = mesh.points[mesh.tetrahedra].mean(axis=1)
         from_light, to_detector = cdist(middles, some), cdist(middles, detector_points)
         excess = np.full(len(middles), np.inf)

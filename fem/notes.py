@@ -48,10 +48,11 @@ def notes_on(solution: Solution, split: SplitLights, tolerance: float | None, wh
         notes += _on_tolerance(solution, tolerance, where)
     notes += _on_bulge(solution)
     notes += _on_power(solution)
-    notes += _on_fluence(solution, may_be_negative=split.has_negative_source)
-    notes += _on_limited_power(solution)
+    if not np.iscomplexobj(solution.fluence):
+        notes += _on_fluence(solution, may_be_negative=split.has_negative_source)
+        notes += _on_limited_power(solution)
+        notes += _on_exitance(solution)
     notes += _on_shallow_sources(solution)
-    notes += _on_exitance(solution)
     return list(dict.fromkeys(notes))
 
 
@@ -115,13 +116,14 @@ def _on_bulge(solution: Solution) -> Iterator[Note]:
 
 def _on_power(solution: Solution) -> Iterator[Note]:
     power = solution.power
-    if min(power.absorbed, power.exited) < -NEGLIGIBLE_POWER * power.incident:
+    modulated = np.iscomplexobj(solution.fluence)
+    if not modulated and min(power.absorbed, power.exited) < -NEGLIGIBLE_POWER * power.incident:
         yield Note(
             "power-negative",
             "absorbed or exited power is negative: the mesh is far too coarse for this light; ask for a smaller "
             "tolerance, or give a finer mesh.",
         )
-    if abs(power.exited) <= ROUNDING * power.incident:
+    if abs(power.exited) <= ROUNDING * abs(power.incident):
         yield Note(
             "no-light-leaves",
             "no light leaves the body: all of it is reflected at its surface, passes through or is absorbed.",

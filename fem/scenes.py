@@ -8,6 +8,7 @@ from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labels import GivenMedia, check_single_label, resolve_media, warnings_for_cavities, warnings_for_labels
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region, check_list_of_regions
+from tetlux.fem.models.modulation import notes_on_frequency, shift_of_frequency
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.system import System
@@ -39,6 +40,10 @@ class Scenes:
         For each scene the body with its media; scenes of equal media share one.
     mesh_is_body : bool
         Whether the user gave a mesh in place of a surface, so that its conformity is reported too.
+    frequency : float
+        At which lights are modulated, Hz; 0 for steady light.
+    shift : complex
+        What that adds to sigma_a, 1/unit.
     """
 
     surface: Surface
@@ -48,6 +53,8 @@ class Scenes:
     mesh: TetMesh | None
     bodies: list[Body]
     mesh_is_body: bool
+    frequency: float = 0.0
+    shift: complex = 0.0
 
     def system_on(
         self,
@@ -61,14 +68,14 @@ class Scenes:
     ) -> System:
         """Prepare the system of one set of media on a mesh, for as many lights as its scenes have, or are expected.
 
-        `solve` and `solve_each` make all their systems here, of steady diffusion: another model enters as `model_of`.
+        `solve` and `solve_each` make all their systems here, of diffusion: another model enters as `model_of`.
         """
         expected = max(expected, self.media.count(media))
         if self.labels:
             by_label = dict(zip(self.labels, media, strict=True))
-            return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit)
+            return System(mesh, by_label, self.surface, lumping, expected, (), assembly, limit, shift=self.shift)
         regions = tuple(Region(surface, medium) for surface, medium in zip(self.inner, media[1:], strict=True))
-        return System(mesh, media[0], self.surface, lumping, expected, regions, assembly, limit)
+        return System(mesh, media[0], self.surface, lumping, expected, regions, assembly, limit, shift=self.shift)
 
     def warnings(self, number: int, solution: Solution, *, given: bool) -> list[str]:
         """Notes on the regions or labels of scene `number`, and on the mesh if the user gave it."""
@@ -76,6 +83,7 @@ class Scenes:
             found = warnings_for_labels(solution.mesh, self.bodies[number].by_label)
         else:
             found = warnings_for_regions(self.inner, self.media[number])
+        found = [*found, *notes_on_frequency(self.frequency, self.shift, self.media[number])]
         if not given:
             return found
         mesh = solution.mesh
@@ -90,10 +98,14 @@ def build_scenes(
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     regions: Sequence[Region],
     scenes: int,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
     *,
     any_size: bool = False,
 ) -> Scenes:
-    """Check a body and its media, and assign the media to the scenes; `any_size` as for `check_media`.
+    """Check a body, its media and the modulation of lights, and assign the media to the scenes.
+
+    `any_size` is as for `check_media`.
 
     Raises
     ------
@@ -117,7 +129,9 @@ def build_scenes(
         else:
             bodies[each] = Body(surface, each, SurfacePartition(inner))
         check_media(bodies[each], any_size=any_size)
-    return Scenes(surface, inner, media, labels, mesh, [bodies[each] for each in media], isinstance(body, TetMesh))
+    each_body, mesh_is_body = [bodies[each] for each in media], isinstance(body, TetMesh)
+    shift = shift_of_frequency(frequency, each_body[0].outer, surface.unit, outside_index)
+    return Scenes(surface, inner, media, labels, mesh, each_body, mesh_is_body, frequency, shift)
 
 
 def media_by_channel(

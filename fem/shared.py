@@ -16,7 +16,7 @@ MOST_SYSTEMS = 4
 # Lights that each system is prepared for.
 EXPECTED_LIGHTS = 4
 
-SystemKey = tuple[tuple[AnyMedium, ...], Lumping, bool]
+SystemKey = tuple[tuple[AnyMedium, ...], Lumping, bool, complex]
 
 
 @dataclass(eq=False)

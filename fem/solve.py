@@ -1,7 +1,6 @@
 """`solve`: the public function that solves for the light in a body."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, Literal, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
@@ -16,9 +15,8 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.planner.options import Options, check_options_without_mesh
+from tetlux.fem.planner.options import Options, check_options_of
 from tetlux.fem.planner.request import make_request
 from tetlux.fem.planner.solve import AnySolution, FiniteElements, solve_by_plan, solve_closed_forms, solve_on_part
 from tetlux.fem.scenes import media_by_channel
@@ -63,8 +61,9 @@ def solve(
     *,
     model: Literal["charges"],
     regions: Sequence[Region] = ...,
-    tolerance: float = ...,
+    tolerance: float | None = ...,
     detectors: Sequence[Detector] = ...,
+    detector_tolerance: float | None = ...,
 ) -> ChargeSolution: ...
 
 
@@ -120,6 +119,8 @@ def solve(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Report = no_report,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
     model: Literal["full", "auto", "closed-form", "charges", "truncated"] = "full",
 ) -> AnySolution | Sequence[AnySolution]:
     """Solve the diffusion approximation for the light in a body.
@@ -144,7 +145,8 @@ def solve(
     detectors : sequence of detectors
         What is to be read, each of all lights together: see `tetlux.fem.PointDetector` and others.
     detector_tolerance : float, optional
-        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them.
+        Wanted relative error of what each detector reads; if not given, the mesh is not refined for them, nor are
+        charges fitted for them.
     everywhere_tolerance : float, optional
         Wanted relative error of the exitance at almost every point of the surface: estimated for some 95 % of the area
         of each decade of exitance, down to a millionth of the largest; what is darker is within that share of a
@@ -175,15 +177,22 @@ def solve(
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
         Called with a line of text as each stage ends.
+    frequency : float
+        At which the lights are modulated, Hz; 0 for steady light. Fluence, exitance, power and readings of the solution
+        then are complex amplitudes, by the convention ``exp(i omega t)``; see its `amplitude_at` and `phase_at`.
+        Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
+    outside_index : float
+        Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
     model : {"full", "auto", "closed-form", "charges", "truncated"}
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
-        arguments it takes `regions`, `tolerance` and `detectors`, and refuses the rest. "closed-form" is the exact
-        series of balls and slabs of one homogeneous medium, with points, beams that are points, and in balls diffuse
-        light; it takes `tolerance` and `detectors`. "truncated" solves by finite elements on the part that light
-        reaches, of bodies of any size, see `tetlux.fem.truncated`. "auto" takes the fastest of these that gives what is
-        asked for, see `tetlux.fem.plan`; its other arguments are for finite elements.
+        arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance`, and refuses
+        the rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with points, beams
+        that are points, and in balls diffuse light; it takes `tolerance` and `detectors`. "truncated" solves by finite
+        elements on the part that light reaches, of bodies of any size, see `tetlux.fem.truncated`. "auto" takes the
+        fastest of these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite
+        elements.
 
     Returns
     -------
@@ -231,13 +240,21 @@ def solve(
         most_tetrahedra=most_tetrahedra,
         cache=cache,
         report=report,
+        frequency=frequency,
+        outside_index=outside_index,
     )
-    if model in ("closed-form", "charges"):
-        check_options_without_mesh(model, options)
+    if model not in ("full", "auto"):
+        check_options_of(model, options)
     if model == "charges":
-        assert tolerance is not None
-        found = solve_with_charges(body if mesh is None else mesh, medium, lights, regions=regions, tolerance=tolerance)
-        return replace(found, readings=read_all(detectors, found))
+        return solve_with_charges(
+            body if mesh is None else mesh,
+            medium,
+            lights,
+            regions=regions,
+            tolerance=tolerance,
+            detectors=detectors,
+            detector_tolerance=detector_tolerance,
+        )
     return _solve_channels(body, medium, lights, model, options)
 
 
@@ -268,6 +285,7 @@ def _solve_channels(
             ),
             detectors=options["detectors"],
             mesh=options["mesh"],
+            need_of_mesh="modulated light is solved on a mesh" if options["frequency"] else "",
         )
         elements = FiniteElements(
             lambda: solve_each(body, channels, scenes, **options),

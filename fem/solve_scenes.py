@@ -57,6 +57,8 @@ def solve_each(
     most_tetrahedra: int = MOST_TETRAHEDRA,
     cache: bool = True,
     report: Report = no_report,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
 ) -> list[Solution]:
     """Solve for several scenes of one body on one mesh that is fine enough for each of them.
 
@@ -94,6 +96,8 @@ def solve_each(
         Whether the mesher's mesh is looked up and kept in the user's cache directory.
     report : callable
         Called with a line of text as each stage ends.
+    frequency, outside_index : float
+        Of modulated light, Hz, and of what surrounds the body: see `solve`.
 
     Returns
     -------
@@ -134,12 +138,12 @@ def solve_each(
         mesh = body
     watch = Stopwatch()
     with watch.stage("surface"):
-        checked = build_scenes(body, mesh, medium, regions, len(scenes))
+        checked = build_scenes(body, mesh, medium, regions, len(scenes), frequency, outside_index)
     with watch.stage("assemble"):
         kept, subtract = _kept_for(mesh, start), replace_fitted(subtract) if isinstance(body, TetMesh) else subtract
         wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
         split = [
-            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene)
+            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene, shift=checked.shift)
             for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
         ]
         dark = Dark(checked.surface, checked.bodies[0].outer)
@@ -163,7 +167,7 @@ def solve_each(
         notes += notes_on_readings(solution.readings, detector_tolerance, where)
         notes += notes_on_fields(solution, everywhere_tolerance, volume_tolerance, where)
         notes += checked.warnings(number, solution, given=given)
-        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes))))
+        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes)), frequency=frequency))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
 

@@ -18,14 +18,15 @@ from tetlux.fem.known.subtraction import Subtraction, subtract_as_before, subtra
 from tetlux.fem.linear.solver import LinearResult
 from tetlux.fem.media.coefficients import AnyMedium, Coefficients, MediaByLabel, coefficients_on
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.models.diffusion import Diffusion, is_steady_diffusion
+from tetlux.fem.models.diffusion import Diffusion, is_diffusion
 from tetlux.fem.models.model import Model
 from tetlux.fem.operators.assembly import Assembly, Lumping
 from tetlux.fem.operators.fitting import fitting_of
 from tetlux.fem.operators.loads import Load, load_of
 from tetlux.fem.operators.operator import Operator, operator_of, solve_columns
 from tetlux.fem.outcome.of_light import attach_quadratic, solution_of_light
-from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.outcome.sums import sum_solutions
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
@@ -73,11 +74,12 @@ class System:
     assembly : Assembly, optional
         That of another system on the same mesh, to share what does not depend on the media.
     limit : bool
-        Whether the fluence is limited to be nonnegative, see `tetlux.fem.operators.limiter`, except under a light for
-        which the equation itself has a negative fluence.
+        Whether the fluence is limited to be nonnegative, where that of the equation itself is.
     model_of : callable
-        Makes the model of the coefficients. A model other than `Diffusion` of steady light is solved for by `solve`
-        with ``subtract="nothing"``, without an estimate of its error and without readings by quadratic elements.
+        Makes the model of the coefficients. A model other than `Diffusion` is solved for by `solve` with
+        ``subtract="nothing"``, without an estimate of its error and without readings by quadratic elements.
+    shift : complex
+        What is added to sigma_a, 1/unit: see `tetlux.fem.models.model.Model`.
     """
 
     mesh: TetMesh
@@ -89,6 +91,7 @@ class System:
     assembly: Assembly | None = None
     limit: bool = True
     model_of: Callable[[Coefficients], Model] = Diffusion
+    shift: complex = 0.0
 
     @property
     def media(self) -> MediaByLabel | tuple[AnyMedium, ...]:
@@ -100,7 +103,7 @@ class System:
     @cached_property
     def coefficients(self) -> Coefficients:
         """Those of its tetrahedra."""
-        return coefficients_on(self.mesh, self.media)
+        return replace(coefficients_on(self.mesh, self.media), shift=self.shift)
 
     @cached_property
     def model(self) -> Model:
@@ -120,7 +123,7 @@ class System:
     @cached_property
     def layer_operator(self) -> Operator:
         """The operator for diffuse and emitted light: on coarse meshes its coefficients fit layers at the boundary."""
-        fits = self.mass == "lumped" and is_steady_diffusion(self.model)
+        fits = self.mass == "lumped" and is_diffusion(self.model) and self.model.shift == 0
         fitting = fitting_of(self.mesh, self.coefficients) if fits else None
         if fitting is None:
             return self.plain
@@ -128,7 +131,7 @@ class System:
 
     @cached_property
     def quadratic(self) -> QuadraticOperator:
-        """The operator that detectors are read by, of steady diffusion."""
+        """The operator that detectors are read by, of diffusion."""
         inner = tuple(region.surface for region in self.regions)
         return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
 
@@ -136,9 +139,9 @@ class System:
     def _assembly(self) -> Assembly:
         return self.assembly or Assembly(self.mesh)
 
-    def _require_steady_diffusion(self, remedy: str) -> None:
-        if not is_steady_diffusion(self.model):
-            raise InputError(f"the model is not that of steady diffusion, for which alone {remedy}.")
+    def _require_diffusion(self, remedy: str) -> None:
+        if not is_diffusion(self.model):
+            raise InputError(f"the model is not diffusion, for which alone {remedy}.")
 
     @property
     def _expected_right_hand_sides(self) -> int:
@@ -166,19 +169,19 @@ class System:
             If the linear solver fails.
         """
         if subtract != "nothing":
-            self._require_steady_diffusion('charges are subtracted; give subtract="nothing"')
+            self._require_diffusion('charges are subtracted; give subtract="nothing"')
         watch = Stopwatch()
         with watch.stage("surface"):
             body = Body(self.true_surface, self.media, MeshPartition(self.mesh))
             if self.surface is None or self.surface is self.mesh.surface:
                 subtract = replace_fitted(subtract)
-            split = split_lights(lights, body, subtract, kept=fits_of(self.mesh))
+            split = split_lights(lights, body, subtract, kept=fits_of(self.mesh), shift=self.shift)
         solution = self._solve(split, watch, None).whole
         return replace(solution, seconds=watch.read(), warnings=[*solution.warnings, *split.warnings])
 
     def step(self, split: SplitLights, watch: Stopwatch, coarser: MeshSolution | None = None) -> MeshSolution:
         """Solve, and estimate the error; `coarser` is the solution on a mesh that this one is a refinement of."""
-        self._require_steady_diffusion("errors are estimated; call System.solve")
+        self._require_diffusion("errors are estimated; call System.solve")
         solved = self._solve(split, watch, coarser)
         with watch.stage("solve"):
             inner = [region.surface for region in self.regions]
@@ -217,7 +220,7 @@ class System:
             own = [each for each in [*subtractions, *fitted] if each.light == light]
             of_lights.append(solution_of_light(load, fluence, own, self.true_surface, limit=self.limit))
         quadratic = None
-        if is_steady_diffusion(self.model):
+        if is_diffusion(self.model):
             of_lights, quadratic = attach_quadratic(of_lights, loads, self.quadratic)
         whole = replace(self._sum(of_lights, loads, results, split), quadratic=quadratic)
         return _Solved(loads, of_lights, whole, accurate)

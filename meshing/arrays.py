@@ -16,8 +16,10 @@ BoolArray = npt.NDArray[np.bool_]
 Vector = tuple[float, float, float]
 
 
-def sum_by_index(indices: npt.NDArray[np.integer], values: FloatArray, count: int) -> FloatArray:
+def sum_by_index(indices: npt.NDArray[np.integer], values: NumberArray, count: int) -> NumberArray:
     """Sum the values with each index 0, 1, ..., (count,); `indices` and `values` have the same shape."""
+    if np.iscomplexobj(values):
+        return sum_by_index(indices, values.real, count) + 1j * sum_by_index(indices, values.imag, count)
     return np.asarray(np.bincount(indices.reshape(-1), values.reshape(-1), count), dtype=np.float64)
 
 

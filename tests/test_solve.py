@@ -318,7 +318,7 @@ def test_a_word_is_said_of_a_slow_mesher(monkeypatch: pytest.MonkeyPatch) -> Non
 @pytest.mark.parametrize(
     ("options", "names"),
     [
-        ({"detector_tolerance": 0.01}, "detector_tolerance"),
+        ({"volume_tolerance": 0.01}, "volume_tolerance"),
         ({"mass": "consistent"}, "mass"),
         ({"subtract": "nothing", "cache": False}, "subtract and cache"),
         ({"limit": False}, "limit"),

@@ -13,7 +13,7 @@ from tests.conftest import needs
 # Each takes a tenth of a second or more to import, alone or with what it needs.
 PICTURES = ("matplotlib", "pyvista", "vtkmodules")
 READERS = ("trimesh", "meshio", "PIL", "networkx", "lxml")
-SOLVERS = ("skfem", "pyamg", "pytetwild", "numba")
+SOLVERS = ("skfem", "pyamg", "pytetwild", "numba", "scipy.interpolate", "scipy.optimize")
 CASE = """\
 surface: {sphere: {radius: 10}}
 medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
@@ -46,7 +46,16 @@ def test_a_run_imports_what_it_uses(tmp_path: Path) -> None:
         "from tetlux.cases.run import run_case\n"
         "run_case(load_cases(Path(sys.argv[1]))[0], Path(sys.argv[2]))"
     )
-    unused = (*PICTURES, *READERS, "pytetwild", "numba", "urllib.request", "tetlux.cases.picture.draw")
+    unused = (
+        *PICTURES,
+        *READERS,
+        "pytetwild",
+        "numba",
+        "scipy.interpolate",
+        "scipy.optimize",
+        "urllib.request",
+        "tetlux.cases.picture.draw",
+    )
     for outputs, names in (("[]", unused), ("[picture]", tuple(set(unused) - {"PIL", "tetlux.cases.picture.draw"}))):
         (tmp_path / "case.yaml").write_text(CASE + f"outputs: {outputs}\n")
         assert imported(code, names, str(tmp_path / "case.yaml"), str(tmp_path / "out")) == []

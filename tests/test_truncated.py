@@ -115,6 +115,11 @@ def test_what_cannot_be_cut_is_refused_in_a_sentence() -> None:
         solve(BLOCK, GREY, [SPOT], mesh=tetrahedralize(BLOCK, edge_length=60.0), model="truncated")
 
 
+def test_what_a_cut_is_not_certified_for_is_refused() -> None:
+    with pytest.raises(InputError, match='model "truncated" does not take everywhere_tolerance and frequency; leave'):
+        solve(BLOCK, GREY, [SPOT], model="truncated", frequency=1e8, everywhere_tolerance=0.1)
+
+
 def test_a_plan_weighs_the_part_against_the_whole() -> None:
     vein = Region(sphere(1.0, center=(0.0, 0.0, 76.0)), Medium(sigma_a=0.5, sigma_s_prime=1.0, eta=1.4))
     found = plan(BLOCK, GREY, [SPOT], regions=[vein])

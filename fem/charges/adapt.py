@@ -17,6 +17,7 @@ from tetlux.fem.charges.placement import (
     ChargePlacement,
     distance_from,
     place_charges,
+    weight_by_distance,
 )
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -38,7 +39,7 @@ NEGLIGIBLE_DIP = 1e-6
 # Estimate in % by 300 charges 2 / 3 spacings high: ball .024 / .017, box .045 / .012, cylinder .031 / .014, torus .037
 # / .050, hare .43 / .46, rocker-arm .63 / .93. With .003 some fits of a torus have 1.5 spacings: .06 % in place of .01.
 SMOOTH_ESTIMATE = 0.006
-# The spacing is multiplied by the share of each charge in the error to minus this power: see `_error_of_each`. Error in
+# The spacing is multiplied by the share of each charge in the error to minus this power: see `error_of_each`. Error in
 # %, and median relative error where the exitance is below 1 % of its maximum, geometric means of fourteen scenes and
 # three draws, for this power and a NOISE_FACTOR: .5 and 1.5: .089, .82; .5 and 2: .094, .77; .5 and 1.25: .108, 1.0; .4
 # and 1.5: .092, .77. By errors of each area in place of each charge .116, 1.25.
@@ -148,17 +149,18 @@ def fit_sequence(
     surface: Surface, equation: Equation, lights: LightSources, *, most: int = MOST_CHARGES
 ) -> Iterator[FittedCharges]:
     """Fit growing numbers of charges, the last of about `most`."""
-    spacing = distance = distance_from(surface, lights.points)
+    spacing = distance_from(surface, lights.points)
+    weight = weight_by_distance(spacing)
     # All steps grow by one factor, chosen so that the last step ends at `most`.
     steps = max(0, round(np.log(most / FEWEST_CHARGES) / np.log(COUNT_FACTOR)))
     height = HEIGHT_ROUGH
     for step in range(steps + 1):
         count = round(most * (FEWEST_CHARGES / most) ** ((steps - step) / max(steps, 1)))
-        placement = place_charges(surface, spacing, distance, count, height)
+        placement = place_charges(surface, spacing, weight, count, height)
         fitted = fit_placed_charges(placement, equation, lights)
         yield fitted
         height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(placement.checked, _error_of_each(fitted))
+        spacing = refine_spacing(placement.checked, error_of_each(fitted))
 
 
 def fit_for_remainder(
@@ -179,10 +181,11 @@ def fit_for_remainder(
     FittedCharges or None
         None if the estimated error of the best fit is above `LARGEST_USEFUL_ESTIMATE`.
     """
-    spacing = distance = distance_from(surface, lights.points)
+    spacing = distance_from(surface, lights.points)
+    weight = weight_by_distance(spacing)
     best, count, height = None, FEWEST_CHARGES, HEIGHT_ROUGH
     while True:
-        fitted = fit_placed_charges(place_charges(surface, spacing, distance, count, height), equation, lights)
+        fitted = fit_placed_charges(place_charges(surface, spacing, weight, count, height), equation, lights)
         estimate, slow = fitted.errors.estimate, False
         if best is not None:
             growth = len(fitted.placement.charges) / len(best.placement.charges)
@@ -196,7 +199,7 @@ def fit_for_remainder(
             round(count * np.clip(excess ** (1.0 / ASSUMED_RATE), LEAST_GROWTH, MOST_GROWTH)), MOST_CHARGES_WITH_FEM
         )
         height = HEIGHT_SMOOTH if estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        spacing = _refine_spacing(fitted.placement.checked, _error_of_each(fitted))
+        spacing = refine_spacing(fitted.placement.checked, error_of_each(fitted))
 
 
 def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: LightSources) -> FittedCharges:
@@ -219,7 +222,7 @@ def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: L
     return FittedCharges(field, lights, placement, factors, errors, violation, negative_share)
 
 
-def _error_of_each(fitted: FittedCharges) -> FloatArray:
+def error_of_each(fitted: FittedCharges) -> FloatArray:
     """The L2 error of the exitance around each checked point, over the area of one charge, up to a factor, (n,).
 
     The residual times the spacing is the error that it causes if the spacing is below the extrapolation length (see
@@ -228,8 +231,13 @@ def _error_of_each(fitted: FittedCharges) -> FloatArray:
     return np.asarray(np.abs(fitted.residual) * fitted.placement.checked.spacing**2)
 
 
-def _refine_spacing(samples: Samples, errors: FloatArray) -> Spacing:
-    """Spacing, up to a factor, that is finer where charges cause large errors (n,), which refinement makes equal."""
+def refine_spacing(
+    samples: Samples, errors: FloatArray, least_change: float = 0.0, most_change: float = np.inf
+) -> Spacing:
+    """Spacing, up to a factor, that is finer where charges cause large errors (n,), which refinement makes equal.
+
+    It is changed by factors from the least to the most change.
+    """
     tree = cKDTree(samples.points)
     count = min(AVERAGED_NEIGHBOURS, len(samples))
     _, near = tree.query(samples.points, k=count)
@@ -237,7 +245,9 @@ def _refine_spacing(samples: Samples, errors: FloatArray) -> Spacing:
     deviation = np.log(np.maximum(local, np.finfo(float).tiny))
     deviation -= deviation.mean()
     deviation = np.sign(deviation) * np.maximum(np.abs(deviation) - np.log(NOISE_FACTOR), 0.0)
-    logarithm = (np.log(samples.spacing) - REFINEMENT_EXPONENT * deviation)[near].mean(axis=1)
+    with np.errstate(divide="ignore"):
+        change = np.clip(-REFINEMENT_EXPONENT * deviation, np.log(least_change), np.log(most_change))
+    logarithm = (np.log(samples.spacing) + change)[near].mean(axis=1)
 
     def spacing(points: FloatArray) -> FloatArray:
         _, around = tree.query(points, k=min(INTERPOLATED_NEIGHBOURS, count))

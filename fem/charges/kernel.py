@@ -4,6 +4,7 @@ A charge of q watts at p gives ``phi = q e^{-k r}/(4 pi D r)``, ``r = |x - p|``,
 everywhere but at p. The wave number k may be complex: light modulated in time has ``k² = (sigma_a + i omega/v)/D``.
 """
 
+import cmath
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,11 +30,14 @@ class Equation:
         D, unit.
     boundary_factor : float
         A.
+    shift : complex
+        What is added to sigma_a in k, 1/unit: 0 for steady light.
     """
 
     wave_number: complex
     diffusion: float
     boundary_factor: float
+    shift: complex = 0.0
 
     @property
     def robin(self) -> float:
@@ -153,6 +157,10 @@ def _rows(positions: FloatArray) -> int:
     return max(1, PAIRS_PER_BLOCK // max(1, len(positions)))
 
 
-def equation_of(medium: Medium) -> Equation:
-    """The equation of steady light in a medium."""
-    return Equation(medium.sigma_tr, medium.diffusion, medium.boundary_factor)
+def equation_of(medium: Medium, shift: complex = 0.0) -> Equation:
+    """The equation in a medium, with what is added to sigma_a, 1/unit: 0 for steady light."""
+    if shift == 0:
+        return Equation(medium.sigma_tr, medium.diffusion, medium.boundary_factor)
+    # The root with a positive real part, as `cmath` has it.
+    wave_number = cmath.sqrt((medium.sigma_a + shift) / medium.diffusion)
+    return Equation(wave_number, medium.diffusion, medium.boundary_factor, shift)

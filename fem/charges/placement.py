@@ -1,6 +1,6 @@
 """Positions of charges: above the surface, outside the body, closest together where light enters."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +36,9 @@ DISTANCE_EXPONENT = 0.75
 # The spacing at the surface point nearest to a source, over the depth of the source; far away the spacing is the
 # distance from the source, both up to one factor.
 DEPTH_FACTOR = 0.6
+
+# The weight of equations at points (n, 3) of the surface, up to a factor, (n,).
+Weight = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +92,13 @@ def distance_from(surface: Surface, sources: FloatArray) -> Spacing:
     return distance
 
 
+def weight_by_distance(distance: Spacing, exponent: float = DISTANCE_EXPONENT) -> Weight:
+    """Weights of equations that grow with the distance from the light, so that faint light far away counts too."""
+    return lambda points: distance(points) ** exponent
+
+
 def place_charges(
-    surface: Surface, spacing: Spacing, distance: Spacing, count: int, height: float = HEIGHT_ROUGH
+    surface: Surface, spacing: Spacing, weight: Weight, count: int, height: float = HEIGHT_ROUGH
 ) -> ChargePlacement:
     """Positions of about `count` charges.
 
@@ -99,29 +107,24 @@ def place_charges(
     surface : Surface
     spacing : callable
         Of charges, up to a factor, which follows from the count.
-    distance : callable
-        From the light, up to a factor.
+    weight : callable
+        Of equations, up to a factor.
     count : int
     height : float
         Of charges above the surface, in spacings.
     """
     scale = spacing_scale([surface], [spacing], count)
-    return place_charges_at(surface, scaled(spacing, scale), distance, np.random.default_rng(0), height)
+    return place_charges_at(surface, scaled(spacing, scale), weight, np.random.default_rng(0), height)
 
 
 def place_charges_at(
-    surface: Surface,
-    spacing: Spacing,
-    distance: Spacing,
-    rng: np.random.Generator,
-    height: float,
-    exponent: float = DISTANCE_EXPONENT,
+    surface: Surface, spacing: Spacing, weight: Weight, rng: np.random.Generator, height: float
 ) -> ChargePlacement:
     """Positions of charges a spacing apart."""
     fitted, others = spread(cells_of(surface, scaled(spacing, 1.0 / EQUATION_REFINEMENT)), rng)
     feet = fitted[thin(fitted, EQUATION_REFINEMENT * LEAST_SEPARATION * fitted.spacing)]
     charges, clear = place_above_surface(surface, feet, EQUATION_REFINEMENT * feet.spacing, height)
-    return ChargePlacement(charges[clear], feet, fitted, _weights(fitted, distance, exponent), _checked(others, fitted))
+    return ChargePlacement(charges[clear], feet, fitted, _weights(fitted, weight), _checked(others, fitted))
 
 
 def spacing_scale(surfaces: Sequence[Surface], spacings: Sequence[Spacing], count: float) -> float:
@@ -168,7 +171,7 @@ def place_above_surface(
     return positions, clear & (heights >= LEAST_HEIGHT * spacing)
 
 
-def _weights(samples: Samples, distance: Spacing, exponent: float) -> FloatArray:
-    """Weights (n,) of equations at samples: the root of the area times a power of the distance from the light."""
-    distances = distance(samples.points)
-    return np.asarray(np.sqrt(samples.areas) * (distances / distances.max()) ** exponent)
+def _weights(samples: Samples, weight: Weight) -> FloatArray:
+    """Weights (n,) of equations at samples: the root of the area times the weight there, at most 1."""
+    weights = weight(samples.points)
+    return np.asarray(np.sqrt(samples.areas) * (weights / weights.max()))

@@ -25,6 +25,7 @@ from tetlux.fem.charges.placement import (
     place_charges_at,
     scaled,
     spacing_scale,
+    weight_by_distance,
 )
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
@@ -117,7 +118,8 @@ def place_at_interfaces(
     scale = spacing_scale(surfaces, spacings, share * count)
     found = []
     for interface, spacing in zip(interfaces, spacings, strict=True):
-        placement = place_charges_at(interface.surface, scaled(spacing, scale), spacing, rng, height, DISTANCE_EXPONENT)
+        weight = weight_by_distance(spacing, DISTANCE_EXPONENT)
+        placement = place_charges_at(interface.surface, scaled(spacing, scale), weight, rng, height)
         charges_inside = np.zeros((0, 3))
         if interface.outside is not None:
             turned = replace(interface.surface, faces=interface.surface.faces[:, ::-1])

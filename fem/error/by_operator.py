@@ -6,7 +6,8 @@ import numpy as np
 
 from tetlux.fem.error.estimate import Estimate, estimate_error
 from tetlux.fem.operators.loads import Load
-from tetlux.fem.outcome.solution import Solution, sum_solutions
+from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.outcome.sums import sum_solutions
 from tetlux.meshing.surface.surface import Surface
 
 

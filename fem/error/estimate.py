@@ -34,7 +34,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
@@ -107,8 +107,8 @@ def estimate_error(
     Estimate
     """
     mesh, areas = solution.mesh, solution.mesh.boundary_node_areas
-    norm, total = float(np.sqrt(areas @ whole.exitance**2)), float(areas @ np.abs(whole.exitance))
-    if total <= ROUNDING * whole.power.incident:
+    norm, total = float(np.sqrt(areas @ np.abs(whole.exitance) ** 2)), float(areas @ np.abs(whole.exitance))
+    if total <= ROUNDING * abs(whole.power.incident):
         # Where no light leaves, the exitance has no error.
         count = len(mesh.tetrahedra)
         return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64))
@@ -121,7 +121,7 @@ def estimate_error(
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
 
-    def indicators_for_dual(dual: FloatArray) -> FloatArray:
+    def indicators_for_dual(dual: NumberArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
         indicators = (
             diffusion
@@ -129,7 +129,7 @@ def estimate_error(
             * gradient_error
             * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
         )
-        indicators += scale * coefficients.sigma_a * mesh.volumes * lumping_error(smooth, at_corners)
+        indicators += scale * np.abs(coefficients.sigma) * mesh.volumes * lumping_error(smooth, at_corners)
         indicators += _boundary_lumping(mesh, coefficients, smooth, dual)
         if fitting is not None:
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
@@ -150,20 +150,20 @@ def estimate_error(
 
 
 def _dual_loads(
-    mesh: TetMesh, coefficients: Coefficients, exitance: FloatArray, norm: float, total: float
-) -> FloatArray:
+    mesh: TetMesh, coefficients: Coefficients, exitance: NumberArray, norm: float, total: float
+) -> NumberArray:
     """Loads of the two duals, (n, 2): for the L2 error of the exitance, and for the error of the exited power."""
-    loads = np.zeros((len(mesh.points), 2))
+    loads = np.zeros((len(mesh.points), 2), exitance.dtype)
     robin, areas = boundary_condition_of(coefficients.outer).robin, mesh.boundary_node_areas
-    loads[mesh.boundary_nodes, 0] = robin * areas * exitance / norm**2
+    loads[mesh.boundary_nodes, 0] = robin * areas * exitance.conj() / norm**2
     loads[mesh.boundary_nodes, 1] = robin * areas / total
     return loads
 
 
-def _remainder(solution: Solution) -> tuple[FloatArray, FloatArray]:
+def _remainder(solution: Solution) -> tuple[NumberArray, NumberArray]:
     """Fluence less that of fitted charges, and its net flux out of the body, at the nodes, (n,) each."""
     mesh, remainder = solution.mesh, solution.fluence
-    outward_flux = np.zeros(len(mesh.points))
+    outward_flux = np.zeros_like(remainder)
     outward_flux[mesh.boundary_nodes] = solution.exitance - solution.transmitted_irradiance
     for patch in solution.patches:
         if isinstance(patch, FittedPatch):
@@ -202,7 +202,7 @@ def _splits_to_resolve(solution: Solution) -> IntArray:
     return splits
 
 
-def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
+def _boundary_lumping(mesh: TetMesh, coefficients: Coefficients, smooth: NumberArray, dual: NumberArray) -> FloatArray:
     """Indicators of the error of lumping the boundary term, (m,)."""
     cells, faces = mesh.boundary_cells, mesh.boundary_faces
     corners = (mesh.tetrahedra[cells][:, None, :] == faces[:, :, None]).argmax(axis=2)

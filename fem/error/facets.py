@@ -16,7 +16,7 @@ import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
@@ -36,7 +36,7 @@ def boundary_facets(
     mesh: TetMesh,
     coefficients: Coefficients,
     surface: Surface,
-    values: tuple[FloatArray, FloatArray, FloatArray],
+    values: tuple[NumberArray, NumberArray, NumberArray],
     others: float,
     absorption_scale: float | FloatArray,
 ) -> FloatArray:
@@ -60,10 +60,10 @@ def boundary_facets(
     tangential = [s - np.einsum("ij,ij->i", s, normals)[:, None] * normals for s in slopes]
     product = np.abs(fluence[faces].mean(axis=1) * dual[faces].mean(axis=1))
     outflow = np.abs(outward_flux[faces].mean(axis=1) * dual[faces].mean(axis=1))
-    diffusion, sigma_a = (at_cells(value, cells) for value in (coefficients.diffusion, coefficients.sigma_a))
+    diffusion, sigma = (at_cells(value, cells) for value in (coefficients.diffusion, np.abs(coefficients.sigma)))
     extrapolation = diffusion / boundary_condition_of(coefficients.outer).robin
     scale = at_cells(absorption_scale, cells)
-    along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma_a * product
+    along = diffusion * np.abs(np.einsum("ij,ij->i", *tangential)) + scale * sigma * product
     corners = mesh.points[faces]
     length = longest_sides(corners)
     most = LARGEST_DISTANCE_RATIO * length * areas * (along + scale * outflow / extrapolation)
@@ -85,7 +85,7 @@ def interface_facets(
     coefficients: Coefficients,
     inner: Sequence[Surface],
     emission: float | FloatArray,
-    values: tuple[FloatArray, FloatArray],
+    values: tuple[NumberArray, NumberArray],
 ) -> FloatArray:
     """Indicators of the error of flat facets between regions, (m,), by the fluence and the dual at the nodes."""
     total = np.zeros(len(mesh.tetrahedra))

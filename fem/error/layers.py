@@ -15,7 +15,7 @@ import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.operators.fitting import LayerFitting
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -42,7 +42,7 @@ def boundary_layers(
     return np.asarray(np.bincount(cells, indicators, minlength=len(mesh.tetrahedra)), dtype=np.float64)
 
 
-def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArray, dual: FloatArray) -> FloatArray:
+def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: NumberArray, dual: NumberArray) -> FloatArray:
     """Indicators of the error of layers along interfaces, (m,), by fluence and dual at corners, (m, 4) each."""
     total = np.zeros(len(mesh.tetrahedra))
     if not mesh.regions.any():
@@ -50,8 +50,7 @@ def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArr
     faces, _, cells = mesh.interfaces
     _, areas = triangle_areas(mesh.points, faces)
     for side in cells.T:
-        diffusion, sigma_a = (at_cells(value, side) for value in (coefficients.diffusion, coefficients.sigma_a))
-        k = np.sqrt(sigma_a / diffusion)
+        diffusion, k = (at_cells(value, side) for value in (coefficients.diffusion, coefficients.decay))
         over = np.sqrt(1.0 + (0.5 * k * 3.0 * mesh.volumes[side] / areas) ** 2)
         first, second = (_step_across(mesh, side, faces, values[side]) for values in (smooth, dual))
         indicators = diffusion * k * (over - 1.0) * over * areas * first * second
@@ -59,7 +58,7 @@ def interface_layers(mesh: TetMesh, coefficients: Coefficients, smooth: FloatArr
     return total
 
 
-def _step_across(mesh: TetMesh, cells: IntArray, faces: IntArray, values: FloatArray) -> FloatArray:
+def _step_across(mesh: TetMesh, cells: IntArray, faces: IntArray, values: NumberArray) -> FloatArray:
     """Change of values at corners of tetrahedra (f, 4) from the mean on a face (f, 3) to the opposite corner, (f,)."""
     on_face = (mesh.tetrahedra[cells][:, :, None] == faces[:, None, :]).any(axis=2)
     return np.asarray(np.abs(np.where(on_face, values / 3.0, -values).sum(axis=1)))

@@ -21,7 +21,7 @@ from scipy.sparse import csc_array
 from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import corner_groups
 
@@ -30,10 +30,10 @@ from tetlux.meshing.tets.regions import corner_groups
 RIPPLE_FACTOR = 1.0 / 30.0
 
 # From vectors of tetrahedra (m, 3) to their averages at the corners, (m, 4, 3).
-Averaging = Callable[[FloatArray], FloatArray]
+Averaging = Callable[[NumberArray], NumberArray]
 
 
-def subtract_patches(solution: Solution, mean: Averaging) -> tuple[FloatArray, FloatArray]:
+def subtract_patches(solution: Solution, mean: Averaging) -> tuple[NumberArray, NumberArray]:
     """Fluence less that of patches at corners, (m, 4), and its `recovered_gradient_difference`, (m, 4, 3)."""
     mesh, fluence = solution.mesh, solution.fluence
     difference = recovered_gradient_difference(mesh, mean, fluence)
@@ -58,7 +58,7 @@ def nodal_averaging(mesh: TetMesh) -> Averaging:
     return lambda vectors: (np.asarray(around @ vectors) / volumes[:, None]).take(groups, axis=0)
 
 
-def recovered_gradient_difference(mesh: TetMesh, mean: Averaging, values: FloatArray) -> FloatArray:
+def recovered_gradient_difference(mesh: TetMesh, mean: Averaging, values: NumberArray) -> NumberArray:
     """The averaged gradient less the gradient, at the corners of each tetrahedron, (m, 4, 3), by values at nodes (n,).
 
     The gradient is not averaged across an interface, where it jumps.
@@ -69,12 +69,12 @@ def recovered_gradient_difference(mesh: TetMesh, mean: Averaging, values: FloatA
     return difference
 
 
-def root_mean_square(vectors: FloatArray) -> FloatArray:
-    """Root mean square over the corners of vectors (m, 4, 3), (m,)."""
-    return np.asarray(np.sqrt(np.einsum("mij,mij->m", vectors, vectors) / 4.0))
+def root_mean_square(vectors: NumberArray) -> FloatArray:
+    """Root mean square modulus over the corners of vectors (m, 4, 3), (m,)."""
+    return np.asarray(np.sqrt(np.einsum("mij,mij->m", vectors, vectors.conj()).real / 4.0))
 
 
-def lumping_error(first: FloatArray, second: FloatArray) -> FloatArray:
+def lumping_error(first: NumberArray, second: NumberArray) -> FloatArray:
     """Error of the lumped mean product of two linear functions, by their values at corners (m, c), (m,)."""
     corners = first.shape[1]
     # The lumped mean is sum(a b)/n, the exact one (sum(a b) + sum(a) sum(b))/(n (n + 1)).

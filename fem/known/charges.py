@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
+from tetlux.meshing.arrays import Number
 from tetlux.meshing.describe import one_line
 
 
@@ -33,8 +34,20 @@ class Charges(ChargeField):
     name: str = ""
 
     @property
+    def shift(self) -> complex:
+        """What their equation adds to sigma_a, 1/unit: 0 for steady light."""
+        return self.equation.shift
+
+    def divide_power(self, taken: Number) -> tuple[Number, Number]:
+        """Divide power that a volume takes, W, into what is absorbed and what is stored."""
+        if self.shift == 0:
+            return taken, 0.0
+        stored = taken * self.shift / (self.medium.sigma_a + self.shift)
+        return taken - stored, stored
+
+    @property
     def has_negative_source(self) -> bool:
         """Whether a source is negative, as those of a first moment are: fluence beside it may be below zero."""
-        return bool((self.strengths[: self.sources] < 0).any())
+        return bool((self.strengths[: self.sources].real < 0).any())
 
     __repr__ = one_line

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_for_remainder, fit_placed_charges
 from tetlux.fem.charges.check import exitance_error
-from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.charges.kernel import Equation, equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import group_size, quadrature
 from tetlux.fem.charges.samples import Samples, Spacing
@@ -26,7 +26,7 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 
@@ -56,14 +56,14 @@ class BoundaryResidual:
         The q points at which it is integrated; their `spacing` is that of charges, unit.
     exitance, values : (q,) ndarray
         ``G/(2A)`` and the residual ``D dG/dn + G/(2A)``, W/unit².
-    missed : float
+    missed : float or complex
         What the sum of ``-D dG/dn`` over the points misses of its integral, W; 0 where that hardly matters.
     """
 
     points: Samples
-    exitance: FloatArray
-    values: FloatArray
-    missed: float
+    exitance: NumberArray
+    values: NumberArray
+    missed: Number
 
     @cached_property
     def tree(self) -> cKDTree:
@@ -109,7 +109,13 @@ class FittedLight:
 
 
 def fit_light(
-    deposit: Deposit, surface: Surface, medium: Medium, *, tolerance: float, like: FittedLight | None = None
+    deposit: Deposit,
+    surface: Surface,
+    medium: Medium,
+    *,
+    tolerance: float,
+    like: FittedLight | None = None,
+    shift: complex = 0.0,
 ) -> FittedLight | None:
     """Fit charges to the points of a deposit.
 
@@ -122,6 +128,9 @@ def fit_light(
         Relative L2 error of the exitance, of charges and finite elements together.
     like : FittedLight, optional
         The same light in other coefficients: charges are put where its are, and are accurate where its are.
+    shift : complex
+        What is added to sigma_a, 1/unit. Places of charges are chosen for the real part of the wave number: complex
+        fits take four times as long.
 
     Returns
     -------
@@ -132,28 +141,33 @@ def fit_light(
     if not _is_fit(deposit, surface, medium):
         return None
     lights = LightSources(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
-    equation = equation_of(medium)
-    if like is None:
-        fitted = fit_for_remainder(surface, equation, lights, tolerance=tolerance)
+    equation = equation_of(medium, shift)
+    placement = None if like is None else like.placement
+    fitted = None
+    if placement is None:
+        real = replace(equation, wave_number=equation.wave_number.real)
+        fitted = fit_for_remainder(surface, real, lights, tolerance=tolerance)
         if fitted is None:
             return None
-    else:
-        fitted = fit_placed_charges(like.placement, equation, lights)
+        placement = fitted.placement
+    if fitted is None or shift != 0:
+        fitted = fit_placed_charges(placement, equation, lights)
     charges = _charges(fitted, surface, medium)
     if like is not None and like.surface is surface:
         residual = residual_at(like.residual.points, charges)
     else:
         residual = residual_at(_residual_points(fitted.placement, surface), charges)
-    accurate = like.accurate if like is not None else _accurate(residual, medium)
+    accurate = like.accurate if like is not None else _accurate(residual, equation)
     return FittedLight(charges, residual, fitted.placement, accurate, surface)
 
 
-def _accurate(residual: BoundaryResidual, medium: Medium) -> BoolArray:
+def _accurate(residual: BoundaryResidual, equation: Equation) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
     points = residual.points
     nearest = residual.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
-    errors = exitance_error(equation_of(medium), residual.values, points.spacing)
-    error, exitance = np.sqrt((errors[nearest] ** 2).mean(axis=1)), np.abs(residual.exitance[nearest]).mean(axis=1)
+    errors = exitance_error(equation, residual.values, points.spacing)
+    error = np.sqrt((np.abs(errors[nearest]) ** 2).mean(axis=1))
+    exitance = np.abs(residual.exitance[nearest]).mean(axis=1)
     return np.asarray(error <= ACCURATE * exitance)
 
 
@@ -195,7 +209,7 @@ def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spaci
 
 def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | None = None) -> BoundaryResidual:
     """The residual of charges at points of the true surface, some of which may be those where it is known."""
-    exitance, values = np.empty(len(points)), np.empty(len(points))
+    exitance, values = np.empty((2, len(points)), charges.equation.dtype)
     new = np.arange(len(points))
     if known is not None:
         distance, nearest = (np.asarray(found) for found in known.tree.query(points.points))
@@ -205,19 +219,19 @@ def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | Non
         exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
         new = new[~same]
     exitance[new], values[new] = charges.exitance_and_residual(points.points[new], points.normals[new])
-    outflow = float(points.areas @ (exitance - values))
+    outflow = (points.areas @ (exitance - values)).item()
     return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
 
 
-def _missed(charges: Charges, points: Samples, outflow: float) -> float:
+def _missed(charges: Charges, points: Samples, outflow: Number) -> Number:
     """What a sum over points misses of the outflow of charges, of which they have that sum, W.
 
     Without absorption all power of the sources flows out, so the sum for the same charges without absorption says how
     far it is off. That matters where little is absorbed, which is what does not flow out.
     """
-    power = float(charges.strengths[: charges.sources].sum())
-    if power - outflow > LITTLE * power:
+    power = charges.strengths[: charges.sources].sum().item()
+    if abs(power - outflow) > LITTLE * abs(power):
         return 0.0
     unabsorbed = replace(charges, equation=replace(charges.equation, wave_number=0.0))
     exitance, values = unabsorbed.exitance_and_residual(points.points, points.normals)
-    return outflow * (power / float(points.areas @ (exitance - values)) - 1.0)
+    return outflow * (power / (points.areas @ (exitance - values)).item() - 1.0)

@@ -14,7 +14,7 @@ from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.assembly import Lumping
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -66,15 +66,15 @@ class FittedPatch(Patch):
         return areas if self.is_whole else areas * self.cells[self.mesh.boundary_cells[self.facets]]
 
     @cached_property
-    def load(self) -> FloatArray:
+    def load(self) -> NumberArray:
         """``-∮ r v`` over the surface of the patch, (n,), W."""
         return self._at_nodes(-self.areas * self.residual.values)
 
     @cached_property
-    def residual_at_nodes(self) -> FloatArray:
+    def residual_at_nodes(self) -> NumberArray:
         """The residual that the mesh sees, averaged around each node, (n,), W/unit²; 0 at nodes inside."""
         area = self._at_nodes(self.areas)
-        return np.divide(-self.load, area, out=np.zeros(len(area)), where=area > 0)
+        return np.divide(-self.load, area, out=np.zeros_like(self.load), where=area > 0)
 
     def unseen(self) -> FloatArray:
         """Integral of the square of the exitance that the mesh misses of each boundary triangle, (f,), W²/unit².
@@ -87,7 +87,7 @@ class FittedPatch(Patch):
         sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
         length = SHORTER * np.minimum(self.residual.points.spacing, sides[self.facets])
         missed = exitance_error(self.charges.equation, self.residual.values - seen, length)
-        square = self.areas * missed**2
+        square = self.areas * np.abs(missed) ** 2
         return np.asarray(np.bincount(self.facets, square, minlength=len(sides)), dtype=np.float64)
 
     def splits_to_see(self) -> IntArray:
@@ -98,7 +98,7 @@ class FittedPatch(Patch):
         # Two halve its sides.
         return np.asarray(np.ceil(2.0 * np.log2(np.maximum(sides / apart, 1.0))), dtype=np.int64)
 
-    def _at_nodes(self, values: FloatArray) -> FloatArray:
+    def _at_nodes(self, values: NumberArray) -> NumberArray:
         """Values (q,) shared out to the nodes of the triangles they belong to, (n,)."""
         corners = self.mesh.boundary_faces[self.facets]
         return sum_by_index(corners, values[:, None] * self.weights, len(self.mesh.points))
@@ -189,13 +189,20 @@ def fitted_terms(patch: FittedPatch, absorbing: FloatArray, mass: Lumping) -> Pa
     areas = patch.areas
     if not patch.is_whole:
         # Sums over points miss power near the light, which is in the patch.
-        leaving = areas @ residual.exitance + residual.missed
-        through = areas @ (residual.values - residual.exitance) - residual.missed
-        return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, float(leaving), float(through)))
-    exited = float(areas @ residual.exitance) + residual.missed
-    inflow = float(areas @ (residual.values - residual.exitance)) - residual.missed
+        leaving = (areas @ residual.exitance).item() + residual.missed
+        through = (areas @ (residual.values - residual.exitance)).item() - residual.missed
+        return patch_terms(patch, mass, BoundaryIntegrals(-patch.load, leaving, through))
+    exited = (areas @ residual.exitance).item() + residual.missed
+    inflow = (areas @ (residual.values - residual.exitance)).item() - residual.missed
     robin = boundary_condition_of(charges.medium).robin
-    at_boundary = robin * float(mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes])
-    # Gauss: of the power of the sources, the body absorbs what does not flow out through its surface.
-    absorbed = float(charges.strengths[: charges.sources].sum()) + inflow
-    return PatchTerms(patch.load, exited - at_boundary, absorbed - float(absorbing @ patch.at_nodes))
+    at_boundary = robin * (mesh.boundary_node_areas @ patch.at_nodes[mesh.boundary_nodes]).item()
+    # Gauss: of the power of the sources, the body takes what does not flow out through its surface.
+    taken = charges.strengths[: charges.sources].sum().item() + inflow
+    absorbed, stored = charges.divide_power(taken)
+    at_nodes = patch.at_nodes
+    return PatchTerms(
+        patch.load,
+        exited - at_boundary,
+        absorbed - (absorbing @ at_nodes).item(),
+        stored - charges.shift * (mesh.node_volumes @ at_nodes).item(),
+    )

@@ -32,6 +32,7 @@ def charges_of(
     most: int = MOST_IMAGE_CHARGES,
     region: int | None = None,
     varying: VaryingMedium | None = None,
+    shift: complex = 0.0,
 ) -> Charges | None:
     """Charges of point sources, each with its images in the tangent plane at the nearest point of the surface.
 
@@ -51,6 +52,8 @@ def charges_of(
         The region that the sources lie in, if the body has several media.
     varying : VaryingMedium, optional
         The medium of that region if it varies; `medium` is what it is at the sources.
+    shift : complex
+        What is added to sigma_a, 1/unit.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def charges_of(
         return None
     closest = CLOSEST * min(medium.mean_free_path, float(depths.min()))
     return Charges(
-        equation_of(medium),
+        equation_of(medium, shift),
         np.vstack(positions),
         np.concatenate(strengths),
         closest,

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch, is_sound
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -44,7 +44,7 @@ _Key = tuple[Elements, str, int]
 _OF_MESHES: WeakKeyDictionary[TetMesh, dict[_Key, _Choice]] = WeakKeyDictionary()
 
 
-def kept_patch(mesh: TetMesh, charges: Charges, at_nodes: FloatArray, elements: Elements) -> Patch | None:
+def kept_patch(mesh: TetMesh, charges: Charges, at_nodes: NumberArray, elements: Elements) -> Patch | None:
     """The patch that charges had on a mesh, None if there was none or it does not hold them now."""
     choice = _OF_MESHES.get(mesh, {}).get(_key(charges, elements))
     if choice is None or not choice.serves(charges.medium):
@@ -64,7 +64,7 @@ def keep_patch(patch: Patch, elements: Elements) -> None:
 
 
 def keep_or_choose(
-    mesh: TetMesh, charges: Charges, at_nodes: FloatArray, elements: Elements, choose: Callable[[], Patch]
+    mesh: TetMesh, charges: Charges, at_nodes: NumberArray, elements: Elements, choose: Callable[[], Patch]
 ) -> Patch:
     """The patch that charges had on a mesh, or one that is chosen now and kept."""
     found = kept_patch(mesh, charges, at_nodes, elements)

@@ -10,7 +10,7 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.media.coefficients import WITHIN
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.search.rays import OFFSET
 from tetlux.meshing.surface.triangles import longest_sides
@@ -46,7 +46,7 @@ class Patch:
     mesh: TetMesh
     charges: Charges
     cells: BoolArray
-    at_nodes: FloatArray
+    at_nodes: NumberArray
 
     @cached_property
     def faces(self) -> tuple[IntArray, BoolArray]:
@@ -70,7 +70,7 @@ class Patch:
     __repr__ = one_line
 
 
-def find_accurate_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
+def find_accurate_nodes(patch: Patch, fluence: NumberArray) -> BoolArray:
     """Whether the charges are close to the fluence (n,) at each node, (n,)."""
     accurate = np.abs(fluence - patch.at_nodes) <= ACCURATE * np.abs(patch.at_nodes)
     charges = patch.charges
@@ -81,7 +81,7 @@ def find_accurate_nodes(patch: Patch, fluence: FloatArray) -> BoolArray:
     return np.asarray(accurate)
 
 
-def patch_of(mesh: TetMesh, charges: Charges, accurate: BoolArray, at_nodes: FloatArray | None = None) -> Patch:
+def patch_of(mesh: TetMesh, charges: Charges, accurate: BoolArray, at_nodes: NumberArray | None = None) -> Patch:
     """The patch of the tetrahedra whose nodes are all accurate (n,); empty if integrals over its faces would fail."""
     cells: BoolArray = np.asarray(accurate[mesh.tetrahedra].all(axis=1))
     if charges.region is not None:

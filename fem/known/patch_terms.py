@@ -12,7 +12,7 @@ from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.operators.loads import load_vector
 from tetlux.fem.simplex_rules import cut_near_charges
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.triangles import triangle_areas
 
@@ -28,13 +28,14 @@ class PatchTerms:
     ----------
     load : (n,) ndarray
         ``P v(x0) - a(G - I_h G, v)`` over the patch, W.
-    exited, absorbed : float
+    exited, absorbed, stored : float or complex
         Of ``G - I_h G``, W.
     """
 
-    load: FloatArray
-    exited: float
-    absorbed: float
+    load: NumberArray
+    exited: Number
+    absorbed: Number
+    stored: Number = 0.0
 
     __repr__ = one_line
 
@@ -47,13 +48,13 @@ class BoundaryIntegrals:
     ----------
     load : (n,) ndarray
         ``∮ (D dG/dn + G/(2A)) v``, W.
-    leaving, through : float
+    leaving, through : float or complex
         ``∮ G/(2A)`` and ``∮ D dG/dn``, W.
     """
 
-    load: FloatArray
-    leaving: float
-    through: float
+    load: NumberArray
+    leaving: Number
+    through: Number
 
     __repr__ = one_line
 
@@ -74,7 +75,7 @@ def patch_terms(patch: Patch, mass: Lumping, surface: BoundaryIntegrals | None =
     PatchTerms
     """
     mesh, charges, medium = patch.mesh, patch.charges, patch.charges.medium
-    sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources])
+    sources = SourceTerms(points=charges.positions[: charges.sources], powers=charges.strengths[: charges.sources].real)
     if not patch.cells.any():
         return PatchTerms(load_vector(mesh, coefficients_of(medium), sources), exited=0.0, absorbed=0.0)
     count = len(mesh.points)
@@ -84,9 +85,9 @@ def patch_terms(patch: Patch, mass: Lumping, surface: BoundaryIntegrals | None =
     value, through = _integrals(mesh.points[faces[integrated]], charges)
     leaving = robin * value * on_boundary[integrated, None]
     load = -sum_by_index(faces[integrated], through + leaving, count)
-    leaves, flows = float(leaving.sum()), float(through.sum())
+    leaves, flows = leaving.sum().item(), through.sum().item()
     if surface is not None:
-        load -= surface.load
+        load = load - surface.load
         leaves, flows = leaves + surface.leaving, flows + surface.through
     # a(I_h G, v): stiffness, absorption and boundary terms of the patch, times G at the nodes.
     inside = slice(None) if patch.cells.all() else np.flatnonzero(patch.cells)
@@ -96,19 +97,23 @@ def patch_terms(patch: Patch, mass: Lumping, surface: BoundaryIntegrals | None =
     volumes = mesh.volumes[inside]
     slope = np.einsum("mij,mi->mj", hats, values)
     stiff = (medium.diffusion * volumes)[:, None] * np.einsum("mij,mj->mi", hats, slope)
-    absorbed = medium.sigma_a * volumes[:, None] * _mass(values, mass)
+    at_corners = volumes[:, None] * _mass(values, mass)
     _, areas = triangle_areas(mesh.points, faces)
     exited = robin * (areas * on_boundary)[:, None] * _mass(patch.at_nodes[faces], mass)
-    load += sum_by_index(cells, stiff + absorbed, count) + sum_by_index(faces, exited, count)
+    sigma = medium.sigma_a + charges.shift if charges.shift else medium.sigma_a
+    load += sum_by_index(cells, stiff + sigma * at_corners, count) + sum_by_index(faces, exited, count)
+    # Gauss: of the power of the sources, the patch takes what does not flow out through its faces.
+    absorbed, stored = charges.divide_power(sources.powers.sum().item() + flows)
+    held = at_corners.sum().item()
     return PatchTerms(
         load,
-        exited=leaves - float(exited.sum()),
-        # Gauss: of the power of the sources, the patch absorbs what does not flow out through its faces.
-        absorbed=float(sources.powers.sum() + flows - absorbed.sum()),
+        exited=leaves - exited.sum().item(),
+        absorbed=absorbed - medium.sigma_a * held,
+        stored=stored - charges.shift * held,
     )
 
 
-def _mass(values: FloatArray, mass: Lumping) -> FloatArray:
+def _mass(values: NumberArray, mass: Lumping) -> NumberArray:
     """Mass matrices of simplices of unit size times values at their corners, (m, d + 1)."""
     corners = values.shape[1]
     if mass == "lumped":
@@ -116,9 +121,9 @@ def _mass(values: FloatArray, mass: Lumping) -> FloatArray:
     return np.asarray((values + values.sum(axis=1, keepdims=True)) / (corners * (corners + 1)))
 
 
-def _integrals(corners: FloatArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
+def _integrals(corners: FloatArray, charges: Charges) -> tuple[NumberArray, NumberArray]:
     """Integrals over triangles (f, 3, 3) of G and of ``D dG/dn`` against their three hat functions, (f, 3) each."""
-    value, flux = np.zeros((len(corners), 3)), np.zeros((len(corners), 3))
+    value, flux = np.zeros((2, len(corners), 3), charges.equation.dtype)
 
     def locate(owner: IntArray, places: FloatArray) -> FloatArray:
         return np.asarray(places @ corners[owner])

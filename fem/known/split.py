@@ -79,6 +79,7 @@ def split_lights(
     tolerance: float = DEFAULT_TOLERANCE,
     kept: KeptFits | None = None,
     scene: int = 0,
+    shift: complex = 0.0,
 ) -> SplitLights:
     """Split the lights of a scene into what is subtracted and what is left to finite elements.
 
@@ -94,6 +95,8 @@ def split_lights(
         Fits of earlier solutions, which are followed; new ones are added.
     scene : int
         The number of the scene, by which patches are kept.
+    shift : complex
+        What the equation adds to sigma_a, 1/unit: 0 for steady light.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def split_lights(
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
         if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
-            found_fit = _fit(light, deposit, body, tolerance, kept)
+            found_fit = _fit(light, deposit, body, tolerance, kept, shift)
             if found_fit is not None:
                 fitted[number] = found_fit
                 deposits.append(deposit)
@@ -123,10 +126,10 @@ def split_lights(
                 continue
         if body.only_medium is not None:
             known, rest, found = _charges_in_one_medium(
-                deposit, body.surface, body.only_medium, images=images, most=left
+                deposit, body.surface, body.only_medium, images=images, most=left, shift=shift
             )
         else:
-            known, rest, found = _charges_in_several(deposit, body, images=images, most=left)
+            known, rest, found = _charges_in_several(deposit, body, images=images, most=left, shift=shift)
         left -= sum(len(some.positions) for some in found)
         charges += [replace(each, name=f"{scene}: {number}.{k} {light!r}") for k, each in enumerate(found)]
         owners += [number] * len(found)
@@ -135,17 +138,19 @@ def split_lights(
     return SplitLights(tuple(deposits), tuple(charges), tuple(owners), fitted, tuple(remaining))
 
 
-def _fit(light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptFits | None) -> FittedLight | None:
+def _fit(
+    light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptFits | None, shift: complex
+) -> FittedLight | None:
     """Fit charges to a light, placed as in its kept fit if there is one; None if charges would not do."""
     medium = body.only_medium
     if medium is None or len(deposit.terms.points) == 0:
         return None
     if kept is None:
-        return fit_light(deposit, body.surface, medium, tolerance=tolerance)
+        return fit_light(deposit, body.surface, medium, tolerance=tolerance, shift=shift)
     chosen, like = kept.find(repr(light), deposit.hints.resolution)
     if chosen and like is None:
         return None
-    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, like=like)
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, like=like, shift=shift)
     if not chosen:
         kept.keep(repr(light), deposit.hints.resolution, found)
     return found
@@ -189,7 +194,7 @@ def check_scenes(scenes: Sequence[Sequence[Light]]) -> None:
 
 
 def _charges_in_one_medium(
-    deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int
+    deposit: Deposit, surface: Surface, medium: Medium, *, images: bool, most: int, shift: complex
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """A deposit as it is subtracted, what is left of it, and what is subtracted: as much as can be afforded."""
     # Beams too and with images, or points alone, at least without.
@@ -199,14 +204,14 @@ def _charges_in_one_medium(
     for bright, faint, with_images in trials:
         points, powers = bright.terms.points, bright.terms.powers
         if 0 < len(points) <= most:
-            some = charges_of(points, powers, surface, medium, images=with_images, most=most)
+            some = charges_of(points, powers, surface, medium, images=with_images, most=most, shift=shift)
             if some is not None:
                 return bright, faint, [some]
     return deposit, deposit, []
 
 
 def _charges_in_several(
-    deposit: Deposit, body: Body, *, images: bool, most: int
+    deposit: Deposit, body: Body, *, images: bool, most: int, shift: complex
 ) -> tuple[Deposit, Deposit, list[Charges]]:
     """The same for points in regions, each within its own region and, where the medium varies, where it is the same.
 
@@ -233,6 +238,7 @@ def _charges_in_several(
                 most=most,
                 region=region if len(body.media) > 1 else None,
                 varying=None if isinstance(of_region, Medium) else of_region,
+                shift=shift,
             )
             if some is not None:
                 most -= len(some.positions)

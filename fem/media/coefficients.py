@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.tets.mesh import TetMesh
@@ -34,6 +34,8 @@ class Coefficients:
         Mean cosine of the scattering angle; nan where sigma_s' alone is given.
     outer : Medium
         The medium whose index and boundary the whole body shares.
+    shift : complex
+        What is added to sigma_a, 1/unit: 0 for steady light, see `tetlux.fem.models.model.Model`.
     """
 
     sigma_a: float | FloatArray
@@ -42,6 +44,17 @@ class Coefficients:
     delta_eddington_cosine: float | FloatArray
     mean_cosine: float | FloatArray
     outer: Medium
+    shift: complex = 0.0
+
+    @property
+    def sigma(self) -> Number | NumberArray:
+        """The coefficient of the fluence in the equation, ``sigma_a + shift``, 1/unit; real for steady light."""
+        return self.sigma_a + self.shift if self.shift else self.sigma_a
+
+    @property
+    def decay(self) -> float | FloatArray:
+        """Modulus of ``k = sqrt(sigma/D)``, over whose inverse the fluence changes, 1/unit."""
+        return np.sqrt(np.abs(self.sigma) / self.diffusion)
 
     @property
     def uniform(self) -> bool:

@@ -3,13 +3,15 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import PchipInterpolator
 
 SpectrumKind = Literal["extinction", "absorption"]
 
@@ -59,7 +61,10 @@ class Spectrum:
                 raise InputError(f"the value at {wavelength:g} nm is {value:g}; give finite values of 0 or more.")
 
     @cached_property
-    def _between(self) -> PchipInterpolator:
+    def _between(self) -> "PchipInterpolator":
+        # It takes a fifth of a second to import, which only tissue needs.
+        from scipy.interpolate import PchipInterpolator  # noqa: PLC0415
+
         return PchipInterpolator(self.wavelengths, self.values)
 
     def absorption_at(self, wavelength: float, amount: float) -> float:

@@ -11,25 +11,28 @@ thinner than a mean free path.
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
+from tetlux.fem.charges.readings import ReadingGoal, ripple_errors
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 
-# Points over which the square of errors around a reading is averaged. Bar over error for 110 readings on balls, balls
-# in balls and cylinders, with errors from 1e-6 to .9: 1.8 in the median, 1.0 and 27 for the lowest and highest 5 %.
-AVERAGED = 12
 # Relative error that is always added, for that of the smooth surface that triangles stand for.
 LEAST_RELATIVE_ERROR = 1e-5
 
 
 def reading_errors(
-    surface: Surface, field: ChargeField, fitted: Samples, boundary_source: float, points: FloatArray
+    surface: Surface,
+    field: ChargeField,
+    fitted: Samples,
+    boundary_source: float,
+    points: FloatArray,
+    exitance: FloatArray,
+    goal: ReadingGoal | None = None,
 ) -> FloatArray:
-    """Estimated errors of the exitance at points of the body's surface.
+    """Estimated relative errors of the exitance at points of the body's surface.
 
     Parameters
     ----------
@@ -41,16 +44,22 @@ def reading_errors(
     boundary_source : float
         Right-hand side of the boundary condition, W/unit².
     points : (d, 3) ndarray
+    exitance : (d,) ndarray
+        There, W/unit².
+    goal : ReadingGoal, optional
+        What charges were fitted for, if it was readings: far from the light the residual then is so small around the
+        points that its effect from elsewhere counts.
 
     Returns
     -------
     (d,) ndarray
-        W/unit².
     """
     tree, spacing = cKDTree(fitted.points), EQUATION_REFINEMENT * fitted.spacing
     checked = quadrature(surface, lambda places: spacing[tree.query(places)[1]])
     _, residual = field.exitance_and_residual(checked.points, checked.normals)
-    apart = spacing[tree.query(checked.points)[1]]
-    errors = exitance_error(field.equation, residual - boundary_source, apart)
-    around = cKDTree(checked.points).query(points, k=min(AVERAGED, len(checked)))[1]
-    return np.asarray(np.sqrt((errors[around.reshape(len(points), -1)] ** 2).mean(axis=1)))
+    violation, apart = residual - boundary_source, spacing[tree.query(checked.points)[1]]
+    if goal is not None:
+        return goal.at(points).relative_errors(checked, apart, violation, exitance) + LEAST_RELATIVE_ERROR
+    with np.errstate(divide="ignore", invalid="ignore"):
+        errors = ripple_errors(field.equation, checked, apart, violation, points) / np.abs(exitance)
+    return np.asarray(errors + LEAST_RELATIVE_ERROR)

@@ -11,14 +11,16 @@ from scipy.spatial import cKDTree
 from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
 from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
+from tetlux.fem.charges.fit_readings import fit_for_readings
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
+from tetlux.fem.charges.readings import ReadingGoal, reading_goal
 from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.meshless.reading_error import LEAST_RELATIVE_ERROR, reading_errors
+from tetlux.fem.meshless.reading_error import reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
@@ -54,8 +56,7 @@ class ChargeSolution:
 
     Attributes
     ----------
-    surface : Surface
-    medium : Medium
+    surface, medium : Surface, Medium
         Of the body.
     interfaces : tuple of Interface
         The body's surface, then those of its regions.
@@ -76,6 +77,8 @@ class ChargeSolution:
         Of the detectors that were given to `tetlux.fem.solve`, in their order.
     plan : Plan, optional
         Why this model was chosen, if it was.
+    goal : ReadingGoal, optional
+        What the charges were fitted for, if it was readings of all lights together.
     """
 
     surface: Surface
@@ -90,9 +93,9 @@ class ChargeSolution:
     warnings: list[str] = field(default_factory=list)
     readings: tuple[Reading, ...] = ()
     plan: Plan | None = None
+    goal: ReadingGoal | None = None
 
-    mesh = None
-    model = "charges"
+    mesh, model = None, "charges"
 
     @property
     def error_estimate(self) -> float:
@@ -124,9 +127,8 @@ class ChargeSolution:
     def errors_on(self, queries: FloatArray) -> FloatArray:
         """Estimated relative errors of the exitance at points (q, 3) on the surface, (q,)."""
         source = float(boundary_condition_of(self.medium).inflow(sum(ledger.transmitted for ledger in self.ledgers)))
-        errors = reading_errors(self.surface, self._sums[0], self.samples[0], source, queries)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(errors / np.abs(self.exitance_on(queries)) + LEAST_RELATIVE_ERROR)
+        exitance = self.exitance_on(queries)
+        return reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
 
     def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
@@ -170,6 +172,7 @@ class ChargeSolution:
             ledgers=(self.ledgers[light],),
             errors=ErrorEstimates(np.nan, np.nan),
             warnings=[],
+            goal=None,
         )
 
     @cached_property
@@ -239,7 +242,8 @@ def charge_solution(
     ledgers: Sequence[LightLedger],
     *,
     inner: Sequence[tuple[Surface, Medium]] = (),
-    tolerance: float = DEFAULT_TOLERANCE,
+    tolerance: float | None = DEFAULT_TOLERANCE,
+    readings: tuple[FloatArray, float] | None = None,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for point sources and diffuse light in a body of homogeneous regions.
@@ -257,8 +261,10 @@ def charge_solution(
         Of each light; diffuse light is for a body without regions.
     inner : sequence of (Surface, Medium)
         Regions of the body.
-    tolerance : float
+    tolerance : float, optional
         Wanted relative L2 error of the exitance.
+    readings : (d, 3) ndarray and float, optional
+        Points that are read and wanted relative error of each reading, in a body without regions.
     most : int
         Approximate number of charges at which fitting ends in any case.
 
@@ -270,12 +276,17 @@ def charge_solution(
     if not inner:
         transmitted = np.array([ledger.transmitted for ledger in ledgers])
         boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
-        lights = LightSources(points, powers, boundary_source)
-        fitted = fit_charges(surface, equation_of(medium), lights, tolerance=tolerance, most=most)
+        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium), None
+        if readings is not None:
+            goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
+            fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
+        else:
+            assert tolerance is not None
+            fitted = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
         samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
-        return ChargeSolution(
-            surface, medium, (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
-        )
+        given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
+        return ChargeSolution(surface, medium, *given, goal=goal)
+    assert tolerance is not None
     surfaces = [each for each, _ in inner]
     parents = nesting(surface, surfaces).parents
     interfaces = [Interface(surface, 0, None)]

@@ -1,14 +1,14 @@
 """Lights in a body of homogeneous regions, solved by charges: what `tetlux.fem.solve` does for ``model="charges"``."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import SurfacePartition
 from tetlux.fem.charges.adapt import MOST_CHARGES, NEGLIGIBLE_DIP
-from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import check_lights
 from tetlux.fem.labels import GivenMedia
@@ -16,7 +16,12 @@ from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
 from tetlux.fem.meshless.solution import ChargeSolution, LightLedger, charge_solution
+from tetlux.fem.notes import notes_on_readings
+from tetlux.fem.outcome.detector_kinds import Detector
+from tetlux.fem.outcome.detectors import place_detector, read_all
+from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.power import Power
+from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -40,7 +45,9 @@ def solve_with_charges(
     lights: Sequence[Light],
     *,
     regions: Sequence[Region] = (),
-    tolerance: float = DEFAULT_TOLERANCE,
+    tolerance: float | None = DEFAULT_TOLERANCE,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
     most: int = MOST_CHARGES,
 ) -> ChargeSolution:
     """Solve for lights in a body of homogeneous regions, without a mesh.
@@ -53,8 +60,12 @@ def solve_with_charges(
         Points, beams that are points, and diffuse light; they add up.
     regions : sequence of Region
         Parts of the body with media of their own; with these there is no diffuse light.
-    tolerance : float
-        Wanted relative L2 error of the exitance.
+    tolerance : float, optional
+        Wanted relative L2 error of the exitance; None to fit for detectors alone.
+    detectors : sequence of Detector
+        What is to be read.
+    detector_tolerance : float, optional
+        Wanted relative error of what each detector reads, in a body without regions.
     most : int
         Charges at which fitting ends even if the tolerance is not met; the solution then carries a warning.
 
@@ -76,14 +87,9 @@ def solve_with_charges(
     >>> solution.error_estimate < 0.02
     True
     """
-    if isinstance(surface, TetMesh):
-        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
-    if not isinstance(medium, AnyMedium):
-        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
-    check_tolerance(tolerance)
-    check_lights(lights)
-    if len(lights) == 0:
-        raise InputError("there is no light; give at least one.")
+    _check_arguments(surface, medium, lights, detectors, regions, Tolerances(tolerance, detector_tolerance))
+    assert isinstance(surface, Surface)
+    assert isinstance(medium, AnyMedium)
     watch = Stopwatch()
     with watch.stage("surface"):
         inner = [(region.surface, homogeneous_medium(only_medium(region))) for region in regions]
@@ -96,26 +102,66 @@ def solve_with_charges(
         deposits = [light.deposit_in(whole) for light in lights]
         for light, deposit in zip(lights, deposits, strict=True):
             check_deposit(light, deposit, whole, [each for each, _ in inner])
+        places = [place_detector(each, Dark(surface, body)).position for each in detectors]
+        readings = None if detector_tolerance is None else (np.array(places), detector_tolerance)
     with watch.stage("solve"):
-        terms = [deposit.terms for deposit in deposits]
-        owners = np.repeat(np.arange(len(terms)), [len(each.points) for each in terms])
-        powers = np.zeros((len(owners), len(terms)))
-        powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
-        points = np.vstack([each.points for each in terms])
+        points, powers = _point_sources(deposits)
         ledgers = [_light_ledger(deposit) for deposit in deposits]
-        solution = charge_solution(surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, most=most)
-    warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
-    if not solution.error_estimate <= tolerance:
-        warnings.append(
-            Note(
-                "tolerance-missed",
-                f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
-                f"with {solution.charges} charges; {_INSTEAD}",
-                value=solution.error_estimate,
-            )
+        solution = charge_solution(
+            surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, readings=readings, most=most
         )
-    warnings += _below_zero(solution)
+        solution = replace(solution, readings=read_all(detectors, solution))
+    warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
+    warnings += _notes_on_tolerances(solution, tolerance, detector_tolerance)
+    if tolerance is not None:
+        warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
+
+
+def _check_arguments(
+    surface: Surface | TetMesh,
+    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
+    lights: Sequence[Light],
+    detectors: Sequence[Detector],
+    regions: Sequence[Region],
+    tolerances: Tolerances,
+) -> None:
+    if isinstance(surface, TetMesh):
+        raise InputError('model "charges" takes no mesh; give the surface, or solve with model "full".')
+    if not isinstance(medium, AnyMedium):
+        raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
+    check_tolerances(tolerances, detectors)
+    if tolerances.readings is not None and len(regions):
+        raise InputError(
+            f'model "charges" takes detector_tolerance in a body without regions only; leave it out, or {_INSTEAD}'
+        )
+    check_lights(lights)
+    if len(lights) == 0:
+        raise InputError("there is no light; give at least one.")
+
+
+def _point_sources(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:
+    """Positions (p, 3) of all point sources, and their powers in each light (p, s), W."""
+    terms = [deposit.terms for deposit in deposits]
+    owners = np.repeat(np.arange(len(terms)), [len(each.points) for each in terms])
+    powers = np.zeros((len(owners), len(terms)))
+    powers[np.arange(len(owners)), owners] = np.concatenate([each.powers for each in terms])
+    return np.vstack([each.points for each in terms]), powers
+
+
+def _notes_on_tolerances(
+    solution: ChargeSolution, tolerance: float | None, detector_tolerance: float | None
+) -> Iterator[Note]:
+    """Notes on tolerances that were missed."""
+    if tolerance is not None and not solution.error_estimate <= tolerance:
+        yield Note(
+            "tolerance-missed",
+            f"the tolerance of {tolerance:g} was not met: the estimated error is {solution.error_estimate:.2g} "
+            f"with {solution.charges} charges; {_INSTEAD}",
+            value=solution.error_estimate,
+        )
+    where = f"with {solution.charges:,} charges; {_INSTEAD.removesuffix('.')}"
+    yield from notes_on_readings(solution.readings, detector_tolerance, where)
 
 
 def _below_zero(solution: ChargeSolution) -> list[str]:

@@ -15,13 +15,15 @@ class Diffusion:
     Parameters
     ----------
     coefficients : Coefficients
-        Of the tetrahedra of a mesh.
-    shift : complex
-        See `tetlux.fem.models.model.Model`; 0 for steady light.
+        Of the tetrahedra of a mesh, with the shift.
     """
 
     coefficients: Coefficients
-    shift: complex = 0.0
+
+    @property
+    def shift(self) -> complex:
+        """See `Model`."""
+        return self.coefficients.shift
 
     @property
     def boundary_condition(self) -> BoundaryCondition:
@@ -42,11 +44,10 @@ class Diffusion:
     __repr__ = one_line
 
 
-def is_steady_diffusion(model: object) -> bool:
-    """Whether a model is `Diffusion` of steady light.
+def is_diffusion(model: object) -> bool:
+    """Whether a model is `Diffusion`, steady or of modulated light.
 
-    Only then do these apply: charges that are subtracted (`tetlux.fem.known`), fitted layers
-    (`tetlux.fem.operators.fitting`), quadratic elements (`tetlux.fem.quadratic`) and the estimate of the error
-    (`tetlux.fem.error`).
+    Only then do these apply: charges that are subtracted (`tetlux.fem.known`), quadratic elements
+    (`tetlux.fem.quadratic`) and the estimate of the error (`tetlux.fem.error`).
     """
-    return isinstance(model, Diffusion) and model.shift == 0
+    return isinstance(model, Diffusion)

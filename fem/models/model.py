@@ -37,7 +37,7 @@ class Model(Protocol):
     (`Assembly.terms`), all of one pattern and real. `operator_of` combines them with `shift`. A model is given to
     `tetlux.fem.system.System` as `model_of`; `tetlux.fem.scenes.Scenes.system_on` makes those of `solve`.
 
-    `CONTRIBUTING.md` lists what modulated light and SP3 have to add.
+    `CONTRIBUTING.md` lists what SP3 has to add.
     """
 
     @property

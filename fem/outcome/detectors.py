@@ -18,6 +18,7 @@ from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.meshing.arrays import FloatArray, Vector, perpendicular_axes
 from tetlux.meshing.describe import as_text, one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.surface.surface import Surface
 
 # Largest distance of a point detector from the surface, as a share of the body's diagonal.
 LARGEST_DISTANCE_SHARE = 0.05
@@ -96,9 +97,9 @@ def estimate_reading(solution: Solution, measurement: Measurement) -> ReadingErr
     if len(solution.of_lights) > 1:
         parts = [estimate_reading(part, measurement) for part in solution.of_lights]
         return ReadingError.add(parts)
-    value = float(measurement.weights @ solution.exitance_on(measurement.points))
+    value = (measurement.weights @ solution.exitance_on(measurement.points)).item()
     squares = np.zeros(len(found.squares))
-    squares[cells[0]] = (value - found.value) ** 2
+    squares[cells[0]] = abs(value - found.value) ** 2
     return ReadingError(value, squares, 0.0, 0.0)
 
 
@@ -155,7 +156,7 @@ def place_detector(detector: Detector, solution: ExitanceField) -> PlacedDetecto
         raise InputError(f"{detector!r} is no detector; give PointDetector, DiscDetector or FibreDetector.")
     place, normal = _on_surface(solution, "center", detector.center, detector.radius, "its radius")
     flat = place + detector.radius * _unit_disc(normal)
-    points, _ = solution.surface.project(flat)
+    points, _ = drop_perpendiculars(solution.surface, flat)
     gap = float(np.linalg.norm(points - flat, axis=1).max())
     if gap > LARGEST_GAP_SHARE * detector.radius:
         raise InputError(
@@ -176,7 +177,7 @@ def _on_surface(
 ) -> tuple[FloatArray, FloatArray]:
     """The nearest point of the surface and the normal there, unless it is out of reach."""
     position = as_vector(given, name)
-    (place,), (normal,) = solution.surface.project(position[None])
+    (place,), (normal,) = drop_perpendiculars(solution.surface, position[None])
     distance = float(np.linalg.norm(position - place))
     if distance > reach:
         raise InputError(
@@ -184,6 +185,17 @@ def _on_surface(
             f"more than {what}, {reach:.3g}; the nearest point of the surface is {as_text(place)}."
         )
     return place, normal
+
+
+def drop_perpendiculars(surface: Surface, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The places on the smooth surface (q, 3) nearest to points (q, 3), unit, and the normals there.
+
+    The nearest place on the triangles lies under another one, on a ball of 5,120 triangles up to 5e-5 of its radius
+    away, and readings near the light change by .1 % on that way. Shifted back, it is 4e-8 of the radius away.
+    """
+    places, normals = surface.project(points)
+    offset = points - places
+    return surface.project(points + offset - np.einsum("qi,qi->q", offset, normals)[:, None] * normals)
 
 
 def _unit_disc(normal: FloatArray) -> FloatArray:

@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
-
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.field_error import field_errors
-from tetlux.fem.quadratic.solution import Where
+from tetlux.fem.quadratic.solution import Where, prefer_positive
 
 
 def error_of_field(solution: Solution, where: Where) -> float:
@@ -27,7 +25,7 @@ def use_quadratic_elements(solution: Solution) -> Solution:
     at_nodes = quadratic.fluence[: len(solution.mesh.points)]
     return replace(
         solution,
-        fluence=np.where(at_nodes > 0, at_nodes, solution.fluence),
+        fluence=prefer_positive(at_nodes, solution.fluence),
         of_lights=tuple(use_quadratic_elements(part) for part in solution.of_lights),
         is_quadratic=True,
     )

@@ -51,7 +51,8 @@ def solution_of_light(
         absorbed=deposited.absorbed + absorbed + sum(each.terms.absorbed for each in subtractions),
         exited=0.0,
         ballistic=deposited.ballistic,
-        stored=operator.model.shift * (mesh.node_volumes @ fluence).item(),
+        stored=operator.model.shift * (mesh.node_volumes @ fluence).item()
+        + sum(each.terms.stored for each in subtractions),
     )
     solution = Solution(
         mesh,

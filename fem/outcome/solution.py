@@ -1,7 +1,7 @@
 """`Solution`: fluence, exitance, and where the power went."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,8 @@ from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
+from tetlux.fem.models.modulation import lag
+from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
@@ -72,6 +74,8 @@ class Solution:
         tolerance of these.
     plan : Plan, optional
         Why this model was chosen, if it was.
+    frequency : float
+        Of modulated light, Hz: fluence, exitance, power and readings then are complex amplitudes. 0 for steady light.
     """
 
     mesh: TetMesh
@@ -95,6 +99,7 @@ class Solution:
     everywhere_error: float = np.nan
     volume_error: float = np.nan
     plan: Plan | None = None
+    frequency: float = 0.0
 
     model = "full"
 
@@ -122,6 +127,14 @@ class Solution:
         """
         return self._at_nearest(points, self.exitance_on)
 
+    def amplitude_at(self, points: FloatArray) -> FloatArray:
+        """Modulus of `exitance_at`, (q,), W/unit²."""
+        return np.abs(self.exitance_at(points))
+
+    def phase_at(self, points: FloatArray) -> FloatArray:
+        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        return lag(self.exitance_at(points))
+
     def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], NumberArray]) -> NumberArray:
         """Values at the points of the surface nearest to given points; nan where those are not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
@@ -132,14 +145,22 @@ class Solution:
         return values
 
     def exitance_on(self, queries: FloatArray) -> NumberArray:
-        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
+        """Exitance at points (q, 3) that lie on the surface, (q,), W/unit².
+
+        Between nodes see `tetlux.fem.outcome.between_nodes`; of each light by itself, so that lights add up.
+        """
+        if self.of_lights and not self.is_quadratic:
+            return np.asarray(sum(light.exitance_on(queries) for light in self.of_lights))
         _, face, weights = self.mesh.closest_boundary(queries)
         weights = np.maximum(weights, 0.0)  # rounding
         cells, corners = self.mesh.boundary_cells[face], self.mesh.boundary_faces[face]
         transmitted = self.transmitted_irradiance
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
-        linear = self.boundary_condition.exitance(self._interpolated(queries, cells, corners, weights), transmitted)
+        fluence = interpolate(self.fluence, self.patches, queries, cells, corners, weights)
+        is_far = ~np.any([np.zeros(len(queries), bool), *(patch.cells[cells] for patch in self.patches)], axis=0)
+        fluence[is_far] = follow_fading(fluence[is_far], self.fluence[corners[is_far]], weights[is_far])
+        linear = self.boundary_condition.exitance(fluence, transmitted)
         if not self.is_quadratic:
             return linear
         assert self.quadratic is not None
@@ -178,29 +199,6 @@ class Solution:
             raise InputError("validity is that of all lights together; ask the whole solution, not one of of_lights.")
         return self.validity.at(queries)
 
-    def _interpolated(self, points: FloatArray, cells: IntArray, nodes: IntArray, weights: FloatArray) -> NumberArray:
-        """Fluence at points of tetrahedra, given their nodes (q, c) there and the weights of these."""
-        linear = (weights * self.fluence[nodes]).sum(axis=1)
-        subtracted, interpolated = np.zeros(len(points)), np.zeros(len(points))
-        for patch in self.patches:
-            inside = patch.cells[cells]
-            subtracted[inside] += patch.charges.fluence(points[inside])
-            interpolated[inside] += (weights[inside] * patch.at_nodes[nodes[inside]]).sum(axis=1)
-        fluence = linear + (subtracted - interpolated)
-        if np.iscomplexobj(fluence):
-            return np.asarray(fluence)
-        # Where light fades within a tetrahedron, adding the difference may give a negative value; scaling by the ratio
-        # cannot.
-        below = (fluence < 0) & (linear >= 0)
-        shares = below & (subtracted >= 0) & (interpolated > 0)
-        fluence[shares] = linear[shares] * subtracted[shares] / interpolated[shares]
-        if any(isinstance(patch, FittedPatch) for patch in self.patches):
-            # They may be below zero where they are off by more than there is light; beside a bright node the linear
-            # function is far larger than either.
-            rest = below & ~shares
-            fluence[rest] = np.minimum(linear[rest], np.abs(subtracted[rest]))
-        return np.asarray(fluence)
-
     def fluence_at(self, points: FloatArray) -> NumberArray:
         """Fluence at given points.
 
@@ -225,13 +223,13 @@ class Solution:
 
         def fill(places: IntArray) -> None:
             nodes = self.mesh.tetrahedra[cells[places]]
-            fluence[places] = self._interpolated(queries[places], cells[places], nodes, weights[places])
+            fluence[places] = interpolate(
+                self.fluence, self.patches, queries[places], cells[places], nodes, weights[places]
+            )
 
         fill(np.flatnonzero(cells >= 0))
-        if np.iscomplexobj(fluence):
-            return fluence
         # Extrapolation beyond the facets may not go below zero.
-        below = lost[fluence[lost] < 0]
+        below = lost[:0] if np.iscomplexobj(fluence) else lost[fluence[lost] < 0]
         weights[below] = np.maximum(weights[below], 0.0)
         weights[below] /= weights[below].sum(axis=1, keepdims=True)
         fill(below)
@@ -241,7 +239,7 @@ class Solution:
             fluence[inside] = self.quadratic.fluence_inside(queries[inside], fluence[inside])
         return fluence
 
-    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def fluence_with_error(self, points: npt.ArrayLike) -> tuple[NumberArray, FloatArray]:
         """Fluence by quadratic elements, and how far it may be off; each point needs a dual solution of its own.
 
         Parameters
@@ -256,13 +254,13 @@ class Solution:
             Estimated numerical error, relative: see `tetlux.fem.quadratic.error`.
         """
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
-        found = np.full((2, len(queries)), np.nan)
+        found = np.full((2, len(queries)), np.nan, self.fluence.dtype)
         if self.quadratic is None:
             raise InputError("this solution was not made by solve, and has no errors of single points.")
         inside = np.flatnonzero(np.isfinite(queries).all(axis=1))
         inside = inside[self.surface.contains(queries[inside])]
         found[:, inside] = fluence_with_error(self.quadratic, queries[inside])
-        return found[0], found[1]
+        return found[0], found[1].real
 
     def __repr__(self) -> str:
         modulated = np.iscomplexobj(self.exitance)
@@ -280,19 +278,3 @@ class Solution:
         if self.warnings:
             facts.append(count(len(self.warnings), "warning"))
         return f"Solution({', '.join(facts)})"
-
-
-def sum_solutions(parts: Sequence[Solution]) -> Solution:
-    """The sum of solutions on one mesh, one for each light."""
-    if len(parts) == 1:
-        return parts[0]
-    powers = [astuple(part.power) for part in parts]
-    return replace(
-        parts[0],
-        fluence=np.sum([part.fluence for part in parts], axis=0),
-        power=Power(*(sum(column) for column in zip(*powers, strict=True))),
-        patches=tuple(patch for part in parts for patch in part.patches),
-        transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
-        limited_power=sum(part.limited_power for part in parts),
-        of_lights=tuple(parts),
-    )

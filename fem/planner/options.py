@@ -29,6 +29,8 @@ class Options(TypedDict, total=False):
     most_tetrahedra: int
     cache: bool
     report: Report
+    frequency: float
+    outside_index: float
 
 
 # Arguments for finite elements alone, with their defaults.
@@ -42,19 +44,29 @@ OF_FINITE_ELEMENTS: Mapping[str, Any] = {
     "most_tetrahedra": MOST_TETRAHEDRA,
     "cache": True,
     "report": no_report,
+    "frequency": 0.0,
+    "outside_index": 1.0,
 }
 
 
-def check_options_without_mesh(model: str, options: Options) -> None:
-    """Refuse arguments that are for finite elements alone, and no tolerance of charges.
+# Those that models take all the same.
+ALSO_OF_CHARGES = {"detector_tolerance"}
+ALSO_OF_TRUNCATED = set(OF_FINITE_ELEMENTS) - {"everywhere_tolerance", "volume_tolerance", "frequency"}
+TAKEN: Mapping[str, set[str]] = {"charges": ALSO_OF_CHARGES, "truncated": ALSO_OF_TRUNCATED}
+
+
+def check_options_of(model: str, options: Options) -> None:
+    """Refuse arguments that are for finite elements on the whole body alone.
 
     Raises
     ------
     InputError
     """
-    if model == "charges" and options.get("tolerance") is None:
-        raise InputError('model "charges" needs a tolerance of the exitance; give one.')
-    names = [name for name, default in OF_FINITE_ELEMENTS.items() if options.get(name, default) != default]
+    names = [
+        name
+        for name, default in OF_FINITE_ELEMENTS.items()
+        if options.get(name, default) != default and name not in TAKEN.get(model, ())
+    ]
     if names:
         raise InputError(
             f'model "{model}" does not take {" and ".join(names)}; leave out what it does not take, or give '

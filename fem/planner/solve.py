@@ -166,10 +166,18 @@ def _fit_charges(request: Request, most: int) -> list[ChargeSolution]:
     for body, lights in zip(request.bodies, request.lights, strict=True):
         outer, *media = body.by_label.values()
         regions = [Region(surface, medium) for surface, medium in zip(request.inner, media, strict=True)]
-        solution = solve_with_charges(
-            request.surface, outer, lights, regions=regions, tolerance=request.exitance_tolerance, most=most
+        found.append(
+            solve_with_charges(
+                request.surface,
+                outer,
+                lights,
+                regions=regions,
+                tolerance=request.tolerances.exitance,
+                detectors=request.detectors,
+                detector_tolerance=request.tolerances.readings,
+                most=most,
+            )
         )
-        found.append(replace(solution, readings=read_all(request.detectors, solution)))
     return found
 
 

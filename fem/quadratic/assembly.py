@@ -15,21 +15,21 @@ from tetlux.fem.quadratic.elements import (
     shape_functions,
 )
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
 # Number of curved tetrahedra that are integrated at once.
 BLOCK = 2048
 
 
-def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: FloatArray) -> csr_array:
+def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: NumberArray) -> csr_array:
     """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
     boundary_matrices = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
     return csr_array(_assemble(space.cells, elements, space.size) + _assemble(faces, boundary_matrices, space.size))
 
 
-def _assemble(dofs: IntArray, values: FloatArray, size: int) -> csr_array:
+def _assemble(dofs: IntArray, values: NumberArray, size: int) -> csr_array:
     """The sum of element matrices (m, c, c) by their DOF numbers (m, c)."""
     count = dofs.shape[1]
     rows = np.repeat(dofs.astype(np.int32), count, axis=1).ravel()
@@ -37,14 +37,14 @@ def _assemble(dofs: IntArray, values: FloatArray, size: int) -> csr_array:
     return csr_array(coo_array((values.ravel(), (rows, columns)), shape=(size, size)))
 
 
-def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> FloatArray:
-    """Matrices of the tetrahedra of a mesh, without boundary terms, (m, 10, 10)."""
+def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> NumberArray:
+    """Matrices of the tetrahedra of a mesh, without boundary terms, (m, 10, 10); complex if the shift is."""
     mesh, curved = space.mesh, space.curved
     every = np.arange(len(mesh.tetrahedra))
-    diffusion, sigma_a = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma_a))
+    diffusion, sigma = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma))
     hats, volumes = mesh.hat_gradients, mesh.volumes
     products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
-    values = products @ reference_stiffness() + (sigma_a * volumes)[:, None] * reference_mass()
+    values = products @ reference_stiffness() + (sigma * volumes)[:, None] * reference_mass()
     values = values.reshape(-1, 10, 10)
 
     def integrate(block: slice) -> None:
@@ -53,7 +53,7 @@ def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> Float
         own = np.einsum("cq,cqai,cqbi->cab", diffusion[some, None] * weights, slopes, slopes, optimize=True)
         shape_values = shape_functions(cell_rule().points)
         pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 100)
-        values[some] = own + ((sigma_a[some, None] * weights) @ pairs).reshape(-1, 10, 10)
+        values[some] = own + ((sigma[some, None] * weights) @ pairs).reshape(-1, 10, 10)
 
     run_in_blocks(integrate, len(curved), BLOCK)
     return np.asarray(values)

@@ -18,7 +18,7 @@ from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.solution import QuadraticSolution
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, Number, NumberArray
 
 # Factor of all contributions. With it the true error is at most twice the estimated error for 95 % of readings
 # (`tests.benchmarks.readings`).
@@ -30,14 +30,15 @@ CORRELATED_WEIGHT = 0.4
 BEAM_RELATIVE_ERROR = 0.35
 
 
-def weigh_residual(solution: QuadraticSolution, dual: FloatArray, value: float) -> ReadingError:
+def weigh_residual(solution: QuadraticSolution, dual: NumberArray, value: Number) -> ReadingError:
     """The error of a linear function of the fluence by its dual solution (size,); `value` is that of the function."""
     operator = solution.operator
     steps = recovered_gradient_difference(operator.space, dual)
     local = np.einsum("mij,mij->m", solution.gradient_difference, steps) / 4.0
     local *= operator.coefficients.diffusion * operator.mesh.volumes
-    rays = BEAM_RELATIVE_ERROR * float(solution.broad_beams @ dual)
-    return ReadingError(value, (RANDOM_SCALE * local) ** 2, RANDOM_SCALE * CORRELATED_WEIGHT * float(local.sum()), rays)
+    rays = BEAM_RELATIVE_ERROR * abs(solution.broad_beams @ dual)
+    squares = (RANDOM_SCALE * np.abs(local)) ** 2
+    return ReadingError(value, squares, RANDOM_SCALE * CORRELATED_WEIGHT * local.sum().item(), float(rays))
 
 
 def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> ReadingError:
@@ -59,7 +60,7 @@ def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> Re
     return found
 
 
-def fluence_with_error(solution: QuadraticSolution, points: FloatArray) -> FloatArray:
+def fluence_with_error(solution: QuadraticSolution, points: FloatArray) -> NumberArray:
     """Fluence at points (q, 3) inside the body, W/unit², and its relative error, (2, q)."""
     measurements = [Measurement(point[None], np.ones(1), inside=True) for point in points]
     found = []

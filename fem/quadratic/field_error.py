@@ -138,7 +138,7 @@ def _mean_square(probes: list[ReadingError]) -> ReadingError:
     return ReadingError(
         1.0,
         np.mean([probe.squares for probe in probes], axis=0),
-        float(np.sqrt(np.mean([probe.sum**2 for probe in probes]))),
+        float(np.sqrt(np.mean([abs(probe.sum) ** 2 for probe in probes]))),
         float(np.sqrt(np.mean([probe.rays**2 for probe in probes]))),
     )
 

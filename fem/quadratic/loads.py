@@ -17,7 +17,7 @@ from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.topology import FACES
@@ -121,8 +121,8 @@ class QuadraticPatch:
     """
 
     patch: Patch
-    interpolant: FloatArray
-    load: FloatArray
+    interpolant: NumberArray
+    load: NumberArray
 
     @property
     def is_fitted(self) -> bool:
@@ -141,7 +141,7 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     if not patch.cells.any():
         count = charges.sources
         return QuadraticPatch(
-            patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count])
+            patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count].real)
         )
     interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
@@ -160,15 +160,15 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     return QuadraticPatch(patch, interpolant, load)
 
 
-def _product(matrices: FloatArray, dofs: IntArray, function: FloatArray) -> FloatArray:
+def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> NumberArray:
     """Element matrices (c, k, k) with DOF numbers (c, k) times a function (size,), (size,)."""
     values = np.einsum("cab,cb->ca", matrices, function[dofs])
     return sum_by_index(dofs, values, len(function))
 
 
 def _jump_load(
-    space: QuadraticSpace, charges: Charges, interpolant: FloatArray, cells: IntArray, local: IntArray
-) -> FloatArray:
+    space: QuadraticSpace, charges: Charges, interpolant: NumberArray, cells: IntArray, local: IntArray
+) -> NumberArray:
     """``∮ (G - I G) D dv/dn``, (size,), over faces of tetrahedra (f,) given by their opposite corners (f,)."""
     rule = triangle_rule(FACE_DEGREES[-1][1])
     on_face, weights = rule.points, rule.weights
@@ -187,10 +187,10 @@ def _jump_load(
     return sum_by_index(space.cells[cells], values, space.size)
 
 
-def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[FloatArray, FloatArray]:
+def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[NumberArray, NumberArray]:
     """Integrals over triangles (f, 6) of G and of ``D dG/dn`` times their shape functions, (f, 6) each."""
     shapes = space.corners_and_bends(faces)
-    value, flux = np.zeros((len(faces), 6)), np.zeros((len(faces), 6))
+    value, flux = np.zeros((2, len(faces), 6), charges.equation.dtype)
 
     def locate(owner: IntArray, places: FloatArray) -> FloatArray:
         return np.asarray(shape_functions(places, TRIANGLE_EDGES) @ shapes[owner])

@@ -8,7 +8,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_functions
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
 
 
@@ -83,7 +83,7 @@ class DiscreteMeasurement:
         values = self.scale * self.measurement.weights[:, None] * self.shape_values
         return sum_by_index(self.dofs, values, self.space.size)
 
-    def values(self, function: FloatArray) -> FloatArray:
+    def values(self, function: NumberArray) -> NumberArray:
         """Values of a function (size,) at the points, (q,)."""
         return np.asarray((function[self.dofs] * self.shape_values).sum(axis=1))
 

@@ -1,7 +1,7 @@
 """`QuadraticOperator`: the matrix of quadratic elements, its solver, and the dual solutions of measurements."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.linear import krylov
-from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, dots
+from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, norms
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.models.diffusion import Diffusion
@@ -17,7 +17,7 @@ from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
@@ -53,7 +53,7 @@ class QuadraticOperator:
     surface: Surface
     inner: Sequence[Surface]
     coefficients: Coefficients
-    _duals: dict[Measurement, FloatArray] = field(default_factory=dict)
+    _duals: dict[Measurement, NumberArray] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
@@ -65,13 +65,13 @@ class QuadraticOperator:
         return quadratic_space(self.mesh, self.surface, self.inner)
 
     @cached_property
-    def elements(self) -> FloatArray:
+    def elements(self) -> NumberArray:
         """The matrices of tetrahedra, (m, 10, 10)."""
         return element_matrices(self.space, self.coefficients)
 
     @cached_property
     def matrix(self) -> csr_array:
-        """The matrix, (size, size)."""
+        """The matrix, (size, size); complex for modulated light."""
         return matrix_of(self.space, self.coefficients, self.elements)
 
     @cached_property
@@ -82,24 +82,28 @@ class QuadraticOperator:
     def _precondition(self) -> Preconditioner:
         """A solver of the linear part, and the diagonal of the bubbles.
 
-        The condition number does not depend on the size of tetrahedra (Yserentant 1986): about 50 iterations.
+        The condition number does not depend on the size of tetrahedra (Yserentant 1986): about 50 iterations. Both are
+        real, with the modulus of a complex shift: see `tetlux.fem.linear.krylov.real_majorant`.
         """
         nodes = len(self.mesh.points)
         assembly = Assembly(self.mesh)
-        matrix = assembly.assemble(self.coefficients)
-        linear = assembly.solver(Diffusion(self.coefficients), matrix, EXPECTED_RIGHT_HAND_SIDES).preconditioner
-        inverse = 1.0 / self.matrix.diagonal()[nodes:, None]
+        real = Diffusion(replace(self.coefficients, shift=abs(self.coefficients.shift)))
+        terms = assembly.terms(real.coefficients.diffusion, real.coefficients.sigma_a, self.robin)
+        matrix = terms.combine(real.shift)
+        linear = assembly.solver(real, matrix, EXPECTED_RIGHT_HAND_SIDES).preconditioner
+        inverse = 1.0 / np.abs(self.matrix.diagonal()[nodes:, None])
 
         def precondition(rest: FloatArray) -> FloatArray:
             return np.concatenate([linear(np.ascontiguousarray(rest[:nodes])), inverse * rest[nodes:]])
 
         return precondition
 
-    def solve(self, loads: FloatArray, stop_residual: float = STOP_RESIDUAL) -> FloatArray:
+    def solve(self, loads: NumberArray, stop_residual: float = STOP_RESIDUAL) -> NumberArray:
         """Solutions (size, k) for loads (size, k), to about a relative residual."""
         product, precondition = self._product, self._precondition
+        loads = loads.astype(np.result_type(loads, self.matrix.dtype), copy=False)
         # Loads are scaled so that the iteration stops at this residual.
-        size = np.sqrt(dots(loads, loads)) * stop_residual / krylov.STOP_RESIDUAL
+        size = norms(loads) * stop_residual / krylov.STOP_RESIDUAL
         size[size == 0] = 1.0
         scaled = loads / size
         groups = [
@@ -121,9 +125,9 @@ class QuadraticOperator:
     @property
     def most_duals(self) -> int:
         """Number of dual solutions that are kept."""
-        return max(BYTES_OF_KEPT_DUALS // (8 * self.space.size), COLUMNS_PER_GROUP)
+        return max(BYTES_OF_KEPT_DUALS // (self.matrix.dtype.itemsize * self.space.size), COLUMNS_PER_GROUP)
 
-    def duals(self, measurements: Sequence[Measurement]) -> list[FloatArray]:
+    def duals(self, measurements: Sequence[Measurement]) -> list[NumberArray]:
         """Dual solutions (size,) of measurements; the last `most_duals` are kept."""
         new = [measurement for measurement in dict.fromkeys(measurements) if measurement not in self._duals]
         if new:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, Number
 from tetlux.meshing.describe import one_line
 
 # Relative error that is always added, for errors that gradients do not show, such as those of the surface itself.
@@ -18,19 +18,19 @@ class ReadingError:
 
     Attributes
     ----------
-    value : float
+    value : float or complex
         W/unit².
     squares : (m,) ndarray
-        Squares of the contributions of tetrahedra to its error.
-    sum : float
+        Squared moduli of the contributions of tetrahedra to its error.
+    sum : float or complex
         Weighted sum of the signed contributions, W/unit².
     rays : float
         Contribution of rays in place of broad beams, W/unit².
     """
 
-    value: float
+    value: Number
     squares: FloatArray
-    sum: float
+    sum: Number
     rays: float
 
     @staticmethod
@@ -47,7 +47,9 @@ class ReadingError:
     def error(self) -> float:
         """Estimated error, W/unit²."""
         return float(
-            np.sqrt(self.squares.sum() + self.sum**2 + self.rays**2 + (LEAST_RELATIVE_ERROR * self.value) ** 2)
+            np.sqrt(
+                self.squares.sum() + abs(self.sum) ** 2 + self.rays**2 + (LEAST_RELATIVE_ERROR * abs(self.value)) ** 2
+            )
         )
 
     @property

@@ -3,11 +3,11 @@
 import numpy as np
 
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.tets.topology import EDGES
 
 
-def recovered_gradient_difference(space: QuadraticSpace, function: FloatArray) -> FloatArray:
+def recovered_gradient_difference(space: QuadraticSpace, function: NumberArray) -> NumberArray:
     """The averaged gradient less the gradient at the corners of each tetrahedron, (m, 4, 3), of a function (size,).
 
     Gradients are averaged over the tetrahedra of one region around a node, weighted by volume. They are not averaged

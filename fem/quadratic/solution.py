@@ -17,7 +17,7 @@ from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 
 # Charges are subtracted where their fluence is at most this many times the fluence itself.
@@ -49,7 +49,7 @@ class QuadraticScene:
     operator: QuadraticOperator
     deposits: tuple[Deposit, ...]
     linear_patches: tuple[tuple[Patch, ...], ...]
-    linear_fluences: tuple[FloatArray, ...]
+    linear_fluences: tuple[NumberArray, ...]
 
     @cached_property
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
@@ -60,7 +60,7 @@ class QuadraticScene:
         )
 
     @cached_property
-    def loads(self) -> FloatArray:
+    def loads(self) -> NumberArray:
         """The load of each light, (size, k), W."""
         space, coefficients = self.operator.space, self.operator.coefficients
         loads = [
@@ -88,7 +88,7 @@ class QuadraticScene:
         return found
 
     @cached_property
-    def fluence(self) -> FloatArray:
+    def fluence(self) -> NumberArray:
         """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
         # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
         fitted = np.column_stack(
@@ -104,7 +104,12 @@ class QuadraticScene:
     __repr__ = one_line
 
 
-def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> QuadraticPatch:
+def prefer_positive(values: NumberArray, linear: NumberArray) -> NumberArray:
+    """Values of quadratic elements, or of linear ones where those are below zero; complex ones as they are."""
+    return values if np.iscomplexobj(values) else np.where(values > 0, values, linear)
+
+
+def _patch(operator: QuadraticOperator, patch: Patch, fluence: NumberArray) -> QuadraticPatch:
     """A patch in quadratic elements, by the fluence (n,) of its light in linear elements.
 
     The residual of fitted charges is integrated over the bent facets. With the quadrature points of linear elements, a
@@ -116,13 +121,13 @@ def _patch(operator: QuadraticOperator, patch: Patch, fluence: FloatArray) -> Qu
     return quadratic_patch(operator, wide)
 
 
-def _widen(patch: Patch, fluence: FloatArray) -> Patch:
+def _widen(patch: Patch, fluence: NumberArray) -> Patch:
     """The patch of tetrahedra where charges are not much brighter than the fluence (n,) in linear elements.
 
     Its faces, across which the fluence jumps, are then farther from the light than those of the linear patch.
     """
     wide = patch_of(
-        patch.mesh, patch.charges, patch.at_nodes <= LARGEST_BRIGHTNESS_RATIO * np.abs(fluence), patch.at_nodes
+        patch.mesh, patch.charges, np.abs(patch.at_nodes) <= LARGEST_BRIGHTNESS_RATIO * np.abs(fluence), patch.at_nodes
     )
     return wide if wide.cells.sum() > patch.cells.sum() else patch
 
@@ -152,7 +157,7 @@ class QuadraticSolution:
         return self.scene.operator
 
     @cached_property
-    def fluence(self) -> FloatArray:
+    def fluence(self) -> NumberArray:
         """Fluence (size,), W/unit²."""
         return np.asarray(self.scene.fluence[:, self.lights].sum(axis=1))
 
@@ -171,7 +176,7 @@ class QuadraticSolution:
             return np.zeros(len(mesh.tetrahedra), dtype=bool)
         # The edge of a regular tetrahedron of this volume.
         edges = (6.0 * np.sqrt(2.0) * mesh.volumes) ** (1.0 / 3.0)
-        return np.asarray(np.sqrt(coefficients.sigma_a / coefficients.diffusion) * edges > LARGEST_RESOLVED_KH)
+        return np.asarray(coefficients.decay * edges > LARGEST_RESOLVED_KH)
 
     @property
     def patches(self) -> list[QuadraticPatch]:
@@ -179,7 +184,7 @@ class QuadraticSolution:
         return [patch for light in self.lights for patch in self.scene.patches[light]]
 
     @cached_property
-    def gradient_difference(self) -> FloatArray:
+    def gradient_difference(self) -> NumberArray:
         """`recovered_gradient_difference` of the fluence less the charges of patches, (m, 4, 3)."""
         space = self.operator.space
         difference = recovered_gradient_difference(space, self.fluence)
@@ -194,7 +199,7 @@ class QuadraticSolution:
         return np.asarray(self.scene.broad_beams[:, self.lights].sum(axis=1))
 
     @cached_property
-    def residual(self) -> FloatArray:
+    def residual(self) -> NumberArray:
         """Load less the matrix times the fluence, (size,), W."""
         load = self.scene.loads[:, self.lights].sum(axis=1)
         return np.asarray(load - self.operator.matrix @ self.fluence)
@@ -207,16 +212,16 @@ class QuadraticSolution:
             self.operator.duals([measurement for measurement in some if measurement not in self.errors])
             yield some
 
-    def values_at(self, discrete: DiscreteMeasurement) -> FloatArray:
+    def values_at(self, discrete: DiscreteMeasurement) -> NumberArray:
         """What is measured at the points of a measurement, (q,): exitance, or fluence inside, W/unit²."""
         values = discrete.scale * self.fluence_at(discrete)
         return values if discrete.measurement.inside else values + self._unscattered(discrete)
 
-    def read(self, discrete: DiscreteMeasurement, dual: FloatArray) -> float:
+    def read(self, discrete: DiscreteMeasurement, dual: NumberArray) -> Number:
         """The value of a measurement with its dual solution (size,), W/unit²."""
-        return float(discrete.measurement.weights @ self.values_at(discrete) + self.residual @ dual)
+        return (discrete.measurement.weights @ self.values_at(discrete) + self.residual @ dual).item()
 
-    def fluence_at(self, discrete: DiscreteMeasurement) -> FloatArray:
+    def fluence_at(self, discrete: DiscreteMeasurement) -> NumberArray:
         """Fluence at the points of a measurement, (q,), W/unit²."""
         fluence, points = discrete.values(self.fluence), discrete.measurement.points
         for patch in self.patches:
@@ -227,26 +232,26 @@ class QuadraticSolution:
                 )
         return fluence
 
-    def exitance_on(self, points: FloatArray, linear: FloatArray) -> FloatArray:
+    def exitance_on(self, points: FloatArray, linear: NumberArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit².
 
         Where there is hardly any light it may be below zero; there it is that of linear elements (q,), which is not.
         """
         values = self.values_at(self.operator.discretise(Measurement(points, np.zeros(len(points)))))
-        return np.where(values > 0, values, linear)
+        return prefer_positive(values, linear)
 
-    def fluence_inside(self, points: FloatArray, linear: FloatArray) -> FloatArray:
+    def fluence_inside(self, points: FloatArray, linear: NumberArray) -> NumberArray:
         """Fluence at points (q, 3) of the body, (q,), W/unit²; likewise."""
         values = self.values_at(self.operator.discretise(Measurement(points, np.zeros(len(points)), inside=True)))
-        return np.where(values > 0, values, linear)
+        return prefer_positive(values, linear)
 
     @property
-    def linear_fluence(self) -> FloatArray:
+    def linear_fluence(self) -> NumberArray:
         """Fluence of linear elements at the nodes, (n,), W/unit²."""
         return np.asarray(np.sum([self.scene.linear_fluences[light] for light in self.lights], axis=0))
 
     @property
-    def exitance_at_nodes(self) -> FloatArray:
+    def exitance_at_nodes(self) -> NumberArray:
         """Exitance at the boundary nodes, (b,), W/unit²."""
         nodes = self.operator.mesh.boundary_nodes
         return np.asarray(self.operator.robin * self.fluence[nodes] + self._unscattered_at_nodes[nodes])

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, cell_rule, shape_derivatives, shape_functions
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -76,7 +76,7 @@ class QuadraticSpace:
         """Coordinates of nodes and bends of edges by DOF numbers (...), (..., 3)."""
         return np.asarray(np.concatenate([self.mesh.points, self.bends])[dofs])
 
-    def interpolate(self, at_nodes: FloatArray, at_middles: FloatArray) -> FloatArray:
+    def interpolate(self, at_nodes: NumberArray, at_middles: NumberArray) -> NumberArray:
         """The function with given values at nodes (n,) and at middles of edges (e,), (n + e,)."""
         return np.concatenate([at_nodes, at_middles - at_nodes[self.mesh.edges].mean(axis=1)])
 

@@ -109,6 +109,7 @@ Output = Literal["surface", "volume", "picture"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
+TOLERANCES_WITHOUT_MESH = {"closed-form": ("exitance",), "charges": ("exitance", "detectors")}
 
 
 Relative = Annotated[float, Field(strict=True, ge=1e-4, lt=1)]
@@ -185,21 +186,28 @@ class CaseSpec(Section):
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
         given = {name: value for name, value in self.tolerances if value is not None}
-        without_mesh = self.model in WITHOUT_MESH
-        if not given or (without_mesh and "exitance" not in given):
-            needed = "of the exitance" if without_mesh else "of exitance, detectors, everywhere or volume"
+        if not given or (self.model == "closed-form" and "exitance" not in given):
+            needed = {"closed-form": "of the exitance", "charges": "of exitance or detectors"}.get(
+                self.model, "of exitance, detectors, everywhere or volume"
+            )
             raise PydanticCustomError(
                 "tolerance", "give a tolerance {needed}, or leave tolerance out", {"needed": needed}
             )
         if "detectors" in given and not self.detectors:
             raise PydanticCustomError("tolerance", "there is a tolerance for detectors, and no detector; give some")
         for name in given:
-            if name != "exitance" and without_mesh:
+            if name not in TOLERANCES_WITHOUT_MESH.get(self.model, given):
                 raise PydanticCustomError(
                     "tolerance",
                     'tolerance.{name} is for finite elements, not for model "{model}"; leave it out',
                     {"name": name, "model": self.model},
                 )
+        if "detectors" in given and self.regions and self.model == "charges":
+            raise PydanticCustomError(
+                "tolerance",
+                'tolerance.detectors with model "charges" is for a body without regions; leave it out, or write '
+                "model: full",
+            )
         return self
 
     @model_validator(mode="before")
