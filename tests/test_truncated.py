@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tetlux.cases.shipped import library_folder
 from tetlux.fem import (
     CollimatedBeam,
     DiffuseLight,
@@ -17,9 +18,10 @@ from tetlux.fem import (
     solve,
 )
 from tetlux.fem.exact import half_space, layered
-from tetlux.meshing import box, sphere, tetrahedralize
+from tetlux.meshing import box, read_surface, sphere, tetrahedralize
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.box_cut import cut_to_box, refine_around
+from tetlux.meshing.repair.topology import Edges
 
 GREY = Medium(sigma_a=0.1, sigma_s_prime=1.0, eta=1.4)
 BLOCK = box((160.0, 160.0, 160.0))
@@ -55,7 +57,7 @@ def test_beyond_the_part_it_is_dark_and_said_to_be_not_modelled(spot: TruncatedS
     assert exitance.max() < 1e-7 * spot.exitance.max()
     assert np.isnan(spot.fluence_at(beyond - [0.0, 0.0, 1.0])).all()
     assert spot.cut_error < 1e-3
-    assert any("only the part of the body within" in warning for warning in spot.warnings)
+    assert any("only a part of the body, all within" in warning for warning in spot.warnings)
     assert spot.surface is BLOCK
     assert np.ptp(spot.mesh.points, axis=0).max() < 120.0
 
@@ -130,3 +132,21 @@ def test_a_plan_weighs_the_part_against_the_whole() -> None:
     assert "saves too little" in plan(BLOCK, GREY, [SPOT])["truncated"].reason
     with_detector = plan(BLOCK, GREY, [SPOT], detectors=[PointDetector((0.0, 9.0, 80.0))])
     assert "for the exitance as a whole only" in with_detector["truncated"].reason
+
+
+def test_cuts_of_a_scan_are_closed_or_refused() -> None:
+    """Boxes that meet vertices and edges have cuts with holes, which are not handed on."""
+    hare = read_surface(library_folder() / "hare.stl")
+    middle, size = 0.5 * (hare.points.min(axis=0) + hare.points.max(axis=0)), 0.25 * hare.diagonal
+    sound = 0
+    for shift in np.linspace(0.0, 0.2, 15):
+        try:
+            part = cut_to_box(hare, middle - size, middle + size * (0.3 + shift))
+        except InputError as error:
+            assert str(error) == "the cut of the surface is not closed"  # noqa: PT017
+            continue
+        assert part is not None
+        assert (Edges(part.faces).balance == 0).all()
+        assert 0.0 < part.volume < hare.volume
+        sound += 1
+    assert sound >= 5

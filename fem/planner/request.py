@@ -20,7 +20,7 @@ from tetlux.fem.scenes import build_scenes
 from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
-from tetlux.fem.truncated.part import distance_of_cut
+from tetlux.fem.truncated.part import Box, dark_box
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -74,15 +74,15 @@ class Request:
         return len(self.surface.points) if self.tolerances.exitance is not None else len(self.detectors)
 
     @cached_property
-    def distance_of_cut(self) -> float:
-        """Distance from the light beyond which the body is dark, unit.
+    def dark_box(self) -> Box:
+        """The box beyond which the body is dark.
 
         Raises
         ------
         InputError
             If light enters or reaches everywhere.
         """
-        return distance_of_cut(self.bodies, self.deposits)
+        return dark_box(self.bodies, self.deposits, self.exitance_tolerance)
 
     @cached_property
     def exact_fields(self) -> tuple[ExactField, ...]:

@@ -127,7 +127,7 @@ def solve_on_part(request: Request, elements: FiniteElements, report: Report) ->
     if request.mesh is not None:
         raise InputError('a mesh is given, and model "truncated" makes its own', remedy='give model="full"')
     try:
-        distance = request.distance_of_cut
+        box = request.dark_box
     except InputError as error:
         raise InputError(f"no part can be cut out: {error.text}", field="model", remedy='give model="full"') from error
     return solve_truncated(
@@ -135,7 +135,7 @@ def solve_on_part(request: Request, elements: FiniteElements, report: Report) ->
         request.inner,
         request.lights,
         request.deposits,
-        distance,
+        box,
         elements.part,
         tolerance=request.exitance_tolerance,
         report=report,

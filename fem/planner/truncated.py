@@ -12,7 +12,6 @@ from tetlux.fem.planner.full import (
     tetrahedra_needed,
 )
 from tetlux.fem.planner.request import Request
-from tetlux.fem.truncated.part import box_around
 from tetlux.meshing.errors import InputError
 
 # Seconds of the mesher for each triangle of a part, whose sharp rim it has to follow: nefertiti within 40 and 69 mm of
@@ -28,16 +27,15 @@ def truncated_candidate(request: Request) -> Candidate:
         refuse_mesh(request)
         if request.tolerances.fields or request.detectors:
             raise InputError("the error of the cut is known for the exitance as a whole only")
-        distance = request.distance_of_cut
-        low, high = box_around([deposit for some in request.deposits for deposit in some], distance)
+        box = request.dark_box
     except InputError as why:
         return impossible("truncated", why)
     tetrahedra = tetrahedra_needed(request)
     # Most points have two triangles.
-    triangles = 2 * int(((request.surface.points > low) & (request.surface.points < high)).all(axis=1).sum())
+    triangles = 2 * int(((request.surface.points > box.low) & (request.surface.points < box.high)).all(axis=1).sum())
     seconds = SECONDS_OF_CUT * len(request.surface.faces) + SECONDS_OF_MESHER + SECONDS_OF_TRIANGLE * triangles
     seconds += seconds_of_elements(request, tetrahedra)
-    seconds += seconds_of_regions(float(np.linalg.norm(high - low)), request.inner)
-    reason = f"finite elements within {distance:.3g} {request.surface.unit} of the light, beyond which it is dark"
+    seconds += seconds_of_regions(float(np.linalg.norm(box.high - box.low)), request.inner)
+    reason = f"finite elements within {box.distance:.3g} {request.surface.unit} of the light, beyond which it is dark"
     needed = bytes_of_elements(request, tetrahedra)
     return Candidate("truncated", request.exitance_tolerance, seconds, needed, reason, suits=True)

@@ -70,7 +70,7 @@ class TruncatedSolution(Solution):
     @property
     def _center(self) -> FloatArray:
         assert self.part is not None
-        return np.asarray(0.5 * (self.part.low + self.part.high))
+        return np.asarray(0.5 * (self.part.box.low + self.part.box.high))
 
     @cached_property
     def _rim(self) -> tuple[float, float, float]:

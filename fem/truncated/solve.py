@@ -11,7 +11,7 @@ from tetlux.fem.media.region import Region
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
-from tetlux.fem.truncated.part import Part, cut_part
+from tetlux.fem.truncated.part import Box, Part, cut_part
 from tetlux.fem.truncated.solution import TruncatedSolution, estimate_cut_error, truncate
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
@@ -32,7 +32,7 @@ def solve_truncated(
     inner: Sequence[Surface],
     lights: Sequence[Sequence[Light]],
     deposits: Sequence[Sequence[Deposit]],
-    distance: float,
+    box: Box,
     solve_on_part: SolveOnPart,
     *,
     tolerance: float,
@@ -48,8 +48,8 @@ def solve_truncated(
         Of the regions.
     lights, deposits : sequence of sequences
         The lights of each scene, and what they leave in the whole body.
-    distance : float
-        From the light to the cut, unit.
+    box : Box
+        Beyond which the body is dark.
     solve_on_part : callable
     tolerance : float
         Wanted relative L2 error of the exitance.
@@ -65,9 +65,8 @@ def solve_truncated(
         If what is cut off shades the light.
     """
     whole = bodies[0].surface
-    together = [deposit for some in deposits for deposit in some]
     for attempt in range(MOST_CUTS):
-        part = cut_part(bodies[0], inner, together, distance)
+        part = cut_part(bodies[0], inner, box)
         media = [list(body.by_label.values()) for body in bodies]
         regions = [Region(surface, [each[number + 1] for each in media]) for number, surface in part.inner]
         _check_shade(bodies, lights, deposits, part)
@@ -77,7 +76,7 @@ def solve_truncated(
         if max(errors) <= SHARE_OF_TOLERANCE * tolerance or attempt == MOST_CUTS - 1:
             break
         report(f"the cut may cause an error of {max(errors):.2%}: a larger part is cut out")
-        distance *= ENLARGEMENT
+        box = box.enlarge(ENLARGEMENT)
     solutions = [truncate(solution, whole, part, error) for solution, error in zip(found, errors, strict=True)]
     return [_with_note(solution, part) for solution in solutions]
 
@@ -99,8 +98,8 @@ def _with_note(solution: TruncatedSolution, part: Part) -> TruncatedSolution:
     unit = solution.surface.unit
     note = Note(
         "truncated",
-        f"only the part of the body within {part.distance:.3g} {unit} of the light is modelled; beyond it the exitance "
-        "is what the field at its rim decays to.",
+        f"only a part of the body, all within {part.distance:.3g} {unit} of the light, is modelled; beyond it the "
+        "exitance is what the field at its rim decays to.",
         value=part.distance,
     )
     return replace(solution, warnings=[*solution.warnings, note])

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
-from tetlux.meshing.repair.pipeline import surface_from_arrays
+from tetlux.meshing.errors import InputError
+from tetlux.meshing.repair.crossings import count_self_intersections
+from tetlux.meshing.repair.topology import Edges
 from tetlux.meshing.surface.solids import Sphere
 from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import signed_volume
 
 # Points nearer than this share of the box are joined.
 MERGE = 1e-9
@@ -33,7 +36,7 @@ def cut_to_box(surface: Surface, low: FloatArray, high: FloatArray) -> Surface |
     Raises
     ------
     InputError
-        If the cut bounds no body.
+        If the cut is not closed, as where triangles meet the box at their edges.
     """
     inside = ((surface.points > low) & (surface.points < high)).all(axis=1)
     if inside.all():
@@ -63,8 +66,11 @@ def cut_to_box(surface: Surface, low: FloatArray, high: FloatArray) -> Surface |
         return None
     points = np.array(vtk_to_numpy(found.GetPoints().GetData()), dtype=np.float64)
     faces = np.array(vtk_to_numpy(found.GetPolys().GetConnectivityArray()), dtype=np.int64).reshape(-1, 3)
-    cut = surface_from_arrays(points, faces, unit=surface.unit, name=surface.name)
-    return replace(cut, crease_angle=surface.crease_angle, repairs=surface.repairs, warnings=surface.warnings)
+    edges = Edges(faces)
+    if (edges.balance != 0).any() or signed_volume(points, faces) <= 0:
+        raise InputError("the cut of the surface is not closed")
+    crosses = surface.overlaps or (count_self_intersections(points, faces) or 0) > 0
+    return replace(surface, points=points, faces=faces, overlaps=crosses, shape=None)
 
 
 def refine_around(surface: Surface, place: FloatArray, radius: float, edge: float) -> Surface:
