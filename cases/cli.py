@@ -134,22 +134,13 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
     run.set_defaults(command=_run)
 
-    _add_previews(commands)
-    listing = commands.add_parser("list", help="list the cases that ship with tetlux")
-    listing.set_defaults(command=_list)
-
-    show = commands.add_parser("show", help="print a case file, for instance a shipped one to start from")
-    show.add_argument("case", metavar="CASE", help="a YAML case file, or the name of a shipped one")
-    show.set_defaults(command=_show)
-
+    _add_inspections(commands)
     _add_measurements(commands)
-    schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
-    schema.set_defaults(command=_schema)
     return parser
 
 
-def _add_previews(commands: "argparse._SubParsersAction[_Parser]") -> None:
-    """Add the commands that read cases and solve nothing."""
+def _add_inspections(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    """Add the commands that look at cases and results."""
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
     check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
     check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
@@ -158,6 +149,20 @@ def _add_previews(commands: "argparse._SubParsersAction[_Parser]") -> None:
     plan = commands.add_parser("plan", help="print which model fits each case, what each model costs, and why")
     plan.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
     plan.set_defaults(command=_plan)
+
+    listing = commands.add_parser("list", help="list the cases that ship with tetlux")
+    listing.set_defaults(command=_list)
+
+    show = commands.add_parser("show", help="print a case file, for instance a shipped one to start from")
+    show.add_argument("case", metavar="CASE", help="a YAML case file, or the name of a shipped one")
+    show.set_defaults(command=_show)
+
+    view = commands.add_parser("view", help="open the viewer of a finished run in the web browser")
+    view.add_argument("result", type=Path, metavar="RESULT", help="the folder of the run, in which viewer.html is")
+    view.set_defaults(command=_view)
+
+    schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
+    schema.set_defaults(command=_schema)
 
 
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -250,6 +255,13 @@ def _show(options: argparse.Namespace) -> int:
     from tetlux.cases.shipped import case_text  # noqa: PLC0415
 
     print(case_text(options.case), end="")
+    return 0
+
+
+def _view(options: argparse.Namespace) -> int:
+    from tetlux.cases.viewer.view import view  # noqa: PLC0415
+
+    print(f"opened {view(options.result)}")
     return 0
 
 

@@ -13,10 +13,12 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.solve import solve_case
+from tetlux.cases.viewer import PAGE
 from tetlux.cases.write.content import content_of
+from tetlux.cases.write.fields import surface_values, volume_values
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
-from tetlux.cases.write.results import Results, collect_results, surface_values, volume_values
+from tetlux.cases.write.results import Results, collect_results
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
 from tetlux.fem.lights.arrows import HasArrows
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from tetlux.cases.picture.draw import PictureScene
 
 Report = Callable[[str], None]
-FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png"}
+FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png", "viewer": PAGE}
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 READINGS = "detectors.csv"
@@ -160,10 +162,7 @@ def _write(
     if "volume" in case.outputs:
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
-    if "picture" in case.outputs:
-        from tetlux.cases.picture.draw import draw_picture  # noqa: PLC0415
-
-        draw_picture(_picture_scene(results, readings), folder / FILES["picture"])
+    _draw(results, readings, folder)
     if readings:
         write_readings(readings, unit, folder / READINGS)
         if len(case.detectors) >= ENOUGH_TO_DRAW:
@@ -223,6 +222,21 @@ def _write_surface(results: Results, folder: Path) -> None:
         # VTK's viewers show a colour only from a single array of three bytes.
         values["preview"] = results.preview[0]
     write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
+
+
+def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+    """Draw the picture and write the viewer, which show the same."""
+    if not {"picture", "viewer"} & set(results.case.outputs):
+        return
+    scene = _picture_scene(results, readings)
+    if "picture" in results.case.outputs:
+        from tetlux.cases.picture.draw import draw_picture  # noqa: PLC0415
+
+        draw_picture(scene, folder / FILES["picture"])
+    if "viewer" in results.case.outputs:
+        from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
+
+        write_viewer(results, readings, scene, folder / FILES["viewer"])
 
 
 def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> "PictureScene":

@@ -125,14 +125,8 @@ def build_stage(
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point]
     arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    marked = [np.array(ray.end) for ray in lights] + [tail for tail, _ in shafts]
-    # A light far away must not shrink the body to a speck.
-    near = [place[None] for place in marked if np.linalg.norm(place - middle) < diagonal]
-    if toward is None:
-        toward = choose_view(corners, exitance[triangles].mean(axis=1), lights, diagonal, up)
     return Stage(
-        camera=camera_at(np.vstack([points, *near]), toward, up),
+        camera=choose_camera(points, triangles, exitance, lights, up=up, toward=toward),
         corners=corners,
         normals=corner_normals(corners, triangles),
         shares=shares[triangles],
@@ -141,6 +135,28 @@ def build_stage(
         table=color_table(),
         colours=None if colours is None else colours[triangles],
     )
+
+
+def choose_camera(
+    points: FloatArray,
+    triangles: IntArray,
+    exitance: FloatArray,
+    lights: tuple[Ray, ...],
+    *,
+    up: Vector = UPRIGHT,
+    toward: FloatArray | None = None,
+) -> Camera:
+    """The camera of a picture of a body and its lights; `toward`, if given, sets the direction to the eye."""
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    marked = [np.array(ray.end) for ray in lights] + [
+        arrow_ends(ray, diagonal)[0] for ray in lights if not ray.is_point
+    ]
+    # A light far away must not shrink the body to a speck.
+    near = [place[None] for place in marked if np.linalg.norm(place - middle) < diagonal]
+    if toward is None:
+        toward = choose_view(points[triangles], exitance[triangles].mean(axis=1), lights, diagonal, up)
+    return camera_at(np.vstack([points, *near]), toward, up)
 
 
 def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:

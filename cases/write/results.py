@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 
 import numpy as np
-import numpy.typing as npt
 
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
@@ -14,7 +13,6 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places
-from tetlux.fem.outcome.radiance import radiance_of, view_cosine
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.meshing.arrays import FloatArray
@@ -125,7 +123,7 @@ def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
 
 def _shows_surface(case: Case) -> bool:
     """Whether the exitance is written or drawn, or an even preview of it needs vertices everywhere."""
-    return bool({"surface", "picture"} & set(case.outputs)) or case.channel_names == RGB
+    return bool({"surface", "picture", "viewer"} & set(case.outputs)) or case.channel_names == RGB
 
 
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
@@ -134,43 +132,3 @@ def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     points = np.vstack([extreme_places(solution) for solution in solutions])
     total = sum(each.exitance_on(points) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
-
-
-def surface_values(results: Results) -> dict[str, npt.NDArray[np.generic]]:
-    """The arrays of ``surface.ply`` and ``surface.vtp`` at the vertices."""
-    case = results.case
-    channels, lights = case.channel_names, case.light_names
-    values: dict[str, npt.NDArray[np.generic]] = {"exitance": results.exitance()}
-    if len(channels) > 1:
-        values |= {f"exitance_{channel}": results.exitance(channel) for channel in channels}
-    if len(lights) > 1:
-        values |= {f"exitance_{light}": results.exitance(light=light) for light in lights}
-    if len(channels) > 1 and len(lights) > 1:
-        values |= {
-            f"exitance_{light}_{channel}": results.exitance(channel, light) for light in lights for channel in channels
-        }
-    if results.mesh_solutions:
-        # The least over channels. It is computed on the facets of a mesh.
-        values["valid"] = np.min(
-            [solution.valid_on(results.surface.points) for solution in results.mesh_solutions], axis=0
-        )
-    if case.camera is not None:
-        _, cosine = view_cosine(case.surface, results.surface.points, np.asarray(case.camera))
-        radiances = [
-            radiance_of(results.exitance(channel), cosine, solution.medium.eta)
-            for channel, solution in zip(channels, results.solutions, strict=True)
-        ]
-        values["radiance"] = np.sum(radiances, axis=0)
-        if len(channels) > 1:
-            values |= {f"radiance_{channel}": part for channel, part in zip(channels, radiances, strict=True)}
-    if results.has_colours:
-        values |= dict(zip(RGB, results.preview[0].T, strict=True))
-    return values
-
-
-def volume_values(results: Results) -> dict[str, FloatArray]:
-    """The arrays of ``volume.vtu`` at the nodes."""
-    names = results.case.channel_names
-    if len(names) == 1:
-        return {"fluence": results.mesh_solutions[0].fluence}
-    return {f"fluence_{name}": solution.fluence for name, solution in zip(names, results.mesh_solutions, strict=True)}

@@ -105,7 +105,7 @@ class MeshSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture"]
+Output = Literal["surface", "volume", "picture", "viewer"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
@@ -163,7 +163,8 @@ class CaseSpec(Section):
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
     up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
     outputs: list[Output] = Field(
-        ["surface", "volume", "picture"], description="default: all; with another model than full all but volume"
+        ["surface", "volume", "picture"],
+        description="default: surface, volume, picture; with another model than full without volume",
     )
     compare: Annotated[list[ClosedForm], Field(min_length=1)] | None = Field(
         None,

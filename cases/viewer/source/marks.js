@@ -1,0 +1,120 @@
+// Lights, detectors and regions drawn in the scene, and their names over it.
+
+import {
+  BufferAttribute,
+  BufferGeometry,
+  ConeGeometry,
+  CylinderGeometry,
+  EdgesGeometry,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshBasicMaterial,
+  Vector3,
+} from "three";
+import { cornerNormals } from "./normals.js";
+import { unpack, unpackPoints } from "./arrays.js";
+import { rimMaterial } from "./shaders.js";
+
+const LIGHT = 0x009eb8;
+const ARROW_RADIUS = 0.0042;
+// Edges of regions at which faces meet at a larger angle, degrees.
+const EDGE = 30;
+
+function arrow([tail, tip], radius, material) {
+  const [start, end] = [new Vector3(...tail), new Vector3(...tip)];
+  const along = end.clone().sub(start);
+  const length = along.length();
+  const head = Math.min(7 * radius, 0.5 * length);
+  const shaft = new Mesh(new CylinderGeometry(radius, radius, length - head, 16), material);
+  shaft.position.y = (length - head) / 2;
+  const cone = new Mesh(new ConeGeometry(2.6 * radius, head, 24), material);
+  cone.position.y = length - head / 2;
+  const whole = new Group();
+  whole.add(shaft, cone);
+  whole.position.copy(start);
+  whole.quaternion.setFromUnitVectors(new Vector3(0, 1, 0), along.normalize());
+  return whole;
+}
+
+export function makeArrows(arrows, diagonal) {
+  const group = new Group();
+  // Strong where nothing is in front of it, faint where the body hides it.
+  const seen = new MeshBasicMaterial({ color: LIGHT, transparent: true, opacity: 0.75 });
+  const hidden = new MeshBasicMaterial({ color: LIGHT, transparent: true, opacity: 0.2, depthTest: false, depthWrite: false });
+  for (const ends of arrows) {
+    group.add(arrow(ends, ARROW_RADIUS * diagonal, hidden), arrow(ends, ARROW_RADIUS * diagonal, seen));
+  }
+  return group;
+}
+
+export async function makeRegion(region, up) {
+  const points = await unpackPoints(region.points);
+  const triangles = await unpack(region.triangles);
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(points, 3));
+  geometry.setIndex(new BufferAttribute(triangles, 1));
+  const soup = geometry.toNonIndexed();
+  soup.setAttribute("normal", new BufferAttribute(cornerNormals(points, triangles), 3));
+  const group = new Group();
+  const rim = new Mesh(soup, rimMaterial());
+  rim.renderOrder = 1;
+  const line = new LineBasicMaterial({ color: 0x14181f, transparent: true, opacity: 0.7, depthTest: false });
+  const edges = new LineSegments(new EdgesGeometry(geometry, EDGE), line);
+  edges.renderOrder = 2;
+  group.add(rim, edges);
+  return { name: region.name, points, triangles, group, top: highest(points, up) };
+}
+
+// The highest vertex, where the name of a region stands.
+function highest(points, [x, y, z]) {
+  let [best, most] = [0, -Infinity];
+  for (let i = 0; i < points.length; i += 3) {
+    const height = points[i] * x + points[i + 1] * y + points[i + 2] * z;
+    if (height > most) [best, most] = [i, height];
+  }
+  return points.slice(best, best + 3);
+}
+
+// Marks and names that stand over the canvas, in the page.
+export class Labels {
+  constructor(parent) {
+    this.parent = parent;
+    this.labels = [];
+  }
+
+  add(kind, place, text) {
+    const element = document.createElement("div");
+    element.className = `mark ${kind}`;
+    element.append(document.createElement("i"));
+    if (text) {
+      const name = document.createElement("span");
+      name.textContent = text;
+      element.append(name);
+    }
+    this.parent.append(element);
+    this.labels.push({ kind, place: new Vector3(...place), element });
+    return element;
+  }
+
+  // Put them where the camera sees them; names that would cover an earlier one are left out.
+  place(camera, width, height, shown) {
+    const taken = [];
+    for (const { kind, place, element } of this.labels) {
+      element.hidden = !shown[kind];
+      if (element.hidden) continue;
+      const { x, y } = place.clone().project(camera);
+      const [left, top] = [((x + 1) / 2) * width, ((1 - y) / 2) * height];
+      element.style.transform = `translate(${left}px, ${top}px)`;
+      const name = element.querySelector("span");
+      if (!name) continue;
+      name.hidden = false;
+      const wide = 7 * name.textContent.length;
+      const start = kind === "regions" ? left - wide / 2 : left + 10;
+      const box = [start, top - 9, start + wide, top + 9];
+      name.hidden = taken.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
+      if (!name.hidden) taken.push(box);
+    }
+  }
+}

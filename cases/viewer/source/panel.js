@@ -1,0 +1,85 @@
+// The controls beside the scene: they follow the state, and the state follows them.
+
+import { ALL } from "./fields.js";
+import { label } from "./colours.js";
+
+export const element = (id) => document.getElementById(id);
+
+function fill(select, names, chosen, text = (name) => name) {
+  select.replaceChildren(...names.map((name) => new Option(text(name), name, false, name === chosen)));
+  select.closest("label").hidden = names.length < 2;
+}
+
+// Names of all switches, and the keys that turn them.
+export const SWITCHES = { edges: "e", lights: "g", detectors: "d", regions: "r" };
+
+export class Panel {
+  constructor(scene, change) {
+    this.scene = scene;
+    for (const id of ["quantity", "channel", "light", "map", "cut"]) {
+      element(id).addEventListener("change", () => change({ [id]: element(id).value }));
+    }
+    for (const name of ["log", "linear"]) {
+      element(name).addEventListener("change", () => change({ logarithmic: name === "log" }));
+    }
+    element("position").addEventListener("input", () => change({ position: Number(element("position").value) }));
+    for (const id of Object.keys(SWITCHES)) {
+      element(id).addEventListener("change", () => change({ [id]: element(id).checked }));
+    }
+    for (const end of ["bottom", "top"]) {
+      element(end).addEventListener("change", () => change({ [end]: Number(element(end).value) }));
+    }
+    element("whole").addEventListener("click", () => change({ bottom: null, top: null }));
+  }
+
+  follow(state, fields, range) {
+    const { scene } = this;
+    const quantities = [...(scene.colours ? ["preview"] : []), ...fields.quantities];
+    fill(element("quantity"), quantities, state.quantity, (name) => (name === "preview" ? "colours" : name));
+    for (const kind of ["channel", "light"]) {
+      fill(element(kind), fields.names(state.quantity, kind), state[kind], (name) => (name === ALL ? "sum of all" : name));
+    }
+    fill(element("map"), Object.keys(scene.maps), state.map);
+    element("log").checked = state.logarithmic;
+    element("linear").checked = !state.logarithmic;
+    element("scales").hidden = element("ranges").hidden = state.quantity === "preview";
+    for (const [i, end] of ["bottom", "top"].entries()) {
+      const input = element(end);
+      input.value = String(Number(range[i].toPrecision(4)));
+    }
+    for (const id of Object.keys(SWITCHES)) element(id).checked = state[id];
+    element("cut").value = state.cut;
+    element("position").value = state.position;
+    element("position").disabled = state.cut === "off";
+  }
+
+  // Leave out switches of what the run has none of.
+  hideMissing() {
+    const { lights, detectors, regions, volume } = this.scene;
+    element("lights").closest("label").hidden = !(lights.arrows.length + lights.points.length);
+    element("detectors").closest("label").hidden = !detectors.length;
+    element("regions").closest("label").hidden = !regions.length;
+    element("no-volume").hidden = Boolean(volume);
+  }
+
+  // Lines of name and value.
+  read(lines) {
+    const rows = lines.map(([name, value]) => {
+      const row = document.createElement("tr");
+      for (const [tag, text] of [["th", name], ["td", value]]) {
+        const cell = document.createElement(tag);
+        cell.textContent = text;
+        row.append(cell);
+      }
+      return row;
+    });
+    element("reading").replaceChildren(...rows);
+    element("hint").hidden = lines.length > 0;
+  }
+}
+
+export function describe(value, unit) {
+  return Number.isFinite(value) ? `${label(value, 5)} ${unit}`.trim() : "not known";
+}
+
+export const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;

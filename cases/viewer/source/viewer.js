@@ -1,0 +1,287 @@
+// `Viewer`: the scene, its state, and what is drawn of it.
+
+import { Color, ColorManagement, LinearSRGBColorSpace, Scene, Vector3, WebGLRenderer } from "three";
+import { unpack, unpackPoints } from "./arrays.js";
+import { makeBody, setColours, setValues } from "./body.js";
+import { View } from "./camera.js";
+import { label, tableOf, textureOf } from "./colours.js";
+import { Fields, rangeOf, ALL } from "./fields.js";
+import { cornerNormals } from "./normals.js";
+import { drawAxes, drawBar, drawNothing, drawScale, drawWhite, pen } from "./legend.js";
+import { Labels, makeArrows, makeRegion } from "./marks.js";
+import { Panel, SWITCHES, element } from "./panel.js";
+import { firstHit } from "./pick.js";
+import { readPoint } from "./reading.js";
+import { Section } from "./section.js";
+
+const PAPER = { light: "#f3f4f6", dark: "#1c1f24" };
+const INK = { light: "#20242b", dark: "#e8eaee" };
+// Room for the title above and for the legends on the right of the body, pixels.
+const ROOM = { top: 52, right: 84, bottom: 44, left: 4 };
+const REST = 150;
+
+// Colours are those of the pictures, as they are.
+ColorManagement.enabled = false;
+
+class Viewer {
+  constructor(scene) {
+    this.data = scene;
+    this.fields = new Fields(scene.fields);
+    this.scene = new Scene();
+    this.renderer = new WebGLRenderer({ canvas: element("view"), antialias: true, preserveDrawingBuffer: true });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.maps = Object.fromEntries(Object.entries(scene.maps).map(([name, colours]) => [name, tableOf(colours)]));
+    this.textures = Object.fromEntries(Object.entries(this.maps).map(([name, table]) => [name, textureOf(table)]));
+    this.view = new View(scene, element("view"), () => this.draw());
+    this.labels = new Labels(element("labels"));
+    this.panel = new Panel(scene, (changes) => this.change(changes));
+    this.state = {
+      quantity: scene.colours ? "preview" : this.fields.quantities[0],
+      channel: ALL,
+      light: ALL,
+      logarithmic: true,
+      bottom: null,
+      top: null,
+      map: Object.keys(scene.maps)[0],
+      edges: false,
+      lights: true,
+      detectors: true,
+      regions: true,
+      cut: "off",
+      position: 0.5,
+    };
+    this.picked = null;
+    this.frames = 0;
+  }
+
+  async build() {
+    const { data } = this;
+    this.points = await unpackPoints(data.points);
+    this.triangles = await unpack(data.triangles);
+    this.body = makeBody(this.points, this.triangles, cornerNormals(this.points, this.triangles));
+    if (data.colours) setColours(this.body, await unpack(data.colours.values), this.triangles);
+    this.arrows = makeArrows(data.lights.arrows, this.view.diagonal);
+    this.regions = await Promise.all(data.regions.map((region) => makeRegion(region, data.up)));
+    this.section = new Section(data, this.regions);
+    this.scene.add(this.body, this.arrows, ...this.regions.map((region) => region.group), ...this.section.objects);
+    for (const place of data.lights.points) this.labels.add("lights", place);
+    for (const { name, place } of data.detectors) this.labels.add("detectors", place, name);
+    for (const { name, top } of this.regions) this.labels.add("regions", top, name);
+    this.labels.add("picked", [0, 0, 0]);
+    this.panel.hideMissing();
+  }
+
+  get field() {
+    const { quantity, channel, light } = this.state;
+    return this.fields.find(quantity === "preview" ? "exitance" : quantity, channel, light);
+  }
+
+  get logarithmic() {
+    return this.state.logarithmic && this.field.logarithmic;
+  }
+
+  // The ends of the colours: those that were typed, where they make sense, else those of the field.
+  get range() {
+    const [least, most] = rangeOf(this.field, this.logarithmic);
+    const { bottom, top } = this.state;
+    const high = top !== null && Number.isFinite(top) && (!this.logarithmic || top > 0) ? top : most;
+    const low = bottom !== null && Number.isFinite(bottom) && (!this.logarithmic || bottom > 0) ? bottom : least;
+    return low < high ? [low, high] : [least, most];
+  }
+
+  async change(changes) {
+    const fresh = ["quantity", "channel", "light", "logarithmic"].some((key) => key in changes);
+    Object.assign(this.state, fresh ? { bottom: null, top: null } : {}, changes);
+    // A quantity may be known for fewer channels and lights.
+    for (const kind of ["channel", "light"]) {
+      const names = this.fields.names(this.field.quantity, kind);
+      if (!names.includes(this.state[kind])) this.state[kind] = names[0];
+    }
+    this.show(await this.fields.values(this.field));
+    await this.section.cut(this.state, this.plane);
+    this.panel.follow(this.state, this.fields, this.range);
+    await this.read();
+    this.draw();
+  }
+
+  show(values) {
+    const { field, state, range, body, data } = this;
+    const { factor } = field.values;
+    this.values = values;
+    if (this.shown !== field) setValues(body, values, this.triangles);
+    this.shown = field;
+    const uniforms = body.material.uniforms;
+    uniforms.low.value = range[0] / factor;
+    uniforms.high.value = range[1] / factor;
+    uniforms.logarithmic.value = this.logarithmic ? 1 : 0;
+    uniforms.map.value = this.textures[state.map];
+    uniforms.ownColours.value = state.quantity === "preview" ? 1 : 0;
+    uniforms.edges.value = state.edges ? 1 : 0;
+    this.section.colour(state, this.textures[state.map]);
+    this.arrows.visible = state.lights;
+    for (const { group } of this.regions) group.visible = state.regions;
+    this.tone = state.quantity === "preview" && data.colours ? "dark" : "light";
+    document.body.className = this.tone;
+    this.scene.background = new Color(PAPER[this.tone]);
+    let [least, finite] = [Infinity, 0];
+    for (const value of values) if (value < least) least = value;
+    for (const value of values) if (Number.isFinite(value)) finite += 1;
+    this.below = least * factor < range[0] * (1 - 1e-6);
+    this.dark = finite === 0 || (field.logarithmic && field.ends === null);
+  }
+
+  // The plane of the cut: unit normal towards the eye, and its distance from the middle; null without a cut.
+  get plane() {
+    const { cut, position } = this.state;
+    if (cut === "off") return null;
+    const axis = cut === "view" ? (this.along ??= this.view.toward) : new Vector3().setComponent("xyz".indexOf(cut), 1);
+    if (cut !== "view") this.along = null;
+    let [low, high] = [Infinity, -Infinity];
+    for (let i = 0; i < this.points.length; i += 3) {
+      const height = this.points[i] * axis.x + this.points[i + 1] * axis.y + this.points[i + 2] * axis.z;
+      low = Math.min(low, height);
+      high = Math.max(high, height);
+    }
+    const offset = low + position * (high - low);
+    const side = axis.dot(this.view.toward) < 0 ? -1 : 1;
+    return { normal: axis.clone().multiplyScalar(side).toArray(), offset: side * offset };
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = element("stage");
+    this.size = [width, height];
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.renderer.setSize(width, height, false);
+    this.view.resize(width, height, ROOM);
+    this.draw();
+  }
+
+  // Draw before the next frame of the screen, once however often it is asked.
+  draw() {
+    if (this.asked || !this.shown) return;
+    this.asked = requestAnimationFrame(() => {
+      this.asked = null;
+      this.render();
+    });
+  }
+
+  render() {
+    const { view, state, body } = this;
+    const plane = this.plane;
+    const uniforms = body.material.uniforms;
+    uniforms.cut.value = plane ? 1 : 0;
+    if (plane) uniforms.plane.value.set(...plane.normal, plane.offset);
+    this.renderer.render(this.scene, view.camera);
+    this.labels.place(view.camera, ...this.size, { ...state, picked: this.picked !== null });
+    this.drawOver();
+    this.frames += 1;
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => this.hideBehind(), REST);
+  }
+
+  drawOver() {
+    const { data, view } = this;
+    const [width, height] = this.size;
+    const ink = INK[this.tone];
+    const context = pen(element("over"), width, height);
+    drawScale(context, view, data.unit, [20, height - 22], ink);
+    drawAxes(context, view.camera, [width - 42, height - 40], ink);
+    const inside = this.section.bar(this.maps[this.state.map]);
+    const [high, low] = [Math.max(100, 0.12 * height), height - 90];
+    const middle = inside ? (high + low) / 2 : low;
+    const x = width - ROOM.right + 8;
+    this.drawLegend(context, x, [high, inside ? middle - 14 : low], ink);
+    if (inside) drawBar(context, x, inside, [middle + 40, low], ink);
+  }
+
+  drawLegend(context, x, ends, ink) {
+    const { data, state, range, field } = this;
+    if (state.quantity === "preview") drawWhite(context, x, ends[0], data.colours.white, field.unit, ink);
+    else if (this.dark) drawNothing(context, x, ends[0], ink);
+    else {
+      const bar = { quantity: field.quantity, unit: field.unit, bottom: range[0], top: range[1] };
+      const rest = { logarithmic: this.logarithmic, table: this.maps[state.map], below: this.below };
+      drawBar(context, x, { ...bar, ...rest }, ends, ink);
+    }
+  }
+
+  // Pale marks of detectors that the body hides, found when the camera rests.
+  hideBehind() {
+    const along = this.view.toward;
+    for (const { kind, place, element: mark } of this.labels.labels) {
+      if (kind !== "detectors" && kind !== "picked") continue;
+      const start = place.clone().addScaledVector(along, 2e-3 * this.view.diagonal).toArray();
+      const hit = firstHit(this.points, this.triangles, start, along.toArray(), () => true, 0);
+      mark.classList.toggle("behind", hit !== null);
+    }
+  }
+
+  // Read the point that is seen at a place of the canvas, pixels from its left and top edges.
+  async pick(x, y) {
+    const [width, height] = this.size;
+    const { start, along } = this.view.ray((2 * x) / width - 1, 1 - (2 * y) / height);
+    const plane = this.plane;
+    const keeps = ([px, py, pz]) =>
+      !plane || px * plane.normal[0] + py * plane.normal[1] + pz * plane.normal[2] <= plane.offset;
+    const outside = firstHit(this.points, this.triangles, start, along, keeps, -Infinity);
+    const inside = plane ? this.section.hit(start, along) : null;
+    this.picked = inside && (!outside || inside.distance < outside.distance) ? inside : outside;
+    return this.read();
+  }
+
+  async read() {
+    const lines = this.picked ? await readPoint(this, this.picked) : [];
+    this.panel.read(lines);
+    const mark = this.labels.labels.find(({ kind }) => kind === "picked");
+    if (this.picked) mark.place.set(...this.picked.place);
+    this.draw();
+    return Object.fromEntries(lines);
+  }
+}
+
+// A click or a tap, not the end of a turn.
+function listenToPicks(viewer, canvas) {
+  let down = null;
+  canvas.addEventListener("pointerdown", (event) => {
+    down = [event.clientX, event.clientY];
+    canvas.focus();
+  });
+  canvas.addEventListener("pointerup", (event) => {
+    const { left, top } = canvas.getBoundingClientRect();
+    const near = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < 5;
+    if (near) viewer.pick(event.clientX - left, event.clientY - top);
+  });
+}
+
+function listenToKeys(viewer) {
+  const switches = Object.fromEntries(Object.entries(SWITCHES).map(([name, key]) => [key, name]));
+  window.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT)$/.test(event.target.tagName)) return;
+    const { state, size } = viewer;
+    const name = switches[event.key];
+    if (name) viewer.change({ [name]: !state[name] });
+    else if (event.key === "l") viewer.change({ logarithmic: !state.logarithmic });
+    else if (event.key === "c") {
+      const kinds = ["off", "x", "y", "z", "view"];
+      viewer.change({ cut: kinds[(kinds.indexOf(state.cut) + 1) % kinds.length] });
+    } else if (event.key === "Enter" && event.target.tagName !== "BUTTON") viewer.pick(size[0] / 2, size[1] / 2);
+    else if (!viewer.view.key(event.key)) return;
+    event.preventDefault();
+  });
+}
+
+export async function start(data) {
+  element("title").textContent = data.title;
+  element("size").textContent = `${data.extent.map((length) => label(length, 3)).join(" × ")} ${data.unit}`;
+  const viewer = new Viewer(data);
+  await viewer.build();
+  listenToPicks(viewer, element("view"));
+  listenToKeys(viewer);
+  element("again").addEventListener("click", () => viewer.view.reset());
+  new ResizeObserver(() => viewer.resize()).observe(element("stage"));
+  viewer.resize();
+  await viewer.change({});
+  viewer.render();
+  document.documentElement.dataset.ready = "yes";
+  window.tetlux = viewer;
+}
