@@ -14,8 +14,12 @@ from tetlux.meshing.errors import InputError
 ERROR_OF_SHAPE, ERROR_OF_SCAN = 2e-4, 6e-3
 # Powers of the number of charges with which it falls.
 RATE_OF_SHAPE, RATE_OF_SCAN = 2.0, 1.3
+# Charges that are tried at least, some .9 s: fewer may leave the exitance of a torus below zero.
+FEWEST_TO_TRY = 600
 # Each further region multiplies the error.
 ERROR_OF_REGION = 4.0
+# Seconds that any fit takes: `python -m tests.benchmarks.plans` has .06 to .17 for 100 charges.
+SECONDS_OF_ANY = 0.08
 # Seconds and bytes of a fit of 300 charges, with those of the smaller fits before it; they grow with the square.
 SECONDS_OF_300, BYTES_OF_300 = 0.22, 20e6
 
@@ -34,17 +38,18 @@ def charges_candidate(request: Request) -> Candidate:
     suits = count < MOST_CHARGES or error <= request.exitance_tolerance
     count *= 1 + len(request.inner)
     size = (count / 300.0) ** 2
+    seconds = (SECONDS_OF_ANY + SECONDS_OF_300 * size) * len(request.bodies)
     reason = f"about {round(count, -1):,.0f} charges, whose residual tells the error"
     if not suits:
         reason = f"{MOST_CHARGES:,} charges are not enough for the tolerance"
-    return Candidate("charges", error, SECONDS_OF_300 * size * len(request.bodies), BYTES_OF_300 * size, reason, suits)
+    return Candidate("charges", error, seconds, BYTES_OF_300 * size, reason, suits)
 
 
 def most_charges(request: Request, candidate: Candidate, seconds: float) -> int:
     """Number of charges at which fitting ends in vain: when it takes as long as another model would."""
     seconds = max(seconds, COUNT_FACTOR**2 * candidate.seconds) / len(request.bodies)
     count = 300.0 * np.sqrt(seconds / SECONDS_OF_300)
-    return int(np.clip(count, FEWEST_CHARGES, MOST_CHARGES))
+    return int(np.clip(count, FEWEST_TO_TRY, MOST_CHARGES))
 
 
 def _check(request: Request) -> None:
