@@ -14,7 +14,8 @@ from tetlux.meshing.errors import InputError
 ERROR_OF_SHAPE, ERROR_OF_SCAN = 2e-4, 6e-3
 # Powers of the number of charges with which it falls.
 RATE_OF_SHAPE, RATE_OF_SCAN = 2.0, 1.3
-# Charges that are tried at least, some .9 s: fewer may leave the exitance of a torus below zero.
+# Charges that are tried at least on scans, some .9 s. Shapes need few, and any limit moves the steps of a fit, which
+# left the exitance of a torus below zero.
 FEWEST_TO_TRY = 600
 # Each further region multiplies the error.
 ERROR_OF_REGION = 4.0
@@ -30,8 +31,7 @@ def charges_candidate(request: Request) -> Candidate:
         _check(request)
     except InputError as why:
         return impossible("charges", why)
-    is_shape = request.surface.shape is not None and all(each.shape is not None for each in request.inner)
-    first, rate = (ERROR_OF_SHAPE, RATE_OF_SHAPE) if is_shape else (ERROR_OF_SCAN, RATE_OF_SCAN)
+    first, rate = (ERROR_OF_SHAPE, RATE_OF_SHAPE) if _are_shapes(request) else (ERROR_OF_SCAN, RATE_OF_SCAN)
     first *= ERROR_OF_REGION ** len(request.inner)
     count = float(np.clip(300.0 * (first / request.exitance_tolerance) ** (1.0 / rate), FEWEST_CHARGES, MOST_CHARGES))
     error = first * (300.0 / count) ** rate
@@ -47,9 +47,16 @@ def charges_candidate(request: Request) -> Candidate:
 
 def most_charges(request: Request, candidate: Candidate, seconds: float) -> int:
     """Number of charges at which fitting ends in vain: when it takes as long as another model would."""
+    if _are_shapes(request):
+        return MOST_CHARGES
     seconds = max(seconds, COUNT_FACTOR**2 * candidate.seconds) / len(request.bodies)
     count = 300.0 * np.sqrt(seconds / SECONDS_OF_300)
     return int(np.clip(count, FEWEST_TO_TRY, MOST_CHARGES))
+
+
+def _are_shapes(request: Request) -> bool:
+    """Whether the body and its regions are built-in shapes, of which few charges are needed."""
+    return all(surface.shape is not None for surface in (request.surface, *request.inner))
 
 
 def _check(request: Request) -> None:
