@@ -6,14 +6,16 @@ from dataclasses import replace
 from tetlux.cases.file.case import Case
 from tetlux.cases.planning import AUTO, plan_case, request_of
 from tetlux.cases.write.results import AnySolution
+from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.planner.solve import report_plan, solve_by_plan, solve_closed_forms
+from tetlux.fem.planner.solve import FiniteElements, report_plan, solve_by_plan, solve_closed_forms, solve_on_part
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
+from tetlux.meshing.surface.surface import Surface
 
 Report = Callable[[str], None]
 
@@ -25,22 +27,37 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
     def solve_fully() -> list[Solution]:
         return _solve_fully(case, report, cache=cache, start=start)
 
+    def solve_part(part: Surface, media: Sequence[AnyMedium], regions: Sequence[Region]) -> list[Solution]:
+        return _solve_fully(case, report, cache=cache, part=(part, media, regions))
+
+    elements = FiniteElements(solve_fully, solve_part)
     if model == AUTO:
         plan = case.plan or plan_case(case)
         report_plan(plan, report)
-        return solve_by_plan(request_of(case, plan.runs), solve_fully, report, plan=plan)
+        return solve_by_plan(request_of(case, plan.runs), elements, report, plan=plan)
     if model == "closed-form":
         return solve_closed_forms(request_of(case))
+    if model == "truncated":
+        return solve_on_part(request_of(case), elements, report)
     return _solve_with_charges(case, report) if model == "charges" else solve_fully()
 
 
-def _solve_fully(case: Case, report: Report, *, cache: bool, start: SharedMesh | None) -> list[Solution]:
-    """Solve all channels by finite elements, on one mesh."""
+def _solve_fully(
+    case: Case,
+    report: Report,
+    *,
+    cache: bool,
+    start: SharedMesh | None = None,
+    part: tuple[Surface, Sequence[AnyMedium], Sequence[Region]] | None = None,
+) -> list[Solution]:
+    """Solve all channels by finite elements, on one mesh; of a part of the body if its surface, media, and regions."""
+    whole = case.mesh or case.surface, [channel.media for channel in case.channels], case.regions
+    body, media, regions = part or whole
     return solve_each(
-        case.mesh or case.surface,
-        [channel.media for channel in case.channels],
+        body,
+        media,
         [list(channel.lights.values()) for channel in case.channels],
-        regions=case.regions,
+        regions=regions,
         tolerance=case.tolerance,
         detectors=[entry.detector for entry in case.detectors],
         detector_tolerance=case.detector_tolerance,

@@ -43,6 +43,7 @@ from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 from tetlux.fem.transient.moments import Moments, moments
 from tetlux.fem.transient.pulse import Transient, read_pulse
+from tetlux.fem.truncated import TruncatedSolution
 
 __all__ = [
     "Body",
@@ -80,6 +81,7 @@ __all__ = [
     "Spectrum",
     "System",
     "Transient",
+    "TruncatedSolution",
     "VaryingMedium",
     "grid_field",
     "henyey_greenstein",

@@ -101,8 +101,12 @@ def build_scenes(
     scenes: int,
     frequency: float | Sequence[float] = 0.0,
     outside_index: float = 1.0,
+    *,
+    any_size: bool = False,
 ) -> Scenes:
     """Check a body, its media and the modulation of lights, and assign the media to the scenes.
+
+    `any_size` is as for `check_media`.
 
     Raises
     ------
@@ -125,7 +129,7 @@ def build_scenes(
             bodies[each] = Body(surface, dict(zip(labels, each, strict=True)), MeshPartition(mesh))
         else:
             bodies[each] = Body(surface, each, SurfacePartition(inner))
-        check_media(bodies[each])
+        check_media(bodies[each], any_size=any_size)
     of_scenes = [bodies[each] for each in media]
     modulation = shifts_of_scenes(frequency, [each.outer for each in of_scenes], surface.unit, outside_index)
     return Scenes(surface, inner, media, labels, mesh, of_scenes, isinstance(body, TetMesh), *modulation)

@@ -16,9 +16,9 @@ from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.planner.options import Options, check_options_without_mesh
+from tetlux.fem.planner.options import Options, check_options_of
 from tetlux.fem.planner.request import make_request
-from tetlux.fem.planner.solve import AnySolution, solve_by_plan, solve_closed_forms
+from tetlux.fem.planner.solve import AnySolution, FiniteElements, solve_by_plan, solve_closed_forms, solve_on_part
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import Report, no_report, solve_each
 from tetlux.fem.sources.light import Light
@@ -27,6 +27,8 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 __all__ = ["solve", "solve_each"]
+
+MODELS = ("full", "auto", "closed-form", "charges", "truncated")
 
 
 @overload
@@ -83,7 +85,7 @@ def solve(  # type: ignore[overload-overlap]  # as above
     medium: AnyMedium | Mapping[Any, AnyMedium],
     lights: Sequence[Light],
     *,
-    model: Literal["auto"],
+    model: Literal["auto", "truncated"],
     **options: Unpack[Options],
 ) -> AnySolution: ...
 
@@ -94,7 +96,7 @@ def solve(
     medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
     lights: Sequence[Light],
     *,
-    model: Literal["auto"],
+    model: Literal["auto", "truncated"],
     **options: Unpack[Options],
 ) -> list[AnySolution]: ...
 
@@ -119,7 +121,7 @@ def solve(
     report: Report = no_report,
     frequency: float = 0.0,
     outside_index: float = 1.0,
-    model: Literal["full", "auto", "closed-form", "charges"] = "full",
+    model: Literal["full", "auto", "closed-form", "charges", "truncated"] = "full",
 ) -> AnySolution | Sequence[AnySolution]:
     """Solve the diffusion approximation for the light in a body.
 
@@ -181,14 +183,16 @@ def solve(
         Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
     outside_index : float
         Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
-    model : {"full", "auto", "closed-form", "charges"}
+    model : {"full", "auto", "closed-form", "charges", "truncated"}
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
         arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance`, and refuses
         the rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with points, beams
-        that are points, and in balls diffuse light; it takes `tolerance` and `detectors`. "auto" takes the fastest of
-        these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite elements.
+        that are points, and in balls diffuse light; it takes `tolerance` and `detectors`. "truncated" solves by finite
+        elements on the part that light reaches, of bodies of any size, see `tetlux.fem.truncated`. "auto" takes the
+        fastest of these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite
+        elements.
 
     Returns
     -------
@@ -219,8 +223,9 @@ def solve(
     >>> solution.error_estimate < 0.05
     True
     """
-    if model not in ("full", "auto", "closed-form", "charges"):
-        raise InputError(f'model is "{model}"; give "full", "auto", "closed-form" or "charges".')
+    if model not in MODELS:
+        names = ", ".join(f'"{each}"' for each in MODELS)
+        raise InputError(f'model is "{model}"; give one of {names}.')
     options = Options(
         regions=regions,
         tolerance=tolerance,
@@ -238,8 +243,8 @@ def solve(
         frequency=frequency,
         outside_index=outside_index,
     )
-    if model in ("closed-form", "charges"):
-        check_options_without_mesh(model, options)
+    if model not in ("full", "auto"):
+        check_options_of(model, options)
     if model == "charges":
         return solve_with_charges(
             body if mesh is None else mesh,
@@ -257,7 +262,7 @@ def _solve_channels(
     body: Surface | TetMesh,
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
-    model: Literal["full", "auto", "closed-form"],
+    model: Literal["full", "auto", "truncated", "closed-form"],
     options: Options,
 ) -> AnySolution | Sequence[AnySolution]:
     """Solve each channel: all on one mesh, or all by one closed form."""
@@ -282,8 +287,14 @@ def _solve_channels(
             mesh=options["mesh"],
             need_of_mesh="modulated light is solved on a mesh" if options["frequency"] else "",
         )
+        elements = FiniteElements(
+            lambda: solve_each(body, channels, scenes, **options),
+            lambda part, media, inside: solve_each(part, media, scenes, **options | {"regions": inside}),
+        )
         if model == "closed-form":
             solutions = solve_closed_forms(request)
+        elif model == "truncated":
+            solutions = solve_on_part(request, elements, options["report"])
         else:
-            solutions = solve_by_plan(request, lambda: solve_each(body, channels, scenes, **options), options["report"])
+            solutions = solve_by_plan(request, elements, options["report"])
     return solutions if several else solutions[0]

@@ -383,5 +383,5 @@ def test_bodies_that_are_not_even_are_refused(ball: Surface) -> None:
         solve(ball, [TISSUE, TISSUE], [light], model="charges")  # type: ignore[call-overload]
     with pytest.raises(InputError, match="on a body with regions"):
         solve(ball, TISSUE, [DiffuseLight(1.0)], regions=[Region(sphere(3.0), TISSUE)], model="charges")
-    with pytest.raises(InputError, match='model is "fast"; give "full", '):
+    with pytest.raises(InputError, match='model is "fast"; give one of "full", '):
         solve(ball, TISSUE, [light], model="fast")  # type: ignore[call-overload]

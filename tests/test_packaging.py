@@ -133,7 +133,7 @@ def test_rooms_that_measure_lead_nowhere_back() -> None:
     }
     assert {name for name in stress if name.startswith("tetlux.cases.chart")} == {"tetlux.cases.chart.samples"}
     assert not any(name.startswith(("tetlux.cases.stress", "tetlux.cases.compare")) for name in chart)
-    by_closed_form = {"exact", "planner", "closed_form.py", "exact_field.py"}
+    by_closed_form = {"exact", "planner", "truncated", "closed_form.py", "exact_field.py"}
     solver = [path for path in (ROOT / "fem").rglob("*.py") if not by_closed_form & set(path.relative_to(ROOT).parts)]
     assert not any(name.startswith("tetlux.fem.exact") for name in imports_of(*solver))
 

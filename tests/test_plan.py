@@ -244,7 +244,7 @@ def test_what_has_no_closed_form_is_refused_in_a_sentence(
 
 
 def test_an_unknown_model_is_refused() -> None:
-    with pytest.raises(InputError, match='give "full", "auto", "closed-form" or "charges"'):
+    with pytest.raises(InputError, match='give one of "full", "auto", "closed-form", "charges", "truncated"'):
         solve(BALL, TISSUE, [BEAM], model="fem")  # type: ignore[call-overload]
 
 

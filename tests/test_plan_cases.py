@@ -40,7 +40,7 @@ def test_a_ball_is_solved_by_its_series(tmp_path: Path) -> None:
     summary, said = summary_of(path, tmp_path / "out")
     assert summary["model"] == summary["plan"]["chosen"] == "closed-form"
     assert "mesh" not in summary
-    assert [each["model"] for each in summary["plan"]["candidates"]] == ["closed-form", "charges", "full"]
+    assert [each["model"] for each in summary["plan"]["candidates"]] == ["closed-form", "charges", "truncated", "full"]
     assert summary["plan"]["measured"]["error"] == summary["channels"][0]["error_estimate"] < 1e-9
     assert 0.0 < summary["plan"]["measured"]["seconds"] < summary["seconds"]["total"]
     assert 0.0 < summary["detectors"][0]["relative_error"] < 1e-8

@@ -23,6 +23,9 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.nesting import check_regions
 
+# Models that take bodies larger than finite elements can mesh as a whole.
+OF_ANY_SIZE = ("auto", "truncated")
+
 
 @dataclass(frozen=True, eq=False)
 class CaseBody:
@@ -87,7 +90,7 @@ def read_body(document: Document, spec: CaseSpec, channels: int, reader: Reader)
     body = CaseBody(surface, media, parts, regions)
     with document.at(("surface",)):
         for each in body.bodies:
-            check_size(each)
+            check_size(each, any_size=spec.model in OF_ANY_SIZE)
     return body
 
 

@@ -15,16 +15,20 @@ from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.truncated import TruncatedSolution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
 from tetlux.meshing.arrays import FloatArray, Number
 from tetlux.meshing.host.libraries import installed_versions
 from tetlux.meshing.mesher.deviation import surface_deviation
 from tetlux.meshing.notes import Note
+from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Tolerances beside that of the exitance, by their name in a case.
 MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_tolerance")
+# Finite elements on the whole body have a name of their own in summaries.
+MODEL_NAMES = {"full": "fem"}
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
@@ -59,12 +63,12 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
     return {
         "case": case.name,
         "unit": case.surface.unit,
-        "model": "fem" if mesh else results.solutions[0].model,
+        "model": MODEL_NAMES.get(results.solutions[0].model, results.solutions[0].model),
         "tolerance": case.tolerance,
         **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
         **({"plan": describe_plan(plan, results.solutions)} if plan else {}),
-        **({"mesh": _mesh(case, mesh)} if mesh else {}),
+        **({"mesh": _mesh(case, mesh, _meshed_surface(results.mesh_solutions[0]))} if mesh else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
@@ -75,13 +79,18 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
     }
 
 
-def _mesh(case: Case, mesh: TetMesh) -> dict[str, Any]:
+def _meshed_surface(solution: Solution) -> Surface:
+    """The surface that the mesh stands for: of the whole body, or of a part."""
+    return solution.meshed_surface if isinstance(solution, TruncatedSolution) else solution.surface
+
+
+def _mesh(case: Case, mesh: TetMesh, surface: Surface) -> dict[str, Any]:
     return {
         "nodes": len(mesh.points),
         "tetrahedra": len(mesh.tetrahedra),
         "volume": mesh.volume,
         "area": mesh.area,
-        "surface_deviation": surface_deviation(mesh, case.surface),
+        "surface_deviation": surface_deviation(mesh, surface),
         "min_quality": float(mesh.quality.min()),
         **({"labels": _labels(case.mesh)} if case.mesh else {}),
     }

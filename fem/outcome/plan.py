@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
-Model = Literal["closed-form", "charges", "full"]
+Model = Literal["closed-form", "charges", "truncated", "full"]
 
 # What a candidate is called in a plan is padded to this width.
 WIDTH = 11
@@ -16,7 +16,7 @@ class Candidate:
 
     Attributes
     ----------
-    model : {"closed-form", "charges", "full"}
+    model : {"closed-form", "charges", "truncated", "full"}
     error : float
         Predicted relative L2 error of the exitance; nan if it is not a way to solve this scene.
     seconds : float
@@ -50,7 +50,7 @@ class Plan:
 
     Attributes
     ----------
-    chosen : {"closed-form", "charges", "full"}
+    chosen : {"closed-form", "charges", "truncated", "full"}
     candidates : tuple of Candidate
         The simplest first.
     tolerance : float or None

@@ -1,6 +1,7 @@
 """`plan`: the public function that says how a scene would be solved."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from tetlux.fem.assessment import Tolerances
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
@@ -13,11 +14,15 @@ from tetlux.fem.planner.charges import charges_candidate
 from tetlux.fem.planner.closed_form import closed_form_candidate
 from tetlux.fem.planner.full import full_candidate
 from tetlux.fem.planner.request import Request, make_request
+from tetlux.fem.planner.truncated import truncated_candidate
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.sources.light import Light
 from tetlux.fem.validity.beforehand import expected_model_error
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
+
+# A part is cut out where that takes less than this share of the seconds of the whole body.
+LARGEST_SHARE_OF_FULL = 0.7
 
 
 def plan(
@@ -74,7 +79,10 @@ def plan(
 
 def plan_of(request: Request) -> Plan:
     """The plan of a request that was checked."""
-    candidates = (closed_form_candidate(request), charges_candidate(request), full_candidate(request))
+    full, truncated = full_candidate(request), truncated_candidate(request)
+    if truncated.suits and full.suits and truncated.seconds > LARGEST_SHARE_OF_FULL * full.seconds:
+        truncated = replace(truncated, suits=False, reason=f"{truncated.reason}, which saves too little")
+    candidates = (closed_form_candidate(request), charges_candidate(request), truncated, full)
     errors = [
         expected_model_error(body, deposits) for body, deposits in zip(request.bodies, request.deposits, strict=True)
     ]

@@ -49,8 +49,14 @@ OF_FINITE_ELEMENTS: Mapping[str, Any] = {
 }
 
 
-def check_options_without_mesh(model: str, options: Options) -> None:
-    """Refuse arguments that are for finite elements alone.
+# Those that models take all the same.
+ALSO_OF_CHARGES = {"detector_tolerance"}
+ALSO_OF_TRUNCATED = set(OF_FINITE_ELEMENTS) - {"everywhere_tolerance", "volume_tolerance", "frequency"}
+TAKEN: Mapping[str, set[str]] = {"charges": ALSO_OF_CHARGES, "truncated": ALSO_OF_TRUNCATED}
+
+
+def check_options_of(model: str, options: Options) -> None:
+    """Refuse arguments that are for finite elements on the whole body alone.
 
     Raises
     ------
@@ -59,7 +65,7 @@ def check_options_without_mesh(model: str, options: Options) -> None:
     names = [
         name
         for name, default in OF_FINITE_ELEMENTS.items()
-        if options.get(name, default) != default and (model, name) != ("charges", "detector_tolerance")
+        if options.get(name, default) != default and name not in TAKEN.get(model, ())
     ]
     if names:
         raise InputError(

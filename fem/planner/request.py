@@ -20,6 +20,7 @@ from tetlux.fem.scenes import build_scenes
 from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
+from tetlux.fem.truncated.part import Box, dark_box
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -73,6 +74,17 @@ class Request:
         return len(self.surface.points) if self.tolerances.exitance is not None else len(self.detectors)
 
     @cached_property
+    def dark_box(self) -> Box:
+        """The box beyond which the body is dark.
+
+        Raises
+        ------
+        InputError
+            If light enters or reaches everywhere.
+        """
+        return dark_box(self.bodies, self.deposits, self.exitance_tolerance)
+
+    @cached_property
     def exact_fields(self) -> tuple[ExactField, ...]:
         """The closed form of each scene.
 
@@ -113,7 +125,7 @@ def make_request(
     if any(len(each) == 0 for each in scenes):
         raise InputError("there is no light; give at least one.")
     given = body if isinstance(body, TetMesh) else mesh
-    built = build_scenes(body, given, medium, regions, len(scenes))
+    built = build_scenes(body, given, medium, regions, len(scenes), any_size=True)
     dark = Dark(built.surface, built.bodies[0].outer)
     placed: tuple[PlacedDetector, ...] = tuple(place_detector(detector, dark) for detector in detectors)
     deposits = tuple(

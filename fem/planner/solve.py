@@ -1,7 +1,7 @@
 """`solve_by_plan`: solve by the model that a plan chooses, and by the next one where that misses the tolerance."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless.closed_form import ClosedFormSolution, solution_of
@@ -16,16 +16,35 @@ from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.closed_form import closed_form_candidate
 from tetlux.fem.planner.request import Request
 from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.truncated.solution import TruncatedSolution
+from tetlux.fem.truncated.solve import SolveOnPart, solve_truncated
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 
 AnySolution = Solution | ChargeSolution | ClosedFormSolution
-SolveFully = Callable[[], Sequence[Solution]]
+
+
+@dataclass(frozen=True)
+class FiniteElements:
+    """How finite elements solve the scenes of a request.
+
+    Attributes
+    ----------
+    whole : callable
+        On the whole body, or the mesh that is given.
+    part : callable
+        On the surface of a part, given the medium of each scene and the regions in it.
+    """
+
+    whole: Callable[[], Sequence[Solution]]
+    part: SolveOnPart
+
+
 Report = Callable[[str], None]
 
 
 def solve_by_plan(
-    request: Request, solve_fully: SolveFully, report: Report, *, plan: Plan | None = None
+    request: Request, elements: FiniteElements, report: Report, *, plan: Plan | None = None
 ) -> list[AnySolution]:
     """Solve each scene of a request by the model that its plan chooses.
 
@@ -34,8 +53,7 @@ def solve_by_plan(
     Parameters
     ----------
     request : Request
-    solve_fully : callable
-        Solves by finite elements.
+    elements : FiniteElements
     report : callable
         Called with each line of the plan, and each change of it.
     plan : Plan, optional
@@ -58,12 +76,14 @@ def solve_by_plan(
         found = solve_closed_forms(request) if candidate.suits else ()
     elif plan.chosen == "charges":
         found, missed = _try_charges(request, plan)
+    elif plan.chosen == "truncated":
+        found, missed = _try_part(request, elements, report)
     else:
-        found = solve_fully()
+        found = elements.whole()
     if missed:
         plan = plan.without(plan.chosen, missed)
         report(f"{missed}: going on with {plan.chosen}")
-        return solve_by_plan(request, solve_fully, report, plan=plan)
+        return solve_by_plan(request, elements, report, plan=plan)
     return [replace(solution, plan=plan) for solution in found]
 
 
@@ -94,6 +114,39 @@ def solve_closed_forms(request: Request) -> list[ClosedFormSolution]:
         found.append(replace(solution, readings=read_all(request.detectors, solution)))
     seconds = watch.read()
     return [replace(solution, seconds=seconds) for solution in found]
+
+
+def solve_on_part(request: Request, elements: FiniteElements, report: Report) -> list[TruncatedSolution]:
+    """Solve each scene of a request on the part of the body that light reaches.
+
+    Raises
+    ------
+    InputError
+        If a mesh is given, or light enters or reaches everywhere.
+    """
+    if request.mesh is not None:
+        raise InputError('a mesh is given, and model "truncated" makes its own', remedy='give model="full"')
+    try:
+        box = request.dark_box
+    except InputError as error:
+        raise InputError(f"no part can be cut out: {error.text}", field="model", remedy='give model="full"') from error
+    return solve_truncated(
+        request.bodies,
+        request.inner,
+        request.lights,
+        request.deposits,
+        box,
+        elements.part,
+        tolerance=request.exitance_tolerance,
+        report=report,
+    )
+
+
+def _try_part(request: Request, elements: FiniteElements, report: Report) -> tuple[Sequence[TruncatedSolution], str]:
+    try:
+        return solve_on_part(request, elements, report), ""
+    except InputError as error:
+        return [], reason_of(error)
 
 
 def _try_charges(request: Request, plan: Plan) -> tuple[list[ChargeSolution], str]:

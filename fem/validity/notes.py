@@ -45,12 +45,14 @@ def check_scattering(medium: AnyMedium) -> None:
         )
 
 
-def check_size(body: Body) -> None:
+def check_size(body: Body, *, any_size: bool = False) -> None:
     """Refuse a body whose size and coefficients cannot be in the same unit.
 
     Parameters
     ----------
     body : Body
+    any_size : bool
+        Whether the body may be larger than finite elements can mesh as a whole.
 
     Raises
     ------
@@ -61,7 +63,7 @@ def check_size(body: Body) -> None:
     least, most = min(low for low, _ in ranges), max(high for _, high in ranges)
     if surface.diagonal / least < SMALLEST_BODY:
         size, mean_free_path = "small", least
-    elif surface.diagonal / most > LARGEST_BODY:
+    elif surface.diagonal / most > LARGEST_BODY and not any_size:
         size, mean_free_path = "large", most
     else:
         return
@@ -73,19 +75,21 @@ def check_size(body: Body) -> None:
     )
 
 
-def check_media(body: Body) -> None:
+def check_media(body: Body, *, any_size: bool = False) -> None:
     """Refuse media that cannot be in one body, or whose coefficients do not suit its size.
 
     Parameters
     ----------
     body : Body
+    any_size : bool
+        Whether the body may be larger than finite elements can mesh as a whole.
 
     Raises
     ------
     InputError
     """
     check_compatible(list(body.by_label.values()))
-    check_size(body)
+    check_size(body, any_size=any_size)
 
 
 def check_compatible(media: Sequence[AnyMedium]) -> None:

@@ -115,7 +115,7 @@ class ModulationSpec(Section):
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
 Output = Literal["surface", "volume", "picture", "viewer"]
-Model = Literal["full", "auto", "closed-form", "charges"]
+Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
 TOLERANCES_WITHOUT_MESH = {"closed-form": ("exitance",), "charges": ("exitance", "detectors")}
@@ -163,8 +163,9 @@ class CaseSpec(Section):
     )
     model: Model = Field(
         "full",
-        description="full: finite elements on a mesh; charges: fitted to the boundary, without a mesh; closed-form: "
-        "the exact series of a sphere or slab; auto: the fastest of these that gives what is asked for",
+        description="full: finite elements on a mesh; truncated: the same where light reaches; charges: fitted to the "
+        "boundary, without a mesh; closed-form: the exact series of a sphere or slab; auto: the fastest of these that "
+        "gives what is asked for",
     )
     tolerance: Tolerance = Field(
         DEFAULT_TOLERANCE,
