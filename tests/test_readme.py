@@ -1,4 +1,4 @@
-"""The README's own code."""
+"""The code in README and on the pages of docs."""
 
 import re
 from pathlib import Path
@@ -14,15 +14,20 @@ from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.meshing import TetMesh
 from tetlux.meshing.files.meshes import write_mesh
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[1]
+PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))), "CONTRIBUTING.md")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+def text_of(page: str) -> str:
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", text_of(page), flags=re.DOTALL)
 
 
 def test_the_python_lines_run_and_say_what_they_promise() -> None:
-    first, second, _ = blocks("python")
+    first, second = blocks("docs/python.md", "python")
     names: dict[str, Any] = {}
     exec(first, names)
     solution = names["solution"]
@@ -46,7 +51,7 @@ def test_the_python_lines_run_and_say_what_they_promise() -> None:
 
 
 def test_the_case_file_is_right(tmp_path: Path) -> None:
-    text, _, marble, head = blocks("yaml")
+    text, _, marble, head = blocks("docs/case-files.md", "yaml")
     (tmp_path / "plate.yaml").write_text(text)
     assert [case.name for case in load_cases(tmp_path / "plate.yaml")] == [
         f"plate/medium.sigma_a={value}" for value in (0.001, 0.01, 0.1)
@@ -69,12 +74,12 @@ def test_the_case_file_is_right(tmp_path: Path) -> None:
 
 def test_a_sweep_ends_in_a_plot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pandas")
-    _, sweep, *_ = blocks("yaml")
+    _, sweep, *_ = blocks("docs/case-files.md", "yaml")
     monkeypatch.chdir(tmp_path)
     Path("probe.yaml").write_text(sweep)
     assert main(["run", "probe.yaml", "--quiet", "--jobs", "1"]) == 0
     names: dict[str, Any] = {}
-    exec(blocks("python")[2], names)
+    exec(blocks("docs/case-files.md", "python")[0], names)
     weak, strong = (line.get_ydata() for line in names["axes"].get_lines())
     # More absorption, less light; 5 mm away least where both are strong.
     assert (np.diff(weak) < 0).all()
@@ -88,7 +93,7 @@ def test_a_sweep_ends_in_a_plot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def test_every_key_of_the_case_file_is_explained() -> None:
-    keys = set(re.findall(r"`([a-z0-9_.\[\]]+)`", README))
+    keys = set(re.findall(r"`([a-z0-9_.\[\]]+)`", text_of("docs/case-files.md")))
     for name in CaseSpec.model_fields:
         assert any(key == name or key.startswith((f"{name}.", f"{name}[")) for key in keys), name
     for section, prefixes in (
@@ -128,6 +133,45 @@ def test_every_key_of_the_case_file_is_explained() -> None:
 
 
 def test_the_two_commands_are_there() -> None:
-    install, check = blocks("sh")
+    install, check = blocks("README.md", "sh")
     assert install.strip().endswith("tetlux run hare")
     assert check.strip().endswith("python -m pytest")
+
+
+def test_the_readme_is_short_and_its_code_runs(tmp_path: Path) -> None:
+    assert len(text_of("README.md").encode()) <= 9_000
+    (python,), (case,) = blocks("README.md", "python"), blocks("README.md", "yaml")
+    names: dict[str, Any] = {}
+    exec(python, names)
+    assert names["solution"].readings[0].relative_error < 0.01
+    (tmp_path / "plate.yaml").write_text(case)
+    assert len(load_cases(tmp_path / "plate.yaml")) == 3
+
+
+def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
+    (python,) = blocks("docs/start.md", "python")
+    exec(python, {})
+    (tmp_path / "mine.yaml").write_text(
+        blocks("docs/start.md", "yaml")[0].replace("{file: mine.stl}", "{sphere: {radius: 20}}")
+    )
+    assert load_cases(tmp_path / "mine.yaml")[0].channel_names == ("red", "green", "blue")
+    fibres, tissue = blocks("docs/how-to.md", "yaml")
+    (tmp_path / "fibres.yaml").write_text(fibres)
+    assert load_cases(tmp_path / "fibres.yaml")[0].detector_tolerance == 0.01
+    ball = "surface: {sphere: {radius: 20}}\nlights: [{diffuse: {irradiance: 1}}]\n"
+    (tmp_path / "tissue.yaml").write_text(ball + tissue)
+    assert len(load_cases(tmp_path / "tissue.yaml")[0].channels) == 2
+    names: dict[str, Any] = {}
+    exec(blocks("docs/how-to.md", "python")[0], names)
+    assert (names["sigma_a"], names["sigma_s_prime"]) == pytest.approx((0.01, 1.0), rel=2e-3)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_to_pages_and_headings_that_exist(page: str) -> None:
+    for target in re.findall(r"\]\((?!https?:)([^)]+)\)", text_of(page)):
+        path, _, heading = target.partition("#")
+        place = (ROOT / page).parent / path if path else ROOT / page
+        assert place.exists(), target
+        if heading:
+            headings = re.findall(r"^#+ (.+)$", place.read_text(encoding="utf-8"), flags=re.MULTILINE)
+            assert heading in {re.sub(r"[^a-z0-9 -]", "", each.lower()).replace(" ", "-") for each in headings}, target
