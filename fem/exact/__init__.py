@@ -4,18 +4,23 @@ Each function takes a `Medium` and returns the result for unit power or unit irr
 W/unit², unless the function says otherwise.
 """
 
-from tetlux.fem.exact import (
-    concentric,
-    cylinder,
-    dipole,
-    half_space,
-    layered,
-    monte_carlo,
-    slab,
-    slab_plane,
-    sphere,
-    sphere_light,
-)
+import importlib
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tetlux.fem.exact import (
+        concentric,
+        cylinder,
+        dipole,
+        half_space,
+        layered,
+        monte_carlo,
+        slab,
+        slab_plane,
+        sphere,
+        sphere_light,
+    )
 
 __all__ = [
     "concentric",
@@ -29,3 +34,10 @@ __all__ = [
     "sphere",
     "sphere_light",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a closed form when it is asked for: a run needs few of them, and all take .05 s to import."""
+    if name in __all__:
+        return importlib.import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
