@@ -1,1 +1,1 @@
-"""Light that varies in time: moments of what detectors read after a pulse."""
+"""Light that varies in time: what detectors read after a pulse, and the moments of that."""

@@ -8,21 +8,19 @@ the number of points. Each point is a solve with a complex shift, with all that 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
-from tetlux.fem.models.modulation import SPEED_OF_LIGHT
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
-from tetlux.meshing.arrays import FloatArray, NumberArray
+from tetlux.fem.transient.laplace import check_arguments, read_with_shift, seconds_per_length
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.surface import MILLIMETRES
 
 # Points on the circle, of which half are solved for, the others being their conjugates; and its radius over a lower
 # bound of the distance of the nearest pole: coefficients are off by less than this to the power of POINTS, 1.5e-5.
@@ -114,26 +112,17 @@ def moments(
         raise InputError(f"order is {order}; give a whole number from 1 to {MOST_ORDERS}.", field="order")
     if len(detectors) == 0:
         raise InputError("moments are of what detectors read, and there is none; give at least one.", field="detectors")
-    if system.shift != 0:
-        raise InputError("the system is that of modulated light; give one with shift=0.", field="system")
-    if not 1.0 <= outside_index <= 10.0:
-        raise InputError(f"outside_index is {outside_index:g}; give 1 or more.", field="outside_index")
+    check_arguments(system, outside_index)
     radius = RADIUS * _nearest_pole(system.coefficients, system.true_surface.diagonal)
     angles = 2.0 * np.pi * (np.arange(POINTS // 2) + 0.5) / POINTS
     circle = radius * np.exp(1j * angles)
-    values = np.array([_read(system, shift, lights, detectors) for shift in circle.tolist()])
+    found = [read_with_shift(system, shift, lights, detectors) for shift in circle.tolist()]
+    values = np.array([[[reading.exitance for reading in row] for row in rows] for rows in found])
     powers = np.exp(-1j * np.outer(np.arange(order + 1), angles)) / radius ** np.arange(order + 1)[:, None]
     coefficients = np.real(np.tensordot(powers, values, axes=1)) * 2.0 / POINTS
     factors = [(-1) ** m * math.factorial(m) * seconds_per_length(system, outside_index) ** m for m in range(order + 1)]
     raw = coefficients * np.array(factors)[:, None, None] / coefficients[0]
     return Moments(raw, coefficients[0])
-
-
-def _read(system: System, shift: complex, lights: Sequence[Light], detectors: Sequence[Detector]) -> NumberArray:
-    """Exitance at each detector for each light, (l, d), with a shift."""
-    solution = replace(system, shift=shift).solve(lights)
-    parts = solution.of_lights or (solution,)
-    return np.array([[reading.exitance for reading in read_all(detectors, part)] for part in parts])
 
 
 def _nearest_pole(coefficients: Coefficients, diagonal: float) -> float:
@@ -146,9 +135,3 @@ def _nearest_pole(coefficients: Coefficients, diagonal: float) -> float:
     diffusion = float(np.min(coefficients.diffusion))
     length = diagonal / (6.0 * robin) + diagonal**2 / (4.0 * np.pi**2 * diffusion)
     return float(np.min(coefficients.sigma_a)) + 1.0 / length
-
-
-def seconds_per_length(system: System, outside_index: float) -> float:
-    """``n/c``, s/unit."""
-    index = system.coefficients.outer.eta * outside_index
-    return float(index * MILLIMETRES[system.mesh.unit] / SPEED_OF_LIGHT)

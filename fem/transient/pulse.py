@@ -8,15 +8,14 @@ point is a solve with a complex shift, with all that is subtracted and by quadra
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
-from tetlux.fem.transient.moments import seconds_per_length
+from tetlux.fem.transient.laplace import check_arguments, read_with_shift, seconds_per_length
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -98,12 +97,13 @@ def read_pulse(
         )
     if len(detectors) == 0:
         raise InputError("a pulse is read by detectors, and there is none; give at least one.", field="detectors")
-    if system.shift != 0:
-        raise InputError("the system is that of modulated light; give one with shift=0.", field="system")
+    check_arguments(system, outside_index)
     points, weights = _contour(float(at.min()), float(at.max()))
     shifts = points * seconds_per_length(system, outside_index)
-    found = [_read(system, shift, lights, detectors) for shift in shifts.tolist()]
-    values, errors = (np.array(each) for each in zip(*found, strict=True))
+    found = [read_with_shift(system, shift, lights, detectors) for shift in shifts.tolist()]
+    values = np.array([[[reading.exitance for reading in row] for row in rows] for rows in found])
+    relative = np.array([[[reading.relative_error for reading in row] for row in rows] for rows in found], dtype=float)
+    errors = np.abs(values) * relative
     factors = weights * np.exp(np.outer(at, points))
     exitance = np.tensordot(factors, values, axes=1).imag / np.pi
     error = np.sqrt(np.tensordot(np.abs(factors) ** 2, errors**2, axes=1)) / np.pi
@@ -118,14 +118,3 @@ def _contour(first: float, last: float) -> tuple[NumberArray, NumberArray]:
     step, scale = extent / POINTS, (4.0 * np.pi * ANGLE - np.pi**2) / extent * POINTS / last
     along = (np.arange(POINTS) + 0.5) * step
     return scale * (1.0 + np.sin(1j * along - ANGLE)), 1j * scale * step * np.cos(1j * along - ANGLE)
-
-
-def _read(
-    system: System, shift: complex, lights: Sequence[Light], detectors: Sequence[Detector]
-) -> tuple[NumberArray, FloatArray]:
-    """Exitance at each detector for each light, and its error, (l, d) each, with a shift."""
-    solution = replace(system, shift=shift).solve(lights)
-    readings = [read_all(detectors, part) for part in solution.of_lights or (solution,)]
-    values = np.array([[reading.exitance for reading in row] for row in readings])
-    relative = np.array([[reading.relative_error for reading in row] for row in readings], dtype=float)
-    return values, np.abs(values) * relative
