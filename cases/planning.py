@@ -7,7 +7,7 @@ from tetlux.cases.file.case import Case
 from tetlux.fem.assessment import Tolerances
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.planner.choose import plan_of
-from tetlux.fem.planner.request import Request, make_request
+from tetlux.fem.planner.request import MODULATED, Request, make_request
 
 AUTO = "auto"
 
@@ -53,7 +53,7 @@ def request_of(case: Case, runs: int = 1) -> Request:
     elif case.comparison is not None:
         need = "compare is of finite elements"
     elif any(case.frequencies):
-        need = "modulated light is solved on a mesh"
+        need = MODULATED
     return make_request(
         case.mesh or case.surface,
         [channel.media for channel in case.channels],

@@ -5,12 +5,18 @@ from dataclasses import replace
 
 from tetlux.cases.file.case import Case
 from tetlux.cases.planning import AUTO, plan_case, request_of
-from tetlux.cases.write.results import AnySolution
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.planner.solve import FiniteElements, report_plan, solve_by_plan, solve_closed_forms, solve_on_part
+from tetlux.fem.planner.solve import (
+    AnySolution,
+    FiniteElements,
+    report_plan,
+    solve_by_plan,
+    solve_closed_forms,
+    solve_on_part,
+)
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve

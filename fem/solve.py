@@ -17,7 +17,7 @@ from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner.options import Options, check_options_of
-from tetlux.fem.planner.request import make_request
+from tetlux.fem.planner.request import MODULATED, make_request
 from tetlux.fem.planner.solve import AnySolution, FiniteElements, solve_by_plan, solve_closed_forms, solve_on_part
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import Report, no_report, solve_each
@@ -285,7 +285,7 @@ def _solve_channels(
             ),
             detectors=options["detectors"],
             mesh=options["mesh"],
-            need_of_mesh="modulated light is solved on a mesh" if options["frequency"] else "",
+            need_of_mesh=MODULATED if options["frequency"] else "",
         )
         elements = FiniteElements(
             lambda: solve_each(body, channels, scenes, **options),

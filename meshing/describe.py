@@ -63,3 +63,9 @@ def _summarize(value: object) -> str:
 def _truncate(text: str, longest: int) -> str:
     line = " ".join(text.split())
     return line if len(line) <= longest else f"{line[: longest - 3]}..."
+
+
+def percent(share: float) -> str:
+    """A share in per cent with two digits, such as ``2 %``, ``1e-6 %`` or ``130 %``."""
+    figure = 100.0 * share
+    return f"{figure:.2g} %" if figure < 99.5 else f"{figure:.0f} %"

@@ -1,7 +1,6 @@
 """Detectors of a case: built from the case file, read, and written as ``detectors.csv``."""
 
 import csv
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,11 +10,13 @@ import numpy as np
 
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.schema.detectors import DetectorSpec
+from tetlux.cases.plain import finite
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import read, read_all
 from tetlux.fem.outcome.exitance_field import Dark, ExitanceField
+from tetlux.meshing.describe import percent
 from tetlux.meshing.surface.surface import Surface
 
 # Columns of errors of a reading, relative.
@@ -82,21 +83,11 @@ def read_detectors(
                     "exitance": abs(reading.exitance) if modulated else reading.exitance,
                     "power": abs(reading.power) if modulated and reading.power is not None else reading.power,
                     **({"phase": float(lag(np.asarray(reading.exitance)))} if modulated else {}),
-                    "relative_error": _finite(reading.relative_error),
-                    "model_error": _finite(reading.model_error),
+                    "relative_error": finite(reading.relative_error),
+                    "model_error": finite(reading.model_error),
                 }
             )
     return rows
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None
-
-
-def _percent(share: float) -> str:
-    """A share in per cent, with two digits."""
-    figure = 100.0 * share
-    return f"{figure:.2g} %" if figure < 99.5 else f"{figure:.0f} %"
 
 
 def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
@@ -107,8 +98,8 @@ def describe_readings(rows: Sequence[dict[str, Any]], unit: str) -> list[str]:
     for row in whole[:MOST_LINES]:
         value, what = (row["exitance"], f"W/{unit}²") if row["power"] is None else (row["power"], "W")
         name = f"{row['name']}, {row['channel']}" if several else row["name"]
-        error = "" if row["relative_error"] is None else f" ± {_percent(row['relative_error'])}"
-        model = "" if row["model_error"] is None else f" (diffusion itself: ± {_percent(row['model_error'])})"
+        error = "" if row["relative_error"] is None else f" ± {percent(row['relative_error'])}"
+        model = "" if row["model_error"] is None else f" (diffusion itself: ± {percent(row['model_error'])})"
         phase = f", {row['phase']:.4g}° behind" if "phase" in row else ""
         lines.append(f"{name}: {value:.5g} {what}{error}{phase}{model}")
     if len(whole) > MOST_LINES:

@@ -1,7 +1,6 @@
 """`write_viewer`: one page that shows a run, with all that it needs inside it."""
 
 import json
-import math
 from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from tetlux.cases.picture.draw import PictureScene
 from tetlux.cases.picture.stage import arrow_ends, choose_camera, exitance_range
 from tetlux.cases.picture.view import PANEL
+from tetlux.cases.plain import finite
 from tetlux.cases.viewer.colour_maps import colour_maps
 from tetlux.cases.viewer.pack import pack_bytes, pack_floats, pack_indices
 from tetlux.cases.write.fields import Field, surface_fields, volume_fields
@@ -156,7 +156,7 @@ def _detectors(readings: Sequence[dict[str, Any]], origin: FloatArray) -> list[d
                 "channel": row["channel"],
                 "light": row["light"],
                 "exitance": row["exitance"],
-                "error": _finite(row["relative_error"]),
+                "error": finite(row["relative_error"]),
             }
         )
     return list(found.values())
@@ -167,12 +167,8 @@ def _errors(results: Results) -> list[dict[str, Any]]:
     return [
         {
             "channel": channel.name,
-            "whole": _finite(solution.error_estimate),
-            "everywhere": _finite(getattr(solution, "everywhere_error", None)),
+            "whole": finite(solution.error_estimate),
+            "everywhere": finite(getattr(solution, "everywhere_error", None)),
         }
         for channel, solution in zip(results.case.channels, results.solutions, strict=True)
     ]
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else value

@@ -1,10 +1,10 @@
 """``plan`` of a summary: what was planned, and what came of it."""
 
-import math
 from typing import Any
 
-from tetlux.cases.write.results import AnySolution
+from tetlux.cases.plain import finite
 from tetlux.fem.outcome.plan import Candidate, Plan
+from tetlux.fem.planner.solve import AnySolution
 
 
 def describe_plan(plan: Plan, solutions: tuple[AnySolution, ...]) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def describe_plan(plan: Plan, solutions: tuple[AnySolution, ...]) -> dict[str, A
         "predicted": {"seconds": chosen.seconds, "error": chosen.error},
         "measured": {
             "seconds": max(solution.seconds["total"] for solution in solutions),
-            "error": _finite(max(solution.error_estimate for solution in solutions)),
+            "error": finite(max(solution.error_estimate for solution in solutions)),
         },
     }
 
@@ -39,12 +39,8 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
         "model": candidate.model,
         "suits": candidate.suits,
-        "error": _finite(candidate.error),
-        "seconds": _finite(candidate.seconds),
-        "bytes": _finite(candidate.bytes),
+        "error": finite(candidate.error),
+        "seconds": finite(candidate.seconds),
+        "bytes": finite(candidate.bytes),
         "reason": candidate.reason,
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -10,17 +10,15 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
 from tetlux.fem.media.medium import Medium
-from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
 from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
+from tetlux.fem.planner.solve import AnySolution
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
-
-AnySolution = Solution | ChargeSolution | ClosedFormSolution
 
 
 @dataclass(frozen=True, eq=False)

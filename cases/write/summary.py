@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 
 from tetlux.cases.file.case import Case, Channel
+from tetlux.cases.plain import finite
 from tetlux.cases.write.media_rows import media_rows
 from tetlux.cases.write.plan_record import describe_plan
-from tetlux.cases.write.results import AnySolution, Results, solutions_by_light
+from tetlux.cases.write.results import Results, solutions_by_light
 from tetlux.cases.write.run_record import describe_run
 from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.solve import AnySolution
 from tetlux.fem.truncated import TruncatedSolution
 from tetlux.fem.validity.local import Validity
 from tetlux.fem.validity.notes import NEAR, THIN
@@ -114,7 +116,7 @@ def _channel(
             "max": float(exitance.max()),
             "mean": _size(solution.power.exited) / area,
         },
-        "error_estimate": _finite(solution.error_estimate),
+        "error_estimate": finite(solution.error_estimate),
         **_figures_of_model(solution),
     }
     if several:
@@ -126,10 +128,10 @@ def _channel(
 def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
     """The figures that only one of the models has."""
     if isinstance(solution, ClosedFormSolution):
-        return {"closed_form": {"name": solution.exact.name, "bound": _finite(solution.error_bound)}}
+        return {"closed_form": {"name": solution.exact.name, "bound": finite(solution.error_bound)}}
     if isinstance(solution, ChargeSolution):
         # The fluence has a pole at each source, so there is no largest value.
-        return {"charges": {"count": solution.charges, "bound": _finite(solution.error_bound)}}
+        return {"charges": {"count": solution.charges, "bound": finite(solution.error_bound)}}
     of_fields = {"everywhere_error": solution.everywhere_error, "volume_error": solution.volume_error}
     fluence = modulus(solution.fluence)
     return {
@@ -137,10 +139,6 @@ def _figures_of_model(solution: AnySolution) -> dict[str, Any]:
         **{name: value for name, value in of_fields.items() if math.isfinite(value)},
         **({"validity": _validity(solution.validity)} if solution.validity else {}),
     }
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _labels(mesh: TetMesh) -> list[dict[str, Any]]:

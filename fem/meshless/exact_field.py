@@ -276,7 +276,6 @@ def _norm_around_entry(exitance: Field, circumference: Field, depth: float, room
 def _largest_on_rim(shape: Slab, medium: Medium, sources: IdealSources, fluence: Field) -> float:
     """The largest right-hand side ``|phi/(2A) + D dphi/dn|`` on the rim, W/unit²."""
     half, step = 0.5 * shape.width, RIM_STEP * medium.mean_free_path
-    half, step = 0.5 * shape.width, RIM_STEP * medium.mean_free_path
     depths = np.unique(np.append(np.linspace(0.0, shape.depth, RIM_DEPTHS), -sources.positions[:, 2]))
     largest = 0.0
     for axis in (0, 1):

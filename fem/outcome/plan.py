@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from tetlux.meshing.describe import percent
+
 Model = Literal["closed-form", "charges", "truncated", "full"]
 
 # What a candidate is called in a plan is padded to this width.
@@ -108,11 +110,6 @@ def cheapest(candidates: tuple[Candidate, ...]) -> Model:
     """The model of the cheapest candidate that suits; the last, if none does."""
     suitable = [each for each in candidates if each.suits] or [candidates[-1]]
     return min(suitable, key=lambda each: each.seconds).model
-
-
-def percent(share: float) -> str:
-    """A relative error for people, such as ``2 %`` or ``1e-6 %``."""
-    return f"{100.0 * share:.2g} %"
 
 
 def seconds_in_words(seconds: float) -> str:

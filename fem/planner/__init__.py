@@ -1,10 +1,11 @@
 """Choose the simplest model that gives what is asked for: ``tetlux.fem.plan``, and ``solve(..., model="auto")``.
 
-request      what is asked for, as plain data
-closed_form, charges, full  what each model would cost, and whether it can give that
-choose       the plan
-solve        solves by the plan
-options      the arguments of `tetlux.fem.solve`, and which of them are for finite elements alone
+request    what is asked for, as plain data
+candidate  what all candidates share
+closed_form, charges, truncated, full  what each model would cost, and whether it can give what is asked for
+choose     the plan
+solve      solves by the plan
+options    the arguments of `tetlux.fem.solve`, and which of them are for finite elements alone
 """
 
 from tetlux.fem.planner.choose import plan

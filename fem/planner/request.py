@@ -26,6 +26,9 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
+# Why modulated light needs a mesh.
+MODULATED = "modulated light is solved on a mesh"
+
 
 @dataclass(frozen=True, eq=False)
 class Request:

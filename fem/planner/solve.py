@@ -8,7 +8,7 @@ from tetlux.fem.meshless.closed_form import ClosedFormSolution, solution_of
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.outcome.detectors import read_all
-from tetlux.fem.outcome.plan import Plan, percent, seconds_in_words
+from tetlux.fem.outcome.plan import Plan, seconds_in_words
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner.candidate import reason_of
 from tetlux.fem.planner.charges import most_charges
@@ -18,6 +18,7 @@ from tetlux.fem.planner.request import Request
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.truncated.solution import TruncatedSolution
 from tetlux.fem.truncated.solve import SolveOnPart, solve_truncated
+from tetlux.meshing.describe import percent
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 
