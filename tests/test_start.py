@@ -39,6 +39,12 @@ def test_the_solver_imports_no_pictures_and_no_readers() -> None:
     assert imported("import tetlux.fem", (*PICTURES, *READERS, *SOLVERS, "pydantic")) == []
 
 
+def test_closed_forms_are_imported_when_they_are_asked_for() -> None:
+    names = ("tetlux.fem.exact.monte_carlo", "tetlux.fem.exact.cylinder")
+    assert imported("import tetlux.fem.exact", names) == []
+    assert imported("from tetlux.fem import exact\nexact.cylinder.point_exitance", names) == [names[1]]
+
+
 @needs("embreex")
 def test_a_run_imports_what_it_uses(tmp_path: Path) -> None:
     code = (
