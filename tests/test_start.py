@@ -40,9 +40,9 @@ def test_the_solver_imports_no_pictures_and_no_readers() -> None:
 
 
 def test_closed_forms_are_imported_when_they_are_asked_for() -> None:
-    names = ("tetlux.fem.exact.monte_carlo", "tetlux.fem.exact.cylinder")
+    names = ("tetlux.fem.exact.monte_carlo",)
     assert imported("import tetlux.fem.exact", names) == []
-    assert imported("from tetlux.fem import exact\nexact.cylinder.point_exitance", names) == [names[1]]
+    assert imported("from tetlux.fem import exact\nassert exact.monte_carlo.__doc__", names) == [*names]
 
 
 @needs("embreex")
