@@ -11,7 +11,7 @@ from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.system import MeshSolution
-from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 
 # How progress lines call errors of fields.
 FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
@@ -45,6 +45,13 @@ class Tolerances:
         """Those of the exitance everywhere and of the fluence inside that are given."""
         given: dict[Where, float | None] = {"surface": self.everywhere, "inside": self.volume}
         return {where: tolerance for where, tolerance in given.items() if tolerance is not None}
+
+    @property
+    def places(self) -> tuple[FloatArray, float] | None:
+        """Where detectors are (d, 3), and their tolerance, if they have one."""
+        if self.readings is None or not self.placed:
+            return None
+        return np.array([each.position for each in self.placed]), self.readings
 
     @property
     def need_quadratic(self) -> bool:

@@ -15,7 +15,6 @@ the tolerance of .01, 98 % lie within twice the bar, and 94 % of those that are 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from tetlux.fem.charges.check import exitance_error
@@ -163,7 +162,7 @@ def ripple_errors(
 ) -> FloatArray:
     """Errors of the exitance at points (d, 3) by ripples of the residual around them, (d,), W/unit²."""
     squares = np.abs(exitance_error(equation, residual, spacing)) ** 2
-    near = cKDTree(samples.points).query(points, k=min(AVERAGED, len(samples)))[1]
+    near = samples.tree.query(points, k=min(AVERAGED, len(samples)))[1]
     return np.asarray(np.sqrt(squares[near.reshape(len(points), -1)].mean(axis=1)))
 
 

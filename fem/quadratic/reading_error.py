@@ -8,7 +8,8 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, Number
 from tetlux.meshing.describe import one_line
 
-# Relative error that is always added, for errors that gradients do not show, such as those of the surface itself.
+# Relative error that is always added, for errors that gradients do not show, such as those of the surface itself. With
+# 5e-5 a reading with the half-space subtracted was off by 2.2 bars, and of 130 random readings 8 % by more than 2.
 LEAST_RELATIVE_ERROR = 5e-4
 
 
