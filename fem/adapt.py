@@ -86,7 +86,7 @@ class Problem:
 
     @property
     def groups(self) -> list[list[int]]:
-        """Scenes that are solved for together, those of the shortest mean free path, which need the finest mesh, first."""
+        """Scenes that are solved for together; first those of the shortest mean free path, for the finest mesh."""
         groups: dict[int, list[int]] = {}
         for scene in range(len(self.lights)):
             first = self.emitters[scene].lit_in if scene in self.emitters else scene

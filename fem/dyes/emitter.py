@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.error.estimate import weigh_residual
-from tetlux.fem.dyes.placed import Dyes, power_of
+from tetlux.fem.dyes.direct import DirectLight
 from tetlux.fem.dyes.glow import Excitation, Glow
+from tetlux.fem.dyes.placed import Dyes, power_of
+from tetlux.fem.error.estimate import weigh_residual
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.power import DyePower
@@ -33,17 +34,25 @@ class DyeEmitter:
     frequency : float
         Hz.
     mass : {"lumped", "consistent"}
+    deposits : tuple of Deposit
+        Of the lights of that scene.
     """
 
     dyes: Dyes
     lit_in: int
     frequency: float
     mass: Lumping
+    deposits: tuple[Deposit, ...]
 
     def lights_on(self, lit: MeshSolution, system: System) -> SplitLights:
         """What the dyes emit by each light that excites them."""
-        weights = self.dyes.weights(lit.solution.mesh, 2.0 * math.pi * self.frequency)
-        excitation = Excitation(lit.solution, system.coefficients, self.mass, weights)
+        mesh, coefficients = lit.solution.mesh, system.coefficients
+        weights = self.dyes.weights(mesh, 2.0 * math.pi * self.frequency)
+        direct = tuple(
+            DirectLight(mesh, coefficients, deposit.evaluate_on(mesh, system.true_surface, coefficients))
+            for deposit in self.deposits
+        )
+        excitation = Excitation(lit.solution, coefficients, self.mass, weights, direct)
         return split_glows(
             [
                 Deposit(Ledger(incident=glow.at_nodes.sum().item()), SourceTerms(volume_sources=(glow,)))

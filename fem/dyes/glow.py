@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from tetlux.fem.dyes.direct import DirectLight
 from tetlux.fem.dyes.near_sources import integrate_near_sources
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.coefficients import Coefficients, at_cells
@@ -16,7 +17,7 @@ from tetlux.fem.quadratic.error import local_residual
 from tetlux.fem.quadratic.operator import STOP_RESIDUAL_OF_DUALS
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import BoolArray, FloatArray, NumberArray, sum_by_index
+from tetlux.meshing.arrays import BoolArray, FloatArray, Number, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.topology import EDGES
@@ -39,12 +40,15 @@ class Excitation:
     mass : {"lumped", "consistent"}
     weights : (m,) ndarray, real or complex
         Emitted power over the fluence, in each tetrahedron, 1/unit.
+    direct : tuple of DirectLight
+        Each light before it is scattered.
     """
 
     whole: Solution
     coefficients: Coefficients
     mass: Lumping
     weights: NumberArray
+    direct: tuple[DirectLight, ...]
     # By the identity of a dual of the emission: this dual, and that of the excitation.
     _duals: dict[int, tuple[NumberArray, NumberArray]] = field(default_factory=dict)
 
@@ -96,6 +100,10 @@ class Glow:
         return self.field.of_lights[self.light]
 
     @property
+    def _direct(self) -> DirectLight:
+        return self.field.direct[self.light]
+
+    @property
     def mesh(self) -> TetMesh:
         """The mesh of both."""
         return self.solution.mesh
@@ -111,7 +119,7 @@ class Glow:
         quadratic, weights = self.solution.quadratic, self.field.weights
         assert quadratic is not None
         space = quadratic.operator.space
-        load = weighted_product(space, weights, quadratic.fluence)
+        load = weighted_product(space, weights, quadratic.fluence) + self._direct.in_space(space, weights)
         for each in quadratic.patches:
             near = integrate_near_sources(space, each.patch)
             load = load + sum_by_index(space.cells[near.cells], weights[near.cells, None] * near.values, space.size)
@@ -120,11 +128,12 @@ class Glow:
     @property
     def density(self) -> FloatArray:
         """Modulus of what is emitted in each tetrahedron, (m,), W/unit³; near sources that of the nodes."""
-        return np.abs(self.field.weights * self.solution.fluence[self.mesh.tetrahedra].mean(axis=1))
+        return np.asarray(np.abs(self.field.weights * self.solution.fluence[self.mesh.tetrahedra].mean(axis=1)))
 
-    def integrate(self, cells: BoolArray) -> complex:
-        """The integral of the exciting fluence over some tetrahedra of the mesh, (m,), W unit."""
-        return self._load(cells.astype(np.float64)).sum().item()
+    def integrate(self, cells: BoolArray) -> Number:
+        """The integral of the exciting light over some tetrahedra of the mesh, (m,), W unit."""
+        total: Number = self._load(cells.astype(np.float64)).sum().item()
+        return total
 
     def _load(self, weights: NumberArray) -> NumberArray:
         """Integrals of the fluence times weights (m,) and each hat function, (n,).
@@ -133,16 +142,14 @@ class Glow:
         """
         mesh, fluence, volumes = self.mesh, self.solution.fluence, self.mesh.volumes
         values = fluence[mesh.tetrahedra]
-        if self.field.mass == "lumped":
-            shares = values / 4.0
-        else:
-            shares = (values + values.sum(axis=1, keepdims=True)) / 20.0
+        lumped = self.field.mass == "lumped"
+        shares = values / 4.0 if lumped else (values + values.sum(axis=1, keepdims=True)) / 20.0
         load = sum_by_index(mesh.tetrahedra, (weights * volumes)[:, None] * shares, len(mesh.points))
         load = self._within_layers(load, weights)
         for patch, missing in zip(self.solution.patches, self._missing, strict=True):
             cells = np.flatnonzero(patch.cells)
             load = load + sum_by_index(mesh.tetrahedra[cells], weights[cells, None] * missing, len(mesh.points))
-        return load
+        return np.asarray(load + self._direct.at_nodes(weights))
 
     def _within_layers(self, load: NumberArray, weights: NumberArray) -> NumberArray:
         """The load where light fades in layers thinner than tetrahedra, see `tetlux.fem.operators.fitting`.

@@ -51,7 +51,9 @@ class Dyes:
     def weights(self, mesh: TetMesh, omega: float) -> NumberArray:
         """Emitted power over the fluence in each tetrahedron of a mesh, (m,), 1/unit, of light modulated at omega."""
         shares = [each.fluorophore.absorption * each.fluorophore.emitted_share(omega) for each in self.placed]
-        return np.sum([share * each.cells(mesh) for share, each in zip(shares, self.placed, strict=True)], axis=0)
+        return np.asarray(
+            np.sum([share * each.cells(mesh) for share, each in zip(shares, self.placed, strict=True)], axis=0)
+        )
 
     __repr__ = one_line
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem
 from tetlux.fem.assessment import Tolerances
-from tetlux.fem.dyes.placed import Dyes, place_dyes
 from tetlux.fem.dyes.emitter import DyeEmitter, split_glows
+from tetlux.fem.dyes.placed import Dyes, place_dyes
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.kept_fits import KeptFits, fits_of, keep_fits
 from tetlux.fem.known.split import Subtract, check_lights, replace_fitted, split_lights
@@ -19,7 +19,7 @@ from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.scenes import Scenes, build_scenes
+from tetlux.fem.scenes import build_scenes
 from tetlux.fem.solve_scenes import Report, check_tolerances, no_report, solve_problem
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
@@ -170,16 +170,19 @@ def solve_pairs(
         for each in lights:
             check_lights(each)
         split = [
-            split_lights(own, scenes.bodies[i], subtracted, tolerance=wanted, kept=kept, scene=i, shift=scenes.shifts[i])
+            split_lights(
+                own, scenes.bodies[i], subtracted, tolerance=wanted, kept=kept, scene=i, shift=scenes.shifts[i]
+            )
             for i, own in enumerate(lights)
         ]
+        deposits = [tuple(light.deposit_in(scenes.bodies[i]) for light in own) for i, own in enumerate(lights)]
         # What dyes emit follows on each mesh.
         split += [split_glows([Deposit()] * len(own)) for own in lights]
         dark = Dark(scenes.surface, scenes.bodies[0].outer)
         tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
-    emitters = {count + i: DyeEmitter(dyes, i, frequency[i], mass) for i in range(count)}
+    emitters = {count + i: DyeEmitter(dyes, i, frequency[i], mass, deposits[i]) for i in range(count)}
     problem = Problem(scenes, split, mass, limit, watch, emitters=emitters)
     found = solve_problem(problem, tolerances, detectors, mesh, most_tetrahedra, report, cache=cache)
     keep_fits(found[0].mesh, kept)
@@ -200,9 +203,7 @@ def _media(
             raise InputError("media by label need a mesh with labelled tetrahedra; for a surface give regions.")
         dyes = place_dyes(fluorophores, mesh, None)
         labelled = resolve_media(mesh, list(excitation))  # type: ignore[arg-type]
-        emitted = [
-            dict.fromkeys(labelled[0], each) if isinstance(each, AnyMedium) else each for each in emission
-        ]
+        emitted = [dict.fromkeys(labelled[0], each) if isinstance(each, AnyMedium) else each for each in emission]
         return dyes, [*map(dyes.add_to, labelled), *emitted], list(regions)
     dyes = place_dyes(fluorophores, mesh, len(regions))
     body_media = [dyes.add_to({0: each})[0] for each in excitation if isinstance(each, AnyMedium)]
