@@ -130,15 +130,17 @@ def _read_regions(
 
 
 def read_emission(
-    document: Document, spec: FluorescenceSpec, body: CaseBody, reader: Reader
-) -> tuple[CaseBody, tuple[Fluorophore, ...]]:
-    """Read the body with its media at the wavelength that dyes emit, and the dyes.
+    document: Document, spec: FluorescenceSpec | None, body: CaseBody, reader: Reader
+) -> tuple[CaseBody | None, tuple[Fluorophore, ...]]:
+    """Read the body with its media at the wavelength that dyes emit, and the dyes; None and none without dyes.
 
     Raises
     ------
     InputError
         With the file, the line and the key.
     """
+    if spec is None:
+        return None, ()
     key: Key = ("fluorescence",)
     dyes, count = [], len(body.media)
     whole = body.surface.points if body.mesh is None else body.mesh.points

@@ -97,9 +97,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         _check_for_charges(document, body)
     names = light_names(spec)
     check_unique_names(document, "lights", names)
-    emitting, dyes = (
-        (None, ()) if spec.fluorescence is None else read_emission(document, spec.fluorescence, body, reader)
-    )
+    emitting, dyes = read_emission(document, spec.fluorescence, body, reader)
     all_names = channels if emitting is None else names_with_emission(channels)
     _check_value_names(document, all_names, names)
     frequencies = _build_frequencies(document, spec, body)
