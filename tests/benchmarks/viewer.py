@@ -1,8 +1,9 @@
 """The viewer in headless Chromium, drawn in software: ``python -m tests.benchmarks.viewer [PAGE...]``.
 
-For each page its triangles and size, the seconds from opening it to its first frame, and frames per second while it is turned by
-the mouse, in windows of a desktop and of a phone. Frames are counted when the canvas has been drawn and read, so that
-none waits in a queue. Without pages, the hare that ships and one of 100,000 triangles made of it, both with volume.
+For each page its triangles and size, the seconds from opening it to its first frame, and frames per second while the
+mouse turns it, in windows of a desktop and of a phone. Frames are counted when the canvas has been drawn and read, so
+that none waits in a queue. Without pages, the hare that ships and one of 100,000 triangles made of it, both with
+volume.
 """
 
 import sys
