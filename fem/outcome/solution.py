@@ -17,6 +17,7 @@ from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import DyePower, Power
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.outcome.shown import Shown
 from tetlux.fem.quadratic.error import fluence_with_error
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
@@ -29,7 +30,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Shown):
     """Light in one body, solved.
 
     Attributes
