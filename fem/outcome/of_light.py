@@ -65,6 +65,8 @@ def solution_of_light(
         tuple(each.patch for each in subtractions),
         terms.transmitted_irradiance,
         limited_power=limited_power,
+        known_absorption=tuple(each.terms.absorbed for each in subtractions),
+        fitting=operator.fitting,
     )
     exited = (mesh.boundary_node_areas @ solution.exitance).item() + sum(each.terms.exited for each in subtractions)
     return replace(solution, power=replace(ledger, exited=exited))
