@@ -88,9 +88,7 @@ def share_mesh(
     checked = build_scenes(surface, None, medium, regions, len(scenes), frequency, outside_index)
     tolerances = _place(tolerances, detectors, checked)
     split = [
-        split_lights(
-            lights, body, "fitted", tolerance=wanted, readings=tolerances.places, kept=KeptFits(), shift=shift
-        )
+        split_lights(lights, body, "fitted", tolerance=wanted, readings=tolerances.places, kept=KeptFits(), shift=shift)
         for lights, body, shift in zip(scenes[:pilots], checked.bodies, checked.shifts, strict=False)
     ]
     others = [
