@@ -118,7 +118,7 @@ def test_fitting_goes_on_where_the_exitance_is_below_zero() -> None:
     """A hundred charges meet the tolerance of a hare lit from its side, and leave dark blots behind it."""
     hare, equation = read_surface(library_folder() / "hare.stl"), equation_of(TISSUE)
     entry = hare.project(np.array([[0.0, -30.0, 10.0]]))[0]
-    light = of_points(entry + [0.0, 1.0, 0.0])
+    light = of_points(entry + np.array([0.0, 1.0, 0.0]))
     few = fit_charges(hare, equation, light, tolerance=0.02)
     assert few.errors.estimate < 0.02
     assert few.negative_share > 0.02

@@ -1,4 +1,4 @@
-"""Charges that finite elements subtract, fitted for what detectors read, and the bars of what their ripples do there."""
+"""Charges that finite elements subtract, fitted for what detectors read; bars of what their ripples do there."""
 
 import numpy as np
 

@@ -27,6 +27,7 @@ from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.shown import Shown
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -81,6 +82,8 @@ class ChargeSolution(Shown):
         Why this model was chosen, if it was.
     goal : ReadingGoal, optional
         What the charges were fitted for, if it was readings of all lights together.
+    validity : SurfaceValidity, optional
+        Expected errors of diffusion in a body of one medium, of all lights together.
     """
 
     surface: Surface
@@ -96,6 +99,7 @@ class ChargeSolution(Shown):
     readings: tuple[Reading, ...] = ()
     plan: Plan | None = None
     goal: ReadingGoal | None = None
+    validity: SurfaceValidity | None = None
 
     mesh, model = None, "charges"
 
@@ -175,6 +179,7 @@ class ChargeSolution(Shown):
             errors=ErrorEstimates(np.nan, np.nan),
             warnings=[],
             goal=None,
+            validity=None,
         )
 
     @cached_property

@@ -25,6 +25,7 @@ from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
@@ -110,6 +111,8 @@ def solve_with_charges(
         solution = charge_solution(
             surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, readings=readings, most=most
         )
+        if not inner:
+            solution = replace(solution, validity=SurfaceValidity(surface, body, deposits))
         solution = replace(solution, readings=read_all(detectors, solution))
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     warnings += _notes_on_tolerances(solution, tolerance, detector_tolerance)
