@@ -132,6 +132,8 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("ModulationSpec", ["modulation."]),
         ("PictureSpec", ["picture."]),
         ("CutSpec", ["picture.cut."]),
+        ("FluorescenceSpec", ["fluorescence."]),
+        ("DyeSpec", ["fluorescence.dyes[]."]),
     ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
             for prefix in prefixes:

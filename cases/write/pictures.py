@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tetlux.cases.file.channels import ALL
+from tetlux.cases.file.channels import ALL, EMISSION
 from tetlux.cases.file.schema.pictures import CutSpec, PictureSpec, file_names
 from tetlux.cases.picture.arrows import light_rays
 from tetlux.cases.picture.cut import cut_open
@@ -51,9 +51,9 @@ def picture_scene(results: Results, readings: Readings) -> PictureScene:
     return PictureScene(
         points=results.surface.points,
         triangles=results.surface.faces,
-        exitance=results.exitance(),
+        exitance=results.shown(),
         unit=case.surface.unit,
-        title=case.name,
+        title=f"{case.name}: {EMISSION}" if case.fluorophores else case.name,
         lights=tuple(ray for light in lights.values() for ray in light_rays(light, case.surface)),
         colours=results.preview if results.has_colours else None,
         up=case.up,
@@ -72,9 +72,12 @@ def scene_of(picture: PictureSpec, results: Results, scene: PictureScene) -> Pic
         scene = replace(scene, toward=toward_camera(picture.camera, results.case.surface, scene.up))
     if picture.shows_fluence:
         return _with_fluence(picture, results, scene)
-    if scene.colours is not None and not picture.chooses_values:
+    if not picture.chooses_values:
         return scene
-    field = _choose(surface_fields(results), picture.field or "exitance", picture)
+    if picture.field or picture.channel or picture.light:
+        field = _choose(surface_fields(results), picture.field or "exitance", picture)
+    else:
+        field = Field("exitance", scene.exitance, f"W/{scene.unit}²")
     return _with_values(replace(scene, colours=None), picture, field)
 
 
