@@ -25,7 +25,7 @@ surface: {sphere: {radius: 10}}
 medium: {sigma_a: [0.02, 0.1], sigma_s_prime: 1.0, eta: 1.4}
 channels: [near, far]
 lights:
-  - {name: glow, point: {position: [0, 0, 6], power: 1.0}}
+  - {name: glow, point: {position: [3, 0, 5], power: 1.0}}
   - {name: room, diffuse: {irradiance: 0.001}}
 tolerance: 0.2
 outputs: [surface, volume, picture]
@@ -69,7 +69,7 @@ def check_colours(path: Path, points: FloatArray, values: FloatArray, share: Any
     """Places on the near side have the colour of their value, but for the lamp's factor."""
     image = panel_of(path)
     # The mark of the point source stands over the body.
-    seen = np.flatnonzero((points[:, 1] < -3) & (np.hypot(points[:, 0], points[:, 2] - 6) > 1))
+    seen = np.flatnonzero((points[:, 1] < -3) & (np.hypot(points[:, 0] - 3, points[:, 2] - 5) > 1))
     assert len(seen) > 50
     off = []
     for i in seen[::7]:
