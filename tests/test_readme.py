@@ -130,6 +130,8 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("FibreSpec", ["detectors[].fibre."]),
         ("CameraSpec", ["camera."]),
         ("ModulationSpec", ["modulation."]),
+        ("PictureSpec", ["picture."]),
+        ("CutSpec", ["picture.cut."]),
         ("FluorescenceSpec", ["fluorescence."]),
         ("DyeSpec", ["fluorescence.dyes[]."]),
     ):

@@ -19,6 +19,7 @@ from tetlux.cases.file.schema.case import CaseSpec, ModulationSpec
 from tetlux.cases.file.sweeps.expand import expand_sweep
 from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
+from tetlux.cases.picture.requests import check_pictures
 from tetlux.cases.picture.view import toward_camera
 from tetlux.cases.start import take_start_seconds
 from tetlux.fem.inputs import unit_vector
@@ -100,6 +101,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     emitting, dyes = read_emission(document, spec.fluorescence, body, reader)
     all_names = channels if emitting is None else names_with_emission(channels)
     _check_value_names(document, all_names, names)
+    check_pictures(document, spec, body.surface, all_names, names)
     frequencies = _build_frequencies(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
     if spec.model == "closed-form":
