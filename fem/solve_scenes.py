@@ -249,7 +249,7 @@ def _with_fields(solution: Solution, tolerances: Tolerances) -> Solution:
     )
 
 
-def check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
+def check_tolerances(given: Tolerances, detectors: Sequence[Detector] | Sequence[Sequence[Detector]]) -> Tolerances:
     """Refuse tolerances out of range, without a detector, or none at all.
 
     A tolerance everywhere is one of the L2 error too.
