@@ -52,6 +52,8 @@ def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
         need = "the output volume is the fluence on a mesh"
     elif case.comparison is not None:
         need = "compare is of finite elements"
+    elif case.fluorophores:
+        need = "what dyes emit is solved for on a mesh"
     elif any(case.frequencies):
         need = MODULATED
     return make_request(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.channels import ALL
+from tetlux.cases.file.channels import ALL, EMISSION
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.solve import solve_case
 from tetlux.cases.viewer import PAGE
@@ -250,9 +250,9 @@ def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> "Picture
     return PictureScene(
         points=results.surface.points,
         triangles=results.surface.faces,
-        exitance=results.exitance(),
+        exitance=results.shown(),
         unit=case.surface.unit,
-        title=case.name,
+        title=f"{case.name}: {EMISSION}" if case.fluorophores else case.name,
         lights=tuple(ray for light in lights.values() for ray in light_rays(light, case.surface)),
         colours=results.preview if results.has_colours else None,
         up=case.up,

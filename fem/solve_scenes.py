@@ -153,24 +153,42 @@ def solve_each(
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
     problem = Problem(checked, split, mass, limit, watch, start)
+    solutions = solve_problem(problem, tolerances, detectors, mesh, most_tetrahedra, report, cache=cache)
+    keep_fits(solutions[0].mesh, kept)
+    return solutions
+
+
+def solve_problem(
+    problem: Problem,
+    tolerances: Tolerances,
+    detectors: Sequence[Detector],
+    mesh: TetMesh | None,
+    most_tetrahedra: int,
+    report: Report,
+    *,
+    cache: bool,
+) -> list[Solution]:
+    """Mesh a body unless a mesh is given, solve for all scenes and refine, and note what a user should know.
+
+    The arguments are those of `solve_each`, checked. Returns a solution for each scene.
+    """
     given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
-    keep_fits(steps[0].solution.mesh, kept)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
-    solutions = []
+    solutions, scenes = [], problem.scenes
     for number, step in enumerate(steps):
-        with watch.stage("solve"):
+        with problem.watch.stage("solve"):
             solution = _with_fields(replace(step.solution, readings=read_all(detectors, step.solution)), tolerances)
-        notes = notes_on(solution, split[number], tolerances.exitance, where)
-        notes += notes_on_readings(solution.readings, detector_tolerance, where)
-        notes += notes_on_fields(solution, everywhere_tolerance, volume_tolerance, where)
-        notes += checked.warnings(number, solution, given=given)
-        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes)), frequency=checked.frequencies[number]))
-    seconds = watch.read()
+        notes = notes_on(solution, problem.lights[number], tolerances.exitance, where)
+        notes += notes_on_readings(solution.readings, tolerances.readings, where)
+        notes += notes_on_fields(solution, tolerances.everywhere, tolerances.volume, where)
+        notes += scenes.warnings(number, solution, given=given)
+        solutions.append(replace(solution, warnings=list(dict.fromkeys(notes)), frequency=scenes.frequencies[number]))
+    seconds = problem.watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tetlux.meshing.describe import percent
+from tetlux.meshing.html import html_table
 
 Model = Literal["closed-form", "charges", "truncated", "full"]
 
@@ -110,6 +111,13 @@ class Plan:
                 f"  diffusion itself is off by {near}{percent(self.model_error)} elsewhere, whatever the model"
             )
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        title, *lines = str(self).splitlines()
+        # Those of candidates begin with the name of the model.
+        first = len(self.candidates)
+        rows = [(each.model, str(each).partition("  ")[2].strip()) for each in self.candidates]
+        return html_table(title, [*rows, *(("note", line.strip()) for line in lines[first:])])
 
 
 def cheapest(candidates: tuple[Candidate, ...]) -> Model:

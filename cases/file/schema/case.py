@@ -7,6 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.camera import CameraSpec
 from tetlux.cases.file.schema.detectors import DetectorSpec
+from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
@@ -161,6 +162,9 @@ class CaseSpec(Section):
     modulation: ModulationSpec | None = Field(
         None, description="lights are modulated at a frequency: results are amplitudes and phases"
     )
+    fluorescence: FluorescenceSpec | None = Field(
+        None, description="dyes that emit at another wavelength, which is a channel of its own"
+    )
     model: Model = Field(
         "full",
         description="full: finite elements on a mesh; truncated: the same where light reaches; charges: fitted to the "
@@ -246,6 +250,10 @@ class CaseSpec(Section):
                         "write model: full",
                         {"key": key, "what": what, "model": self.model},
                     )
+        if self.fluorescence and self.model != "full":
+            raise PydanticCustomError(
+                "no_mesh", "dyes are solved for by model full; leave fluorescence or model out", {"key": "fluorescence"}
+            )
         return self
 
     @model_validator(mode="after")
