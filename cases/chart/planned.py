@@ -27,8 +27,9 @@ def _by_plan(benchmark: Benchmark, tolerance: float) -> Outcome:
         )
         exitance = solution.exitance_at(benchmark.samples.points)
         seconds, mesh = time.perf_counter() - started, solution.mesh
-        sizes = (None, None) if mesh is None else (len(mesh.points), len(mesh.tetrahedra))
-        return Outcome(exitance, seconds, *sizes, solution.error_estimate)
+        if mesh is None:
+            return Outcome(exitance, seconds, None, None, solution.error_estimate)
+        return Outcome(exitance, seconds, len(mesh.points), len(mesh.tetrahedra), solution.error_estimate)
 
     return fastest_run(benchmark, run)
 
