@@ -73,8 +73,12 @@ def measure(number: int) -> dict[str, Any]:
     runs: dict[str, Any] = {}
     taken, auto = _solve(surface, medium, lights, regions, tolerance, "auto")
     runs["auto"] = _figures(taken, auto, tolerance)
-    places = surface.points[:: max(1, len(surface.points) // 2000)]
-    exitance = auto.exitance_at(places)
+    corners = surface.points[surface.faces]
+    roots = np.sqrt(
+        0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    )
+    places = corners.mean(axis=1)
+    exitance = roots * auto.exitance_at(places)
     differences = []
     for each in made.candidates:
         is_hopeless = each.seconds > HOPELESS * max(taken, made.best.seconds) and number % CHECKED
@@ -82,7 +86,8 @@ def measure(number: int) -> dict[str, Any]:
             continue
         seconds, found = _solve(surface, medium, lights, regions, tolerance, each.model)
         runs[each.model] = _figures(seconds, found, tolerance)
-        difference = float(np.linalg.norm(found.exitance_at(places) - exitance) / np.linalg.norm(exitance))
+        off = roots * found.exitance_at(places) - exitance
+        difference = float(np.linalg.norm(off) / np.linalg.norm(exitance))
         differences.append(difference / (auto.error_estimate + found.error_estimate))
     best = min(run["seconds"] for name, run in runs.items() if name == "auto" or run["meets"])
     return {
