@@ -1,6 +1,6 @@
 """`QuadraticSolution`: the fluence of lights in quadratic elements, and measurements of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -88,18 +88,27 @@ class QuadraticScene:
         return found
 
     @cached_property
+    def solved(self) -> NumberArray:
+        """What is solved for of each light, (size, k), W/unit².
+
+        That is the fluence with the interpolants of its patches, and of patches that are the whole body the fluence
+        less that of their charges.
+        """
+        # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
+        fitted = self._interpolants(lambda each: each.is_fitted and not each.is_whole)
+        return fitted + self.operator.solve(self.loads - self.operator.matrix @ fitted)
+
+    @cached_property
     def fluence(self) -> NumberArray:
         """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
-        # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
-        fitted = np.column_stack(
-            [
-                np.sum(
-                    [np.zeros(self.operator.space.size), *(each.interpolant for each in own if each.is_fitted)], axis=0
-                )
-                for own in self.patches
-            ]
+        return self.solved + self._interpolants(lambda each: each.is_whole)
+
+    def _interpolants(self, which: Callable[[QuadraticPatch], bool]) -> NumberArray:
+        """The sum of the interpolants of some patches of each light, (size, k)."""
+        nothing = np.zeros(self.operator.space.size)
+        return np.column_stack(
+            [np.sum([nothing, *(each.interpolant for each in own if which(each))], axis=0) for own in self.patches]
         )
-        return fitted + self.operator.solve(self.loads - self.operator.matrix @ fitted)
 
     __repr__ = one_line
 
@@ -157,6 +166,11 @@ class QuadraticSolution:
         return self.scene.operator
 
     @cached_property
+    def solved(self) -> NumberArray:
+        """What is solved for, (size,), W/unit²: see `QuadraticScene.solved`."""
+        return np.asarray(self.scene.solved[:, self.lights].sum(axis=1))
+
+    @cached_property
     def fluence(self) -> NumberArray:
         """Fluence (size,), W/unit²."""
         return np.asarray(self.scene.fluence[:, self.lights].sum(axis=1))
@@ -187,8 +201,10 @@ class QuadraticSolution:
     def gradient_difference(self) -> NumberArray:
         """`recovered_gradient_difference` of the fluence less the charges of patches, (m, 4, 3)."""
         space = self.operator.space
-        difference = recovered_gradient_difference(space, self.fluence)
+        difference = recovered_gradient_difference(space, self.solved)
         for patch in self.patches:
+            if patch.is_whole:
+                continue
             inside = np.flatnonzero(patch.patch.cells)
             difference[inside] -= recovered_gradient_difference(space, patch.interpolant)[inside]
         return difference
@@ -200,9 +216,9 @@ class QuadraticSolution:
 
     @cached_property
     def residual(self) -> NumberArray:
-        """Load less the matrix times the fluence, (size,), W."""
+        """Load less the matrix times what is solved for, (size,), W."""
         load = self.scene.loads[:, self.lights].sum(axis=1)
-        return np.asarray(load - self.operator.matrix @ self.fluence)
+        return np.asarray(load - self.operator.matrix @ self.solved)
 
     def prepare(self, measurements: Sequence[Measurement]) -> Iterator[Sequence[Measurement]]:
         """Parts of measurements, as many as have their dual solutions kept; those of each part are found together."""
@@ -223,13 +239,13 @@ class QuadraticSolution:
 
     def fluence_at(self, discrete: DiscreteMeasurement) -> NumberArray:
         """Fluence at the points of a measurement, (q,), W/unit²."""
-        fluence, points = discrete.values(self.fluence), discrete.measurement.points
+        fluence, points = discrete.values(self.solved), discrete.measurement.points
         for patch in self.patches:
             inside = np.flatnonzero(patch.patch.cells[discrete.cells])
             if len(inside):
-                fluence[inside] += (
-                    patch.patch.charges.fluence(points[inside]) - discrete.values(patch.interpolant)[inside]
-                )
+                fluence[inside] += patch.patch.charges.fluence(points[inside])
+                if not patch.is_whole:
+                    fluence[inside] -= discrete.values(patch.interpolant)[inside]
         return fluence
 
     def exitance_on(self, points: FloatArray, linear: NumberArray) -> NumberArray:
