@@ -14,7 +14,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
-from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
+from tetlux.fem.quadratic.assembly import assemble, element_matrices, matrix_of
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -47,12 +47,15 @@ class QuadraticOperator:
     inner : sequence of Surface
         True surfaces of the regions.
     coefficients : Coefficients
+    steady : QuadraticOperator, optional
+        That of the same coefficients without their shift: see `shifted`.
     """
 
     mesh: TetMesh
     surface: Surface
     inner: Sequence[Surface]
     coefficients: Coefficients
+    steady: "QuadraticOperator | None" = None
     _duals: dict[Measurement, NumberArray] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -67,11 +70,25 @@ class QuadraticOperator:
     @cached_property
     def elements(self) -> NumberArray:
         """The matrices of tetrahedra, (m, 10, 10)."""
+        if self.steady is not None:
+            return self.steady.elements + self.coefficients.shift * self.steady.mass_elements
         return element_matrices(self.space, self.coefficients)
+
+    @cached_property
+    def mass_elements(self) -> NumberArray:
+        """Integrals of products of shape functions over tetrahedra, (m, 10, 10)."""
+        return element_matrices(self.space, replace(self.coefficients, sigma_a=1.0, sigma_t_prime=np.inf))
+
+    @cached_property
+    def mass(self) -> csr_array:
+        """The mass matrix, (size, size)."""
+        return assemble(self.space, self.mass_elements)
 
     @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size); complex for modulated light."""
+        if self.steady is not None:
+            return csr_array(self.steady.matrix + self.coefficients.shift * self.steady.mass)
         return matrix_of(self.space, self.coefficients, self.elements)
 
     @cached_property
@@ -97,6 +114,10 @@ class QuadraticOperator:
             return np.concatenate([linear(np.ascontiguousarray(rest[:nodes])), inverse * rest[nodes:]])
 
         return precondition
+
+    def shifted(self, shift: complex) -> "QuadraticOperator":
+        """The operator with another shift, which shares the assembled matrices of this steady one."""
+        return replace(self, coefficients=replace(self.coefficients, shift=shift), steady=self, _duals={})
 
     def solve(self, loads: NumberArray, stop_residual: float = STOP_RESIDUAL) -> NumberArray:
         """Solutions (size, k) for loads (size, k), to about a relative residual."""
