@@ -107,6 +107,14 @@ class FittedLight:
         """Whether the charges are accurate at each of the points, (q,)."""
         return _accurate(self.residual, self.charges.equation) if self.like is None else self.like.accurate
 
+    def refit(self, shift: complex) -> Charges:
+        """The charges with another shift, 1/unit, at the same places."""
+        known = self.charges
+        sources, powers = known.positions[: known.sources], known.strengths[: known.sources, None]
+        lights = LightSources(sources, powers, np.zeros(1))
+        field, _ = fit_strengths(self.placement, equation_of(known.medium, shift), lights)
+        return replace(known, equation=field.equation, strengths=field.strengths[:, 0])
+
     def accurate_at(self, points: FloatArray) -> BoolArray:
         """Whether the charges are accurate at the point of `residual` nearest to each of some points (n, 3), (n,)."""
         if self.accurate.all():

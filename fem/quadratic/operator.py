@@ -33,6 +33,8 @@ COLUMNS_PER_GROUP = 4
 EXPECTED_RIGHT_HAND_SIDES = 10
 # Memory for dual solutions that are kept for measurements that come again; the oldest are dropped.
 BYTES_OF_KEPT_DUALS = 2**28
+# Names of what solves.
+SOLVING = ("_product", "_precondition")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,12 @@ class QuadraticOperator:
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
-        return {name: value for name, value in vars(self).items() if name not in ("_product", "_precondition")}
+        return {name: value for name, value in vars(self).items() if name not in SOLVING}
+
+    def release(self) -> None:
+        """Drop the matrices, which are made anew when they are needed."""
+        for name in ("elements", "matrix", *SOLVING):
+            vars(self).pop(name, None)
 
     @cached_property
     def space(self) -> QuadraticSpace:
@@ -133,6 +140,22 @@ class QuadraticOperator:
         ]
         found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
+
+    def solve_near(
+        self, loads: NumberArray, known: Sequence[NumberArray], stop_residual: float = STOP_RESIDUAL
+    ) -> NumberArray:
+        """Solutions (size, k) for loads (size, k), beginning with those of similar matrices and loads.
+
+        The combination of them with the least residual is close to the solution for shifts that are next to each
+        other on a contour.
+        """
+        start = np.zeros(loads.shape, dtype=np.result_type(loads, self.matrix.dtype))
+        for column in range(loads.shape[1] if known else 0):
+            basis = np.column_stack([each[:, column] for each in known])
+            start[:, column] = basis @ np.linalg.lstsq(self.matrix @ basis, loads[:, column])[0]
+        rest = loads - self.matrix @ start
+        left = float((norms(rest) / np.maximum(norms(loads), np.finfo(float).tiny)).max(initial=0.0))
+        return start if left <= stop_residual else start + self.solve(rest, min(stop_residual / left, 0.1))
 
     def discretise(self, measurement: Measurement) -> DiscreteMeasurement:
         """A measurement on the mesh."""

@@ -1,19 +1,20 @@
 """`QuadraticSolution`: the fluence of lights in quadratic elements, and measurements of it."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
+from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.kept_patches import keep_or_choose
 from tetlux.fem.known.patch import Patch, patch_of
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.loads import LineLoad, QuadraticPatch, line_load, quadratic_load, quadratic_patch
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
-from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.operator import STOP_RESIDUAL, QuadraticOperator
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.sources.deposit import Deposit
@@ -44,16 +45,47 @@ class QuadraticScene:
         The patches of each light in linear elements.
     linear_fluences : tuple of (n,) ndarray
         The fluence of each light in linear elements, which determines its quadratic patches.
+    steady : QuadraticScene, optional
+        That of the same lights without the shift: see `shifted`.
+    charges : tuple of tuple of Charges
+        With the shift, in the order of the steady scene's patches.
+    known : tuple of (size, k) ndarray
+        What was solved for with similar shifts, to begin with.
+    stop_residual : float
+        Relative residual at which the iteration stops.
     """
 
     operator: QuadraticOperator
     deposits: tuple[Deposit, ...]
     linear_patches: tuple[tuple[Patch, ...], ...]
     linear_fluences: tuple[NumberArray, ...]
+    steady: "QuadraticScene | None" = None
+    charges: tuple[tuple[Charges, ...], ...] = ()
+    known: tuple[NumberArray, ...] = ()
+    stop_residual: float = STOP_RESIDUAL
+
+    def shifted(
+        self,
+        shift: complex,
+        charges: tuple[tuple[Charges, ...], ...],
+        known: tuple[NumberArray, ...],
+        stop_residual: float,
+    ) -> "QuadraticScene":
+        """The scene with a shift, on the patches of this steady one, of which each light's charges are given."""
+        operator = self.operator.shifted(shift)
+        return replace(self, operator=operator, steady=self, charges=charges, known=known, stop_residual=stop_residual)
 
     @cached_property
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
+        if self.steady is not None:
+            return tuple(
+                tuple(
+                    quadratic_patch(self.operator, known.patch.with_charges(each))
+                    for known, each in zip(of_light, own, strict=True)
+                )
+                for of_light, own in zip(self.steady.patches, self.charges, strict=True)
+            )
         return tuple(
             tuple(_patch(self.operator, patch, fluence) for patch in own)
             for own, fluence in zip(self.linear_patches, self.linear_fluences, strict=True)
@@ -62,14 +94,19 @@ class QuadraticScene:
     @cached_property
     def loads(self) -> NumberArray:
         """The load of each light, (size, k), W."""
+        of_patches = [sum(each.load for each in own) for own in self.patches]
+        return np.column_stack([load + more for load, more in zip(self.deposit_loads, of_patches, strict=True)])
+
+    @cached_property
+    def deposit_loads(self) -> list[FloatArray]:
+        """The load of what each light leaves on the mesh, (size,), W."""
+        if self.steady is not None:
+            return self.steady.deposit_loads
         space, coefficients = self.operator.space, self.operator.coefficients
-        loads = [
+        return [
             quadratic_load(space, coefficients, deposit.terms, lines)
             for deposit, lines in zip(self.deposits, self.lines, strict=True)
         ]
-        return np.column_stack(
-            [load + sum(each.load for each in own) for load, own in zip(loads, self.patches, strict=True)]
-        )
 
     @cached_property
     def lines(self) -> list[LineLoad]:
@@ -96,7 +133,7 @@ class QuadraticScene:
         """
         # The system is solved for the remainder, which is far smaller near the light than the fitted charges.
         fitted = self._interpolants(lambda each: each.is_fitted and not each.is_whole)
-        return fitted + self.operator.solve(self.loads - self.operator.matrix @ fitted)
+        return fitted + self.operator.solve_near(self.loads - self.operator.matrix @ fitted, self.known, self.stop_residual)
 
     @cached_property
     def fluence(self) -> NumberArray:
@@ -270,7 +307,8 @@ class QuadraticSolution:
     def exitance_at_nodes(self) -> NumberArray:
         """Exitance at the boundary nodes, (b,), W/unit²."""
         nodes = self.operator.mesh.boundary_nodes
-        return np.asarray(self.operator.robin * self.fluence[nodes] + self._unscattered_at_nodes[nodes])
+        fluence = self.solved[nodes] + sum(each.patch.at_nodes[nodes] for each in self.patches if each.is_whole)
+        return np.asarray(self.operator.robin * fluence + self._unscattered_at_nodes[nodes])
 
     @cached_property
     def _unscattered_at_nodes(self) -> FloatArray:
