@@ -8,7 +8,8 @@ have new strengths for each shift.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +24,11 @@ from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
 from tetlux.fem.models.modulation import seconds_per_length
+from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import place_detector
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.planner.options import Options
 from tetlux.fem.quadratic.operator import STOP_RESIDUAL, QuadraticOperator
-from tetlux.fem.quadratic.solution import QuadraticScene
+from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.scenes import build_scenes
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.light import Light
@@ -35,6 +36,7 @@ from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.transient.contour import contour_for, windows_of
 from tetlux.fem.transient.transient import MeshError, Transient
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
@@ -58,7 +60,7 @@ def solve_in_time(
     channels: Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
     times: Sequence[float],
-    options: Options,
+    options: Mapping[str, Any],
 ) -> list[Transient]:
     """Solve for light in time in each channel: see `tetlux.fem.solve`.
 
@@ -70,8 +72,8 @@ def solve_in_time(
     lights : sequence of Light
     times : sequence of float
         s, rising.
-    options : Options
-        Other arguments of `tetlux.fem.solve`, without a frequency.
+    options : mapping of str
+        Other arguments of `tetlux.fem.solve_each`; the frequency is not used.
 
     Returns
     -------
@@ -91,8 +93,9 @@ def solve_in_time(
             _check_first(float(at[0]), each.outer, seconds_per_length(each.outer, scenes.surface.unit, index))
     rate = FASTEST / float(at[0])
     frequencies = [0.0] * len(channels) + [rate / (2.0 * math.pi)] * len(channels)
-    twice = options | {"regions": [_twice(region) for region in options.get("regions", ())], "frequency": frequencies}
-    solutions = solve_each(body, [*channels, *channels], [lights] * (2 * len(channels)), **twice)  # type: ignore[misc]
+    regions = [_twice(region) for region in options.get("regions", ())]
+    others: dict[str, Any] = {**options, "regions": regions, "frequency": frequencies}
+    solutions = solve_each(body, [*channels, *channels], [lights] * (2 * len(channels)), **others)
     subtract = options.get("subtract", "fitted")
     if isinstance(body, TetMesh):
         subtract = replace_fitted(subtract)
@@ -102,10 +105,8 @@ def solve_in_time(
         with watch.stage("solve"):
             split = split_lights(lights, each, subtract, kept=fits_of(steady.mesh), scene=number)
             delay = seconds_per_length(each.outer, scenes.surface.unit, index)
-            transient = _follow_contours(at, steady, fast, split.fitted, delay, rate)
-            transient = replace(
-                transient, detectors=tuple(place_detector(one, steady) for one in options.get("detectors", ()))
-            )
+            pulse = _Pulse(at, delay, rate, tuple(options.get("detectors", ())))
+            transient = _follow_contours(pulse, steady, fast, split.fitted)
         found.append(replace(transient, warnings=_notes(transient, fast, each, delay)))
     seconds = watch.read()
     for name, value in solutions[0].seconds.items():
@@ -156,28 +157,50 @@ def _twice(region: Region) -> Region:
     return replace(region, medium=[*region.medium, *region.medium])
 
 
-def _follow_contours(
-    times: FloatArray, steady: Solution, fast: Solution, fitted: Mapping[int, FittedLight], delay: float, rate: float
-) -> Transient:
-    """Light in time from that at the points of contours, given the seconds that it takes for a unit of length."""
+@dataclass(frozen=True, eq=False)
+class _Pulse:
+    """What is asked for.
+
+    Attributes
+    ----------
+    times : (t,) ndarray
+        s.
+    delay : float
+        The time that light takes for a unit of length, s/unit.
+    rate : float
+        Angular frequency of the fast light that the mesh was refined for, 1/s.
+    detectors : tuple of Detector
+    """
+
+    times: FloatArray
+    delay: float
+    rate: float
+    detectors: tuple[Detector, ...]
+
+    __repr__ = one_line
+
+
+def _follow_contours(pulse: _Pulse, steady: Solution, fast: Solution, fitted: Mapping[int, FittedLight]) -> Transient:
+    """Light in time from that at the points of contours."""
     quadratic = steady.quadratic
     assert quadratic is not None
-    leftmost = -SAFE_SHARE * slowest_decay(quadratic.operator) / delay
-    contours = tuple(contour_for(times[window], leftmost) for window in windows_of(times))
+    leftmost = -SAFE_SHARE * slowest_decay(quadratic.operator) / pulse.delay
+    contours = tuple(contour_for(pulse.times[window], leftmost) for window in windows_of(pulse.times))
     scenes = []
     for contour in contours:
         solved: list[QuadraticScene] = []
         for point, weight in zip(contour.points.tolist(), contour.weights.tolist(), strict=True):
             stop = min(STOP_RESIDUAL / weight, ROUGHEST)
-            solved.append(_solve_shifted(quadratic.scene, fitted, point * delay, solved[-NEIGHBOURS:], stop))
+            solved.append(_solve_shifted(quadratic.scene, fitted, point * pulse.delay, solved[-NEIGHBOURS:], stop))
         scenes.append(tuple(solved))
-    of_surface = MeshError(float(np.fmax(steady.error_estimate, fast.error_estimate)), rate)
+    of_surface = MeshError(float(np.fmax(steady.error_estimate, fast.error_estimate)), pulse.rate)
     errors = np.array(
         [[reading.relative_error for reading in each.readings] for each in (steady, fast)], dtype=float
     ).reshape(2, -1)
-    of_readings = MeshError(errors.max(axis=0), rate)
+    of_readings = MeshError(errors.max(axis=0), pulse.rate)
     lights = tuple(range(len(quadratic.scene.deposits)))
-    whole = Transient(times, steady, (), contours, tuple(scenes), of_surface, of_readings, lights)
+    placed = tuple(place_detector(detector, steady) for detector in pulse.detectors)
+    whole = Transient(pulse.times, steady, placed, contours, tuple(scenes), of_surface, of_readings, lights)
     if len(lights) == 1:
         return whole
     return replace(whole, of_lights=tuple(replace(whole, lights=(light,)) for light in lights))

@@ -10,26 +10,30 @@ import numpy.typing as npt
 from tetlux.fem.outcome.detectors import PlacedDetector
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
+from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.transient.contour import Contour
-from tetlux.meshing.arrays import BoolArray, FloatArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, NumberArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Values below so many times their estimated error are not resolved.
 RESOLVED = 2.0
+# The power of the rate with which errors grow, of elements whose error is ``k r (k h)^4`` and more where k h is large;
+# and the share of errors that changes from point to point of a contour: see `MeshError`.
+GROWTH, DISORDER = 3.0, 0.2
 # Points of the surface of which fluence in the Laplace domain is computed at once.
 BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
 class MeshError:
-    """The relative error that the mesh makes, as it depends on how fast light rises.
+    """The error that the mesh makes in time.
 
-    By the method of steepest descent a value y(t) in time is that of one point of the Laplace domain, ``s = y'/y``. Up
-    to the shift at which errors were estimated, they are at most those; beyond, they grow with the fourth power of the
-    wave number, that is with the square of s.
+    By the method of steepest descent a value y(t) is that of one point of the Laplace domain, ``s = y'/y``, and has the
+    relative error there: that which was estimated, and beyond the rate for which it was, more by a power of s. What
+    changes with s without order, as what charges leave, does not cancel where terms of the contour do.
 
     Attributes
     ----------
@@ -42,9 +46,11 @@ class MeshError:
     error: FloatArray | float
     rate: float
 
-    def at(self, slopes: FloatArray) -> FloatArray:
-        """Relative error where light rises by given relative slopes (t, d), 1/s."""
-        return np.asarray(self.error * np.maximum(slopes / self.rate, 1.0) ** 2)
+    def of(self, values: FloatArray, slopes: FloatArray, terms: FloatArray) -> FloatArray:
+        """Errors (t, d) of values (t, d), by their slopes, 1/s, and the norm of the terms of the contour, (t, d)."""
+        rises = np.divide(slopes, values, out=np.zeros_like(values), where=values > 0)
+        grown = np.abs(values) * np.maximum(rises / self.rate, 1.0) ** GROWTH
+        return np.asarray(self.error * (grown + DISORDER * terms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,8 +136,9 @@ class Transient:
         """Exitance at each detector, (t, d), and its error."""
         discrete = [self._discretise(each.measurement.points, each.measurement.weights) for each in self.detectors]
 
-        def read(light: QuadraticSolution) -> FloatArray:
-            return np.array([each.measurement.weights @ light.values_at(each) for each in discrete])
+        def read(light: QuadraticSolution) -> NumberArray:
+            values = [each.measurement.weights @ light.values_at(each) for each in discrete]
+            return np.array(values, dtype=np.complex128)
 
         return self._in_time(read, self.reading_error)
 
@@ -142,15 +149,17 @@ class Transient:
 
     @property
     def errors(self) -> FloatArray:
-        """Estimated error of each reading, of mesh and contour, (t, d), W/unit² per J; what is not resolved is below
-        twice this."""
+        """Estimated error of each reading by mesh and contour, (t, d), W/unit² per J.
+
+        Readings below twice this are not resolved.
+        """
         return self._read[1]
 
     @property
     def powers(self) -> FloatArray:
         """Power that each detector collects, (t, d), W per J; nan of points, and where it is not resolved."""
         collects = [np.nan if each.area is None else each.share * each.area for each in self.detectors]
-        return self.readings * np.array(collects, dtype=float)
+        return np.asarray(self.readings * np.array(collects, dtype=float))
 
     @property
     def resolved(self) -> BoolArray:
@@ -168,7 +177,7 @@ class Transient:
         return quadratic.operator.discretise(Measurement(places, weights))
 
     def _in_time(
-        self, read: Callable[[QuadraticSolution], FloatArray], of_mesh: MeshError
+        self, read: Callable[[QuadraticSolution], NumberArray], of_mesh: MeshError
     ) -> tuple[FloatArray, FloatArray]:
         """Values in time (t, ...) of what is read in the Laplace domain (...), and their errors.
 
@@ -177,12 +186,11 @@ class Transient:
         parts = []
         for contour, scenes in zip(self.contours, self.scenes, strict=True):
             each = np.array([read(QuadraticSolution(scene, self.lights)) for scene in scenes])
-            parts.append((contour.invert(each), contour.slopes(each), contour.error(each)))
-        values, slopes, errors = (np.concatenate(some) for some in zip(*parts, strict=True))
-        positive = values > 0
-        relative = np.divide(slopes, values, out=np.zeros_like(values), where=positive)
-        errors = errors + np.where(positive, values * of_mesh.at(relative), 0.0)
-        return np.where(positive & (values > RESOLVED * errors), values, np.nan), errors
+            values = contour.invert(each)
+            of_contour = contour.error(each) + of_mesh.of(values, contour.slopes(each), contour.norm(each))
+            parts.append((values, of_contour))
+        values, errors = (np.concatenate(some) for some in zip(*parts, strict=True))
+        return np.where(values > RESOLVED * errors, values, np.nan), errors
 
     def __repr__(self) -> str:
         facts = [
