@@ -1,6 +1,7 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.dyes.solve import fluorescence
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -17,6 +18,7 @@ from tetlux.fem.lights import (
     Rectangle,
 )
 from tetlux.fem.media.fields import grid_field, mesh_field
+from tetlux.fem.media.fluorophore import Fluorophore
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
@@ -28,7 +30,7 @@ from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
 from tetlux.fem.outcome.detectors import read
 from tetlux.fem.outcome.plan import Candidate, Plan
-from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.power import DyePower, Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
@@ -56,9 +58,11 @@ __all__ = [
     "DiffusePatch",
     "Disc",
     "DiscDetector",
+    "DyePower",
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
+    "Fluorophore",
     "Footprint",
     "Gaussian",
     "Image",
@@ -83,6 +87,7 @@ __all__ = [
     "Transient",
     "TruncatedSolution",
     "VaryingMedium",
+    "fluorescence",
     "grid_field",
     "henyey_greenstein",
     "material",

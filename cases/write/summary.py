@@ -31,6 +31,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_tolerance")
 # Finite elements on the whole body have a name of their own in summaries.
 MODEL_NAMES = {"full": "fem"}
+# What becomes of the power that a dye takes from steady light.
+DYE_LEDGER = ("absorbed", "lost", "emitted")
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
@@ -118,6 +120,7 @@ def _channel(
         },
         "error_estimate": finite(solution.error_estimate),
         **_figures_of_model(solution),
+        **_dyes(solution),
     }
     if several:
         lights = solutions_by_light(list(channel.lights), solution)
@@ -145,6 +148,13 @@ def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
     """The labels of a mesh that the case gives, with their names and volumes."""
     volumes = mesh.region_volumes.items()
     return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
+
+
+def _dyes(solution: AnySolution) -> dict[str, list[dict[str, float]]]:
+    """The ledger of each dye that emits the light of a channel, in the order of the case; of modulated light moduli."""
+    dyes = solution.dyes if isinstance(solution, Solution) else ()
+    names = ("absorbed", "lost", "emitted", "stored") if any(dye.stored for dye in dyes) else DYE_LEDGER
+    return {"dyes": [{name: _size(getattr(dye, name)) for name in names} for dye in dyes]} if dyes else {}
 
 
 def _size(value: Number) -> Number:

@@ -76,6 +76,7 @@ def solve_channels(
             detectors=options["detectors"],
             mesh=options["mesh"],
             need_of_mesh=MODULATED if options["frequency"] else "",
+            cache=options["cache"],
         )
         elements = FiniteElements(
             lambda: solve_each(body, channels, scenes, **options),

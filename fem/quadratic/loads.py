@@ -50,7 +50,7 @@ class LineLoad:
 
 def quadratic_load(
     space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms, lines: LineLoad
-) -> FloatArray:
+) -> NumberArray:
     """Load of source terms, as they are on the mesh of a space, and of their beams, (size,)."""
     mesh, load = space.mesh, lines.load.copy()
     points, powers = np.vstack([terms.points, lines.points]), np.concatenate([terms.powers, lines.powers])
@@ -64,7 +64,7 @@ def quadratic_load(
         emitted = volume_load(space, np.broadcast_to(terms.emission, len(mesh.tetrahedra)))
         # The power of emission is that of the mesh with flat facets.
         load += emitted * float((mesh.volumes * terms.emission).sum()) / emitted[: len(mesh.points)].sum()
-    return load
+    return np.asarray(load + sum(source.at_dofs for source in terms.volume_sources))
 
 
 def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -> FloatArray:

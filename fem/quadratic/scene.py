@@ -88,7 +88,7 @@ class QuadraticScene:
         return np.column_stack([load + more for load, more in zip(self.deposit_loads, of_patches, strict=True)])
 
     @cached_property
-    def deposit_loads(self) -> list[FloatArray]:
+    def deposit_loads(self) -> list[NumberArray]:
         """The load of what each light leaves on the mesh, (size,), W."""
         if self.steady is not None:
             return self.steady.deposit_loads

@@ -14,6 +14,7 @@ from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.sources.volume import VolumeSource
 from tetlux.meshing.arrays import BoolArray, FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 
@@ -78,6 +79,11 @@ class QuadraticSolution:
         # The edge of a regular tetrahedron of this volume.
         edges = (6.0 * np.sqrt(2.0) * mesh.volumes) ** (1.0 / 3.0)
         return np.asarray(coefficients.decay * edges > LARGEST_RESOLVED_KH)
+
+    @property
+    def volume_sources(self) -> list[VolumeSource]:
+        """Their volume sources."""
+        return [source for light in self.lights for source in self.scene.deposits[light].terms.volume_sources]
 
     @property
     def patches(self) -> list[QuadraticPatch]:
