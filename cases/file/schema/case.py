@@ -116,7 +116,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
