@@ -193,7 +193,7 @@ def test_the_cases_of_the_how_to_pages_are_right(tmp_path: Path, monkeypatch: py
     (text,) = blocks("docs/scan.md", "yaml")
     Path("scan.yaml").write_text(text.replace("{file: scan.obj, scale: 1000, holes: close}", "{sphere: {radius: 80}}"))
     (case,) = load_cases(Path("scan.yaml"))
-    assert case.up == (0, 1, 0)
+    assert case.up == (0.0, 1.0, 0.0)
     for key in ("file: scan.obj", "scale: 1000", "holes: close"):
         assert key in text
 
