@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.planning import AUTO, plan_case, request_of
+from tetlux.cases.planning import AUTO, request_of
 from tetlux.fem.assessment import Tolerances
 from tetlux.fem.dyes.solve import solve_pairs
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.solve import (
     AnySolution,
     FiniteElements,
@@ -40,9 +41,10 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
 
     elements = FiniteElements(solve_fully, solve_part)
     if model == AUTO:
-        plan = case.plan or plan_case(case)
+        request = request_of(case, case.plan.runs if case.plan else 1, cache=cache)
+        plan = case.plan or plan_of(request)
         report_plan(plan, report)
-        return solve_by_plan(request_of(case, plan.runs), elements, report, plan=plan)
+        return solve_by_plan(request, elements, report, plan=plan)
     if model == "closed-form":
         return solve_closed_forms(request_of(case))
     if model == "truncated":
