@@ -44,8 +44,8 @@ def plan_case(case: Case, runs: int = 1) -> Plan:
     return plan_of(request_of(case, runs))
 
 
-def request_of(case: Case, runs: int = 1) -> Request:
-    """What a case asks for."""
+def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
+    """What a case asks for; without `cache` past runs are neither looked at nor learned from."""
     need = ""
     # By default other models than "full" do without this output.
     if "volume" in case.outputs and (case.spec.model == AUTO or "outputs" in case.spec.model_fields_set):
@@ -70,6 +70,7 @@ def request_of(case: Case, runs: int = 1) -> Request:
         detectors=[entry.detector for entry in case.detectors],
         need_of_mesh=need,
         runs=runs,
+        cache=cache,
     )
 
 

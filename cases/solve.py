@@ -4,13 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.planning import AUTO, plan_case, request_of
+from tetlux.cases.planning import AUTO, request_of
 from tetlux.fem.assessment import Tolerances
 from tetlux.fem.dyes.solve import solve_pairs
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.solve import (
     AnySolution,
     FiniteElements,
@@ -23,6 +24,8 @@ from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
+from tetlux.fem.transient.solve import solve_in_time
+from tetlux.fem.transient.transient import Transient
 from tetlux.meshing.surface.surface import Surface
 
 Report = Callable[[str], None]
@@ -40,9 +43,10 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
 
     elements = FiniteElements(solve_fully, solve_part)
     if model == AUTO:
-        plan = case.plan or plan_case(case)
+        request = request_of(case, case.plan.runs if case.plan else 1, cache=cache)
+        plan = case.plan or plan_of(request)
         report_plan(plan, report)
-        return solve_by_plan(request_of(case, plan.runs), elements, report, plan=plan)
+        return solve_by_plan(request, elements, report, plan=plan)
     if model == "closed-form":
         return solve_closed_forms(request_of(case))
     if model == "truncated":
@@ -78,6 +82,25 @@ def _solve_fully(
         report=report,
         frequency=case.frequencies,
         outside_index=case.outside_index,
+    )
+
+
+def solve_pulse(case: Case, report: Report, *, cache: bool) -> list[Transient]:
+    """Solve each channel in time."""
+    return solve_in_time(
+        case.mesh or case.surface,
+        [channel.media for channel in case.channels],
+        [list(channel.lights.values()) for channel in case.channels],
+        case.times,
+        {
+            "regions": case.regions,
+            "tolerance": case.tolerance,
+            "detectors": [entry.detector for entry in case.detectors],
+            "detector_tolerance": case.detector_tolerance,
+            "cache": cache,
+            "report": report,
+            "outside_index": case.outside_index,
+        },
     )
 
 

@@ -87,8 +87,9 @@ def share_mesh(
     wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
     checked = build_scenes(surface, None, medium, regions, len(scenes), frequency, outside_index)
     tolerances = _place(tolerances, detectors, checked)
+    places = tolerances.places_in(0)
     split = [
-        split_lights(lights, body, "fitted", tolerance=wanted, readings=tolerances.places, kept=KeptFits(), shift=shift)
+        split_lights(lights, body, "fitted", tolerance=wanted, readings=places, kept=KeptFits(), shift=shift)
         for lights, body, shift in zip(scenes[:pilots], checked.bodies, checked.shifts, strict=False)
     ]
     others = [
@@ -123,7 +124,7 @@ def choose_places(
 ) -> None:
     """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
     checked = build_scenes(surface, None, medium, regions, len(scenes))
-    places = _place(Tolerances(tolerance, detector_tolerance), detectors, checked).places
+    places = _place(Tolerances(tolerance, detector_tolerance), detectors, checked).places_in(0)
     for lights, body in zip(scenes, checked.bodies, strict=True):
         split_lights(lights, body, "fitted", tolerance=tolerance, readings=places, kept=start.kept)
 
@@ -161,12 +162,12 @@ def _refine_for_most(
         solve_on = problem.solver_on(mesh)
         steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
         with problem.watch.stage("solve"):
-            missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
+            missing = {scene: step for scene, step in steps.items() if tolerances.assess({scene: step}).splits.any()}
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
         if len(missing) <= allowed:
             return mesh
         with problem.watch.stage("mesh"):
-            splits = tolerances.assess(list(missing.values())).splits
+            splits = tolerances.assess(missing).splits
             inner = problem.scenes.inner
             finer = refine_often(mesh, splits, problem.scenes.surface, inner, most_tetrahedra)
         if not len(mesh.tetrahedra) < len(finer.tetrahedra) <= most_tetrahedra:

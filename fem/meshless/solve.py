@@ -15,7 +15,8 @@ from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.meshless.solution import ChargeSolution, LightLedger, charge_solution
+from tetlux.fem.meshless.fit import charge_solution
+from tetlux.fem.meshless.solution import ChargeSolution, LightLedger
 from tetlux.fem.notes import notes_on_readings
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import place_detector, read_all

@@ -30,6 +30,10 @@ class Candidate:
         What it does, or why it is not a way.
     suits : bool
         Whether it can give what is asked for, within the tolerance.
+    kind : str
+        What runs are told apart by that others are predicted from.
+    learned : tuple of (float, float)
+        Factors of past runs, see `tetlux.fem.planner.costs`, on the seconds and the error, which contain them.
     """
 
     model: Model
@@ -38,6 +42,8 @@ class Candidate:
     bytes: float
     reason: str
     suits: bool
+    kind: str = ""
+    learned: tuple[float, float] = (1.0, 1.0)
 
     def __str__(self) -> str:
         name = f"{self.model:{WIDTH}}  "
