@@ -33,6 +33,8 @@ from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner import plan
+from tetlux.fem.sensitivity.parameters import Grid
+from tetlux.fem.sensitivity.sensitivity import Sensitivity, sensitivity
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint
@@ -61,6 +63,7 @@ __all__ = [
     "FibreDetector",
     "Footprint",
     "Gaussian",
+    "Grid",
     "Image",
     "Ledger",
     "Light",
@@ -76,6 +79,7 @@ __all__ = [
     "Rectangle",
     "Region",
     "Segments",
+    "Sensitivity",
     "Solution",
     "SourceTerms",
     "Spectrum",
@@ -92,6 +96,7 @@ __all__ = [
     "radiance",
     "read",
     "read_pulse",
+    "sensitivity",
     "solve",
     "solve_each",
     "table",

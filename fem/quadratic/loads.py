@@ -8,11 +8,10 @@ from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
-from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
-from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
 from tetlux.fem.sources.segments import Segments
@@ -130,34 +129,44 @@ class QuadraticPatch:
         return isinstance(self.patch, FittedPatch)
 
 
-def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
-    """A patch with its load, as in `tetlux.fem.known.patch_terms` for linear elements.
+def quadratic_patch(
+    space: QuadraticSpace, patch: Patch, elements: NumberArray, inner: "InnerFaces | None" = None
+) -> QuadraticPatch:
+    """A patch with its load, as in `tetlux.fem.known.patch_terms`, by the matrices (c, 10, 10) of its tetrahedra.
+
+    Its `inner_faces` need not be given.
 
     Across inner faces of the patch the fluence jumps by the interpolation error G - I G. The jump changes a reading by
     ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change.
     """
-    space, coefficients = operator.space, coefficients_of(patch.charges.medium)
     mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
         count = charges.sources
         return QuadraticPatch(
             patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count].real)
         )
-    interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
     inside = np.flatnonzero(patch.cells)
+    interpolant = _interpolant(space, patch, inside)
     cell, face, on_boundary = patch.outer
     corners = mesh.tetrahedra[cell[:, None], FACES[face]]
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
-    load = _product(operator.elements[inside], space.cells[inside], interpolant)
-    robin = boundary_condition_of(coefficients.outer).robin
+    load = _product(elements, space.cells[inside], interpolant)
+    robin = boundary_condition_of(charges.medium).robin
     load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
     value, flux = _integrals(space, faces, charges)
     leaving = flux + (robin * on_boundary)[:, None] * value
     load -= sum_by_index(faces, leaving, space.size)
-    within = ~on_boundary
-    if within.any():
-        load += _jump_load(space, charges, interpolant, cell[within], face[within])
+    if not on_boundary.all():
+        load += _jump_load(charges, interpolant, inner or inner_faces(space, patch))
     return QuadraticPatch(patch, interpolant, load)
+
+
+def _interpolant(space: QuadraticSpace, patch: Patch, cells: IntArray) -> NumberArray:
+    """The quadratic interpolant of the charges of a patch, (size,); 0 on edges outside its tetrahedra (c,)."""
+    edges = np.unique(space.mesh.tetrahedron_edges[cells])
+    at_middles = patch.at_nodes[space.mesh.edges].mean(axis=1)
+    at_middles[edges] = patch.charges.fluence(space.middles[edges])
+    return space.interpolate(patch.at_nodes, at_middles)
 
 
 def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> NumberArray:
@@ -166,25 +175,52 @@ def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> Nu
     return sum_by_index(dofs, values, len(function))
 
 
-def _jump_load(
-    space: QuadraticSpace, charges: Charges, interpolant: NumberArray, cells: IntArray, local: IntArray
-) -> NumberArray:
-    """``∮ (G - I G) D dv/dn``, (size,), over faces of tetrahedra (f,) given by their opposite corners (f,)."""
+@dataclass(frozen=True, eq=False)
+class InnerFaces:
+    """The outer faces of a patch that lie inside the body, with their quadrature points.
+
+    Attributes
+    ----------
+    faces, cells : (f, 6), (f, 10) ndarray
+        DOF numbers of the faces, and of the tetrahedra of the patch.
+    points, shape_values : (f, q, 3), (q, 6) ndarray
+        Quadrature points, and shape functions there.
+    slopes : (f, q, 10) ndarray
+        Derivatives of shape functions along the normal times area, unit.
+    """
+
+    faces: IntArray
+    cells: IntArray
+    points: FloatArray
+    shape_values: FloatArray
+    slopes: FloatArray
+
+    __repr__ = one_line
+
+
+def inner_faces(space: QuadraticSpace, patch: Patch) -> InnerFaces:
+    """The faces at which a patch ends inside the body; they do not depend on its charges."""
+    owners, opposite, on_boundary = patch.outer
+    cells, local = owners[~on_boundary], opposite[~on_boundary]
     rule = triangle_rule(FACE_DEGREES[-1][1])
     on_face, weights = rule.points, rule.weights
-    corners = space.mesh.tetrahedra[cells[:, None], FACES[local]]
-    faces = space.faces(corners)
+    faces = space.faces(space.mesh.tetrahedra[cells[:, None], FACES[local]])
     shape_values = shape_functions(on_face, TRIANGLE_EDGES)
-    points = shape_values @ space.corners_and_bends(faces)
-    fluence = charges.fluence(points.reshape(-1, 3)).reshape(len(cells), -1)
-    jumps = fluence - interpolant[faces] @ shape_values.T
     normals = weights[:, None] * face_normals(space, faces, on_face)
     barycentric = np.zeros((len(cells), len(weights), 4))
     for corner in range(3):
         np.put_along_axis(barycentric, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
     slopes, _ = gradients(space, cells, barycentric, weights)
-    values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", jumps, slopes, normals)
-    return sum_by_index(space.cells[cells], values, space.size)
+    along = np.einsum("fqai,fqi->fqa", slopes, normals)
+    return InnerFaces(faces, space.cells[cells], shape_values @ space.corners_and_bends(faces), shape_values, along)
+
+
+def _jump_load(charges: Charges, interpolant: NumberArray, inner: InnerFaces) -> NumberArray:
+    """``∮ (G - I G) D dv/dn`` over inner faces, (size,)."""
+    fluence = charges.fluence(inner.points.reshape(-1, 3)).reshape(inner.points.shape[:2])
+    jumps = fluence - interpolant[inner.faces] @ inner.shape_values.T
+    values = charges.medium.diffusion * np.einsum("fq,fqa->fa", jumps, inner.slopes)
+    return sum_by_index(inner.cells, values, len(interpolant))
 
 
 def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[NumberArray, NumberArray]:

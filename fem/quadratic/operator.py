@@ -67,7 +67,7 @@ class QuadraticOperator:
     @cached_property
     def elements(self) -> NumberArray:
         """The matrices of tetrahedra, (m, 10, 10)."""
-        return element_matrices(self.space, self.coefficients)
+        return element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
 
     @cached_property
     def matrix(self) -> csr_array:
