@@ -1,6 +1,8 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.inverse.fit import FitResult, fit
+from tetlux.fem.inverse.problem import FitProblem
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -61,6 +63,8 @@ __all__ = [
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
+    "FitProblem",
+    "FitResult",
     "Footprint",
     "Gaussian",
     "Grid",
@@ -87,6 +91,7 @@ __all__ = [
     "Transient",
     "TruncatedSolution",
     "VaryingMedium",
+    "fit",
     "grid_field",
     "henyey_greenstein",
     "material",

@@ -27,6 +27,7 @@ from tetlux.fem.lights import Light
 from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
 from tetlux.fem.sensitivity.products import multiply
+from tetlux.fem.sensitivity.sensitivity import check_readings
 from tetlux.fem.sensitivity.subtracted import Coefficient, change_medium
 from tetlux.meshing import InputError, Surface, TetMesh, sphere, tetrahedralize
 from tetlux.meshing.arrays import NumberArray
@@ -178,11 +179,8 @@ def test_what_has_no_sensitivities_is_refused(even: System) -> None:
         sensitivity(even, [SOURCE], [])
     with pytest.raises(InputError, match="the grid has shape"):
         Grid(shape=(0, 1, 1), origin=(0.0, 0.0, 0.0), spacing=1.0)
+    with pytest.raises(InputError, match=r"detector 2 is in the dark: it reads -2e-20 of light 1, and less than"):
+        check_readings(np.array([[1.0, -2e-20]]), np.array([1e-18]))
     absorbing = replace(even, medium=replace(TISSUE, sigma_a=5.0, sigma_s_prime=5.0))
-    far = [PointDetector((float(x), 0.0, 9.5)) for x in np.linspace(-3.0, 3.0, 9)]
-    with pytest.raises(
-        InputError, match=r"detector \d is in the dark: it reads .* of light 1, and less than .* is not"
-    ):
-        sensitivity(absorbing, [PointSource((0.0, 0.0, -9.0))], far, log=True)
     with pytest.raises(InputError, match="diffuse light fades within a tetrahedron at a detector"):
         sensitivity(absorbing, [DiffuseLight(1.0)], DETECTORS)
