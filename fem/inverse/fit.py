@@ -175,7 +175,8 @@ def _least_squares(problem: FitProblem, values: FloatArray, accuracy: float) -> 
         ftol=accuracy**2,
         gtol=None,
     )
-    return np.exp(np.asarray(found.x, dtype=float))
+    logarithms: FloatArray = np.asarray(found.x, dtype=float)
+    return np.asarray(np.exp(logarithms))
 
 
 def _mesh(
@@ -199,7 +200,8 @@ def _mesh(
         detector_tolerance=tolerance,
         frequency=frequency,
     )
-    return solutions[0].mesh
+    mesh: TetMesh = solutions[0].mesh
+    return mesh
 
 
 def _ratio(unknowns: Unknowns, before: FloatArray, after: FloatArray) -> float:
