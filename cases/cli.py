@@ -1,19 +1,19 @@
+# PYTHON_ARGCOMPLETE_OK
 """The command line: ``tetlux run``, ``tetlux check``, ``tetlux list`` and others."""
 
 import argparse
+import contextlib
+import os
 import re
 import signal
 import sys
 import threading
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import NoReturn
 
+from tetlux.cases import commands as does
 from tetlux.cases.start import mark_start
-
-if TYPE_CHECKING:
-    from tetlux.cases.batch.events import Listener
-    from tetlux.cases.batch.launch import Launcher
 
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
 # then answer at once.
@@ -41,7 +41,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _main(arguments: Sequence[str] | None) -> int:
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    if "_ARGCOMPLETE" in os.environ:
+        _complete(parser)
+    options = parser.parse_args(arguments)
     try:
         code = int(options.command(options))
         if sys.stdout is not None:
@@ -52,6 +55,14 @@ def _main(arguments: Sequence[str] | None) -> int:
     except Exception as error:
         return _exit_code_of(error)
     return code
+
+
+def _complete(parser: argparse.ArgumentParser) -> None:
+    """Print what completes a command line, as the shell asks for, and exit; nothing without argcomplete."""
+    with contextlib.suppress(ImportError):
+        import argcomplete  # noqa: PLC0415 - an extra
+
+        argcomplete.autocomplete(parser)
 
 
 def _exit_code_of(error: Exception) -> int:
@@ -130,11 +141,14 @@ def _parser() -> argparse.ArgumentParser:
         help="address or file of a Dask scheduler, whose workers do the work (pip install 'tetlux[cluster]')",
     )
     run.add_argument("--resume", action="store_true", help="keep the runs that are finished in DIR, by their content")
-    run.add_argument("--quiet", action="store_true", help="print nothing but what failed")
+    how = run.add_mutually_exclusive_group()
+    how.add_argument("--quiet", action="store_true", help="print nothing but what failed")
+    how.add_argument("--verbose", action="store_true", help="print each stage of every run, also of many")
     run.add_argument("--no-cache", action="store_true", help="do not use cached meshes of earlier runs, and cache none")
-    run.set_defaults(command=_run)
+    run.set_defaults(command=does.run)
 
     _add_inspections(commands)
+    _add_helpers(commands)
     _add_measurements(commands)
     return parser
 
@@ -144,25 +158,44 @@ def _add_inspections(commands: "argparse._SubParsersAction[_Parser]") -> None:
     check = commands.add_parser("check", help="check case files and the files they name, without solving")
     check.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
     check.add_argument("--plan", action="store_true", help="print how the runs would be grouped and shared, as JSON")
-    check.set_defaults(command=_check)
+    check.set_defaults(command=does.check)
 
     plan = commands.add_parser("plan", help="print which model fits each case, what each model costs, and why")
     plan.add_argument("cases", nargs="+", metavar="CASE", help="a YAML case file, a pattern, or a shipped case")
-    plan.set_defaults(command=_plan)
+    plan.set_defaults(command=does.plan)
 
     listing = commands.add_parser("list", help="list the cases that ship with tetlux")
-    listing.set_defaults(command=_list)
+    listing.set_defaults(command=does.list_shipped)
 
     show = commands.add_parser("show", help="print a case file, for instance a shipped one to start from")
     show.add_argument("case", metavar="CASE", help="a YAML case file, or the name of a shipped one")
-    show.set_defaults(command=_show)
+    show.set_defaults(command=does.show)
 
     view = commands.add_parser("view", help="open the viewer of a finished run in the web browser")
     view.add_argument("result", type=Path, metavar="RESULT", help="the folder of the run, in which viewer.html is")
-    view.set_defaults(command=_view)
+    view.set_defaults(command=does.view)
+
+    compare = commands.add_parser("compare", help="compare two finished runs: figures, and a picture side by side")
+    compare.add_argument("first", type=Path, metavar="A", help="the folder of a run")
+    compare.add_argument("second", type=Path, metavar="B", help="the folder of another run")
+    compare.add_argument("--field", default="exitance", help="an array of surface.ply; default: exitance")
+    compare.add_argument(
+        "--out", type=Path, default=Path("compare.png"), metavar="PNG", help="the picture; default: compare.png"
+    )
+    compare.set_defaults(command=does.compare)
+
+
+def _add_helpers(commands: "argparse._SubParsersAction[_Parser]") -> None:
+    """Add the commands that help to write cases and to report trouble."""
+    new = commands.add_parser("new", help="write a commented case file to start from")
+    new.add_argument("name", metavar="NAME", help="name of the case: NAME.yaml is written")
+    new.set_defaults(command=does.new)
 
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")
-    schema.set_defaults(command=_schema)
+    schema.set_defaults(command=does.schema)
+
+    doctor = commands.add_parser("doctor", help="print what this machine has, for reports of errors")
+    doctor.set_defaults(command=does.doctor)
 
 
 def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
@@ -176,114 +209,14 @@ def _add_measurements(commands: "argparse._SubParsersAction[_Parser]") -> None:
         "--readings", action="store_true", help="compare what detectors read, not the exitance over the surface"
     )
     chart.add_argument("--quick", action="store_true", help="run a few coarse resolutions of each method only")
-    chart.set_defaults(command=_chart)
+    chart.set_defaults(command=does.chart)
 
     stress = commands.add_parser("stress", help="run the solver at extreme values and map where it fails")
     stress.add_argument(
         "--out", type=Path, default=Path("stress"), metavar="DIR", help="folder of the map; default: stress"
     )
     stress.add_argument("--quick", action="store_true", help="run a few values on each axis only")
-    stress.set_defaults(command=_stress)
-
-
-def _run(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch.launch import Launcher, seem_many  # noqa: PLC0415
-    from tetlux.meshing.host.blocks import CORES  # noqa: PLC0415
-
-    with Launcher() as launcher:
-        starts_early = options.scheduler is None and not options.resume
-        if starts_early and seem_many(options.cases):
-            # Its libraries load while those of this process do.
-            launcher.start_first(options.jobs or CORES)
-        return _run_with(launcher, options, starts_early=starts_early)
-
-
-def _run_with(launcher: "Launcher", options: argparse.Namespace, *, starts_early: bool) -> int:
-    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
-    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
-    from tetlux.cases.batch.engine import run_batch, worker_count  # noqa: PLC0415
-    from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
-    from tetlux.cases.results.batch_tables import BatchTables, results_file  # noqa: PLC0415
-    from tetlux.meshing.errors import RunError  # noqa: PLC0415
-
-    def expect(runs: int) -> None:
-        if starts_early:
-            launcher.prepare(worker_count(options.jobs, runs))
-
-    cases = load_all(options.cases, expect)
-    listeners: list[Listener] = [choose_display(len(cases), quiet=options.quiet)]
-    # The summary of a single run says all that tables would, unless there are tables that it belongs into.
-    if len(cases) > 1 or results_file(options.out).path.exists():
-        listeners += [RunLogs(), BatchTables()]
-    try:
-        ended = run_batch(
-            cases,
-            options.out,
-            jobs=options.jobs,
-            resume=options.resume,
-            scheduler=options.scheduler,
-            cache=not options.no_cache,
-            listeners=listeners,
-            launcher=launcher,
-        )
-    except RunError as error:
-        return _report(str(error), 1)
-    return 1 if ended.failed or ended.left else 0
-
-
-def _check(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
-
-    return check_all(options.cases, plan=options.plan)
-
-
-def _plan(options: argparse.Namespace) -> int:
-    from tetlux.cases.batch.requests import print_models  # noqa: PLC0415
-
-    return print_models(options.cases)
-
-
-def _list(_: argparse.Namespace) -> int:
-    from tetlux.cases.shipped import shipped_cases  # noqa: PLC0415
-
-    for name, sentence in shipped_cases().items():
-        print(f"{name:<10} {sentence}")
-    return 0
-
-
-def _show(options: argparse.Namespace) -> int:
-    from tetlux.cases.shipped import case_text  # noqa: PLC0415
-
-    print(case_text(options.case), end="")
-    return 0
-
-
-def _view(options: argparse.Namespace) -> int:
-    from tetlux.cases.viewer.view import view  # noqa: PLC0415
-
-    print(f"opened {view(options.result)}")
-    return 0
-
-
-def _chart(options: argparse.Namespace) -> int:
-    from tetlux.cases.chart.command import chart  # noqa: PLC0415
-
-    return chart(options.cases, options.out, readings=options.readings, quick=options.quick)
-
-
-def _stress(options: argparse.Namespace) -> int:
-    from tetlux.cases.stress.command import stress  # noqa: PLC0415
-
-    return stress(options.out, quick=options.quick)
-
-
-def _schema(_: argparse.Namespace) -> int:
-    import json  # noqa: PLC0415
-
-    from tetlux.cases.file.schema.case import CaseSpec  # noqa: PLC0415
-
-    print(json.dumps(CaseSpec.model_json_schema(), indent=2))
-    return 0
+    stress.set_defaults(command=does.stress)
 
 
 if __name__ == "__main__":

@@ -44,14 +44,16 @@ def plan_case(case: Case, runs: int = 1) -> Plan:
     return plan_of(request_of(case, runs))
 
 
-def request_of(case: Case, runs: int = 1) -> Request:
-    """What a case asks for."""
+def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
+    """What a case asks for; without `cache` past runs are neither looked at nor learned from."""
     need = ""
     # By default other models than "full" do without this output.
     if "volume" in case.outputs and (case.spec.model == AUTO or "outputs" in case.spec.model_fields_set):
         need = "the output volume is the fluence on a mesh"
     elif case.comparison is not None:
         need = "compare is of finite elements"
+    elif case.fluorophores:
+        need = "what dyes emit is solved for on a mesh"
     elif any(case.frequencies):
         need = MODULATED
     return make_request(
@@ -68,6 +70,7 @@ def request_of(case: Case, runs: int = 1) -> Request:
         detectors=[entry.detector for entry in case.detectors],
         need_of_mesh=need,
         runs=runs,
+        cache=cache,
     )
 
 

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -29,20 +29,25 @@ from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import add_prefix
 
 # Pictures and comparisons are imported where they are used: together they take as long as a small solve.
-if TYPE_CHECKING:
-    from tetlux.cases.picture.draw import PictureScene
-
 Report = Callable[[str], None]
-FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png", "viewer": PAGE}
+FILES = {
+    "surface": "surface.ply",
+    "volume": "volume.vtu",
+    "picture": "picture.png",
+    "viewer": PAGE,
+    "glb": "surface.glb",
+}
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
+MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
+FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -139,7 +144,7 @@ def finish_case(
             writing = time.perf_counter()
             try:
                 summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
-                publish(folder, target, ALL_FILES)
+                publish(folder, target, [*_more_pictures(folder, target), *ALL_FILES])
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
                 raise write_error(target, error) from error
@@ -188,6 +193,11 @@ def _write(
     return figures, warnings, readings
 
 
+def _more_pictures(*folders: Path) -> set[str]:
+    """Pictures beside the first one, of this run and of an earlier one."""
+    return {path.name for folder in folders for pattern in MORE_PICTURES for path in folder.glob(pattern)}
+
+
 def _seconds(results: Results, started: float, writing: float) -> dict[str, float]:
     """Seconds by stage, from the start of the command until now, of a run that began and was written at some time."""
     case, of_solve, now = results.case, results.solutions[0].seconds, time.perf_counter()
@@ -225,43 +235,27 @@ def _write_surface(results: Results, folder: Path) -> None:
 
 
 def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
-    """Draw the picture and write the viewer, which show the same."""
-    if not {"picture", "viewer"} & set(results.case.outputs):
-        return
-    scene = _picture_scene(results, readings)
-    if "picture" in results.case.outputs:
-        from tetlux.cases.picture.draw import draw_picture  # noqa: PLC0415
+    """Draw pictures and figures, and write the viewer and what renderers read."""
+    outputs = set(results.case.outputs)
+    if "figures" in outputs:
+        from tetlux.cases.write.figures import write_figures  # noqa: PLC0415
 
-        draw_picture(scene, folder / FILES["picture"])
-    if "viewer" in results.case.outputs:
+        write_figures(results, _places_lit(results.case), folder)
+    if not outputs & {"picture", "viewer", "glb", "mitsuba"}:
+        return
+    from tetlux.cases.write.pictures import draw_pictures, picture_scene  # noqa: PLC0415
+
+    if "picture" in outputs:
+        draw_pictures(results, readings, folder)
+    scene = picture_scene(results, readings)
+    if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
         write_viewer(results, readings, scene, folder / FILES["viewer"])
+    if outputs & {"glb", "mitsuba"}:
+        from tetlux.cases.write.renderers import write_for_renderers  # noqa: PLC0415
 
-
-def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> "PictureScene":
-    """Collect what the picture shows."""
-    from tetlux.cases.picture.arrows import light_rays  # noqa: PLC0415
-    from tetlux.cases.picture.draw import PictureScene, RegionOutline  # noqa: PLC0415
-
-    case = results.case
-    # Lights of all channels: one that is dark in the first may be bright in another.
-    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-    return PictureScene(
-        points=results.surface.points,
-        triangles=results.surface.faces,
-        exitance=results.exitance(),
-        unit=case.surface.unit,
-        title=case.name,
-        lights=tuple(ray for light in lights.values() for ray in light_rays(light, case.surface)),
-        colours=results.preview if results.has_colours else None,
-        up=case.up,
-        toward=case.toward,
-        regions=tuple(
-            RegionOutline(region.surface.name, region.surface.points, region.surface.faces) for region in case.regions
-        ),
-        detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
-    )
+        write_for_renderers(results, scene, folder)
 
 
 def _warnings(results: Results) -> list[str]:

@@ -13,6 +13,8 @@ from tetlux.cases.hints import did_you_mean
 
 # Suffixes of case files; JSON is a subset of YAML.
 SUFFIXES = (".yaml", ".yml", ".json")
+# In the library: what tetlux schema prints. Shipped cases name it in a comment.
+SCHEMA = "case.schema.json"
 
 
 def library_folder() -> Path:
@@ -24,6 +26,11 @@ def shipped_cases() -> dict[str, str]:
     """Names of the shipped case files, each with the sentence in its first line."""
     files = sorted(library_folder().glob("*.yaml"))
     return {path.stem: path.read_text(encoding="utf-8").splitlines()[0].lstrip("# ") for path in files}
+
+
+def schema_line() -> str:
+    """The comment by which editors find the JSON Schema of case files, and complete and check their keys."""
+    return f"# yaml-language-server: $schema={(library_folder() / SCHEMA).as_uri()}"
 
 
 def find_case_file(request: str) -> Path:
@@ -111,7 +118,7 @@ def _refuse_surface(path: Path) -> None:
 
 
 def case_text(request: str) -> str:
-    """Read the text of a case file; in a shipped one the path of its surface is made absolute, so that a copy runs.
+    """Read the text of a case file; in a shipped one paths are made absolute, so that a copy runs.
 
     Parameters
     ----------
@@ -136,6 +143,7 @@ def case_text(request: str) -> str:
         raise _input_error(f"{path} cannot be read: {error.strerror}; give a YAML case file.") from error
     if path.parent != library_folder():
         return text
+    text = text.replace(f"# yaml-language-server: $schema={SCHEMA}", schema_line())
     # JSON quotes the path as YAML needs it, whatever characters it has.
     return re.sub(r"(?<=file: )[\w.-]+", lambda name: json.dumps(str(library_folder() / name[0])), text)
 

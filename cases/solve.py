@@ -4,11 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.planning import AUTO, plan_case, request_of
+from tetlux.cases.planning import AUTO, request_of
+from tetlux.fem.assessment import Tolerances
+from tetlux.fem.dyes.solve import solve_pairs
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.meshless import ChargeSolution
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.solve import (
     AnySolution,
     FiniteElements,
@@ -38,9 +41,10 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
 
     elements = FiniteElements(solve_fully, solve_part)
     if model == AUTO:
-        plan = case.plan or plan_case(case)
+        request = request_of(case, case.plan.runs if case.plan else 1, cache=cache)
+        plan = case.plan or plan_of(request)
         report_plan(plan, report)
-        return solve_by_plan(request_of(case, plan.runs), elements, report, plan=plan)
+        return solve_by_plan(request, elements, report, plan=plan)
     if model == "closed-form":
         return solve_closed_forms(request_of(case))
     if model == "truncated":
@@ -57,6 +61,8 @@ def _solve_fully(
     part: tuple[Surface, Sequence[AnyMedium], Sequence[Region]] | None = None,
 ) -> list[Solution]:
     """Solve all channels by finite elements, on one mesh; of a part of the body if its surface, media, and regions."""
+    if case.fluorophores:
+        return _solve_dyes(case, report, cache=cache)
     whole = case.mesh or case.surface, [channel.media for channel in case.channels], case.regions
     body, media, regions = part or whole
     return solve_each(
@@ -75,6 +81,33 @@ def _solve_fully(
         frequency=case.frequencies,
         outside_index=case.outside_index,
     )
+
+
+def _solve_dyes(case: Case, report: Report, *, cache: bool) -> list[Solution]:
+    """Solve for the light that excites dyes and for what they emit, in the order of the channels."""
+    count = len(case.excitations)
+    media = [channel.media for channel in case.channels]
+    pairs = solve_pairs(
+        case.mesh or case.surface,
+        media[:count],
+        media[count:],
+        [list(channel.lights.values()) for channel in case.excitations],
+        case.fluorophores,
+        regions=case.regions,
+        tolerances=Tolerances(
+            case.tolerance,
+            case.detector_tolerance,
+            everywhere=case.everywhere_tolerance,
+            volume=case.volume_tolerance,
+        ),
+        detectors=[entry.detector for entry in case.detectors],
+        mesh=case.mesh,
+        frequency=[channel.frequency for channel in case.excitations],
+        outside_index=case.outside_index,
+        cache=cache,
+        report=report,
+    )
+    return [*(lit for lit, _ in pairs), *(glowing for _, glowing in pairs)]
 
 
 def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:

@@ -52,6 +52,13 @@ ALIASES: dict[str, tuple[str, ...]] = {
     "scatter_amplitude": ("a",),
     "scatter_power": ("b",),
     "chromophore": ("chromophores",),
+    "fluorophore": ("dyes", "fluorescence"),
+    "fluorophores": ("dyes", "fluorescence"),
+    "dye": ("dyes", "fluorescence"),
+    "yield": ("quantum_yield",),
+    "quantum_efficiency": ("quantum_yield",),
+    "efficiency": ("quantum_yield",),
+    "tau": ("lifetime",),
     "substance": ("material",),
     "preset": ("material",),
     # Sections.

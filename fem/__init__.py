@@ -1,6 +1,7 @@
 """Light diffusing in tetrahedra: media, lights, the weak form, and its solution."""
 
 from tetlux.fem.body.body import Body
+from tetlux.fem.dyes.solve import fluorescence
 from tetlux.fem.inverse.fit import FitResult, fit
 from tetlux.fem.inverse.problem import FitProblem
 from tetlux.fem.lights import (
@@ -19,6 +20,7 @@ from tetlux.fem.lights import (
     Rectangle,
 )
 from tetlux.fem.media.fields import grid_field, mesh_field
+from tetlux.fem.media.fluorophore import Fluorophore
 from tetlux.fem.media.materials import material
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.phase import henyey_greenstein, table, two_term
@@ -30,7 +32,7 @@ from tetlux.fem.meshless import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.detector_kinds import DiscDetector, FibreDetector, PointDetector
 from tetlux.fem.outcome.detectors import read
 from tetlux.fem.outcome.plan import Candidate, Plan
-from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.power import DyePower, Power
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
@@ -46,7 +48,7 @@ from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 from tetlux.fem.transient.moments import Moments, moments
-from tetlux.fem.transient.pulse import Transient, read_pulse
+from tetlux.fem.transient.transient import Transient
 from tetlux.fem.truncated import TruncatedSolution
 
 __all__ = [
@@ -60,11 +62,13 @@ __all__ = [
     "DiffusePatch",
     "Disc",
     "DiscDetector",
+    "DyePower",
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
     "FitProblem",
     "FitResult",
+    "Fluorophore",
     "Footprint",
     "Gaussian",
     "Grid",
@@ -92,6 +96,7 @@ __all__ = [
     "TruncatedSolution",
     "VaryingMedium",
     "fit",
+    "fluorescence",
     "grid_field",
     "henyey_greenstein",
     "material",
@@ -100,7 +105,6 @@ __all__ = [
     "plan",
     "radiance",
     "read",
-    "read_pulse",
     "sensitivity",
     "solve",
     "solve_each",

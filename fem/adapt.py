@@ -1,9 +1,10 @@
 """Mesh a body, solve, estimate the error and refine, until the tolerance is met for every scene."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from threading import Timer
+from typing import Protocol
 
 import numpy as np
 
@@ -12,11 +13,13 @@ from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, g
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
+from tetlux.fem.outcome.detectors import PlacedDetector
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution, System
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
@@ -33,6 +36,23 @@ Report = Callable[[str], None]
 SystemKind = tuple[tuple[AnyMedium, ...], complex]
 # Solves for one scene on a mesh, given its number and its solution on the coarser mesh, if there was one.
 SceneSolver = Callable[[int, MeshSolution | None], MeshSolution]
+
+
+class Emitter(Protocol):
+    """What is lit in one scene and lights another one, such as a dye."""
+
+    @property
+    def lit_in(self) -> int:
+        """The number of the scene that lights it."""
+        ...
+
+    def lights_on(self, lit: MeshSolution, system: System) -> SplitLights:
+        """Its light on a mesh, by the solution of the scene that lights it and the system of that."""
+        ...
+
+    def add_error(self, found: MeshSolution, lit: MeshSolution, system: System) -> MeshSolution:
+        """The solution for its light with the error that comes from the scene that lights it."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +73,8 @@ class Problem:
         The mesh to begin with, and what other problems have left on it.
     others : sequence of Deposit
         Lights of other problems that the first mesh is to be graded for too.
+    emitters : mapping of int to Emitter
+        By the number of the scene that they light, which comes after the one that lights them.
     """
 
     scenes: Scenes
@@ -62,6 +84,17 @@ class Problem:
     watch: Stopwatch
     shared: SharedMesh | None = None
     others: Sequence[Deposit] = ()
+    emitters: Mapping[int, Emitter] = field(default_factory=dict)
+
+    @property
+    def groups(self) -> list[list[int]]:
+        """Scenes that are solved for together; first those of the shortest mean free path, for the finest mesh."""
+        groups: dict[int, list[int]] = {}
+        for scene in range(len(self.lights)):
+            first = self.emitters[scene].lit_in if scene in self.emitters else scene
+            groups.setdefault(first, []).append(scene)
+        bodies = self.scenes.bodies
+        return sorted(groups.values(), key=lambda group: min(bodies[scene].shortest_mean_free_path for scene in group))
 
     @property
     def kinds(self) -> list[SystemKind]:
@@ -74,7 +107,10 @@ class Problem:
         return len(set(self.kinds)), sum(len(split.deposits) for split in self.lights)
 
     def solver_on(self, mesh: TetMesh) -> SceneSolver:
-        """A solver for single scenes on a mesh; scenes of the same media and shift share a matrix."""
+        """A solver for single scenes on a mesh; scenes of the same media and shift share a matrix.
+
+        A scene that an emitter lights is solved for after the one that lights it.
+        """
         each = dict.fromkeys(self.kinds)
         if self.shared is not None and mesh is self.shared.mesh:
             systems = {kind: self._shared_system(self.shared, kind) for kind in each}
@@ -84,7 +120,21 @@ class Problem:
                 (media, shift): self.scenes.system_on(mesh, media, self.lumping, assembly, shift, limit=self.limit)
                 for media, shift in each
             }
-        return lambda scene, coarser: systems[self.kinds[scene]].step(self.lights[scene], self.watch, coarser)
+        found: dict[int, MeshSolution] = {}
+
+        def solve(scene: int, coarser: MeshSolution | None) -> MeshSolution:
+            system, emitter = systems[self.kinds[scene]], self.emitters.get(scene)
+            if emitter is None:
+                found[scene] = system.step(self.lights[scene], self.watch, coarser)
+                return found[scene]
+            lit, by = found[emitter.lit_in], systems[self.kinds[emitter.lit_in]]
+            with self.watch.stage("assemble"):
+                lights = emitter.lights_on(lit, by)
+            step = system.step(lights, self.watch, coarser)
+            with self.watch.stage("solve"):
+                return emitter.add_error(step, lit, by)
+
+        return solve
 
     def _shared_system(self, shared: SharedMesh, kind: SystemKind) -> System:
         media, shift = kind
@@ -116,16 +166,14 @@ def first_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
         if tolerances.readings is not None:
-            detector_points = np.array([placed.position for placed in tolerances.placed])
-            all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
+            ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):
                 mesh = grade_between(
                     mesh,
                     scenes.surface,
                     scenes.inner,
                     media,
-                    all_points,
-                    detector_points,
+                    ways,
                     tolerances.readings,
                     most_tetrahedra,
                     shift,
@@ -133,6 +181,18 @@ def first_mesh(
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
+
+
+def _ways_of_light(problem: Problem, tolerances: Tolerances) -> list[tuple[FloatArray, FloatArray]]:
+    """Where light is deposited, (s, 3), and where it is read, (d, 3), for scenes of the same detectors together."""
+    by_detectors: dict[tuple[PlacedDetector, ...], list[Deposit]] = {}
+    for scene, split in enumerate(problem.lights):
+        by_detectors.setdefault(tolerances.placed_in(scene), []).extend(split.deposits)
+    return [
+        (places_to_resolve(deposits)[0], np.array([placed.position for placed in detectors]))
+        for detectors, deposits in by_detectors.items()
+        if deposits and detectors
+    ]
 
 
 @contextmanager
@@ -169,15 +229,15 @@ def solve_and_refine(
     list of MeshSolution
         One for each scene, all on the same mesh.
     """
-    # The scene of the shortest mean free path needs the finest mesh. When that is found, the others are solved for.
-    bodies = problem.scenes.bodies
-    first, *pending = sorted(range(len(bodies)), key=lambda scene: bodies[scene].shortest_mean_free_path)
+    # When the mesh is found that the first scenes need, the others are solved for.
+    first, *others = problem.groups
+    pending = [scene for group in others for scene in group]
     solve_on = problem.solver_on(mesh)
-    steps = best_steps = {first: solve_on(first, None)}
+    steps = best_steps = {scene: solve_on(scene, None) for scene in first}
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = tolerances.assess(list(steps.values()))
+            found = tolerances.assess(steps)
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
@@ -193,6 +253,6 @@ def solve_and_refine(
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.
             chosen = steps if fine_enough else best_steps
-            return [chosen[scene] for scene in range(len(bodies))]
+            return [chosen[scene] for scene in range(len(problem.lights))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf

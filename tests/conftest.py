@@ -45,12 +45,13 @@ def needs(*packages: str) -> pytest.MarkDecorator:
 
 @pytest.fixture(autouse=True, scope="session")
 def _own_mesh_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Tests read and write no mesh of the user's cache; all processes of a run of the tests share one."""
+    """Tests read and write no mesh of the user's cache, and learn nothing; all processes of a run share one cache."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TETLUX_CACHE_DIR", str(folder / "meshes"))
+        patch.setenv("TETLUX_LEARN", "0")
         yield
 
 

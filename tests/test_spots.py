@@ -22,7 +22,8 @@ NOISE = RNG.random((64, 48))
 
 
 def power(spot: Spot, mesh: TetMesh, *, direction: Vector = DOWN, from_center: bool = False) -> float:
-    return deposit_on_mesh(CollimatedBeam(direction, 1.0, spot, from_center=from_center), mesh, MATCHED).ledger.incident
+    beam = CollimatedBeam(direction, 1.0, spot, from_center=from_center)
+    return float(deposit_on_mesh(beam, mesh, MATCHED).ledger.incident)
 
 
 SPOTS: dict[str, Spot] = {

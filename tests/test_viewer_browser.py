@@ -2,7 +2,6 @@
 
 import io
 import math
-import shutil
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,18 +12,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.viewer_made import data_of, run_with_viewer
+from tests.viewer_made import CHROMIUM, OPTIONS, data_of, run_with_viewer
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.search.rays import RayCaster
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on the path"),
     pytest.mark.skipif(find_spec("playwright") is None, reason="playwright, which drives Chromium, is not installed"),
-]
-OPTIONS = [
-    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"),
-    *("--disable-component-update", "--disable-sync", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
 ]
 SIZES = {"wide": (1280, 900), "phone": (390, 844)}
 SMALL = (872, 500)
@@ -32,6 +26,11 @@ FIRST = (
     "quantity: 'exitance', channel: 'all', light: 'all', logarithmic: true, map: 'inferno', edges: false, "
     "lights: true, detectors: true, regions: true, cut: 'off', position: 0.5"
 )
+# Draw what is asked for, then as finely as at rest.
+AT_REST = (
+    "new Promise(requestAnimationFrame).then(() => new Promise(requestAnimationFrame)).then(() => tetlux.render(true))"
+)
+RESTED = "new Promise(done => {const look = () => tetlux.sharpness.resting ? done() : setTimeout(look, 20); look()})"
 # What the driver of the screen says of its own speed.
 OF_THE_DRIVER = "GPU stall due to ReadPixels"
 
@@ -69,11 +68,12 @@ class Page:
 
     def change(self, changes: str) -> FloatArray:
         """Change the state, and return what the canvas shows then."""
-        self.do(f"tetlux.change({{{changes}}}).then(() => tetlux.render())")
+        self.do(f"tetlux.change({{{changes}}})")
         return self.shown()
 
     def shown(self) -> FloatArray:
-        """The canvas of the body, red, green and blue from 0 to 255."""
+        """The canvas of the body at rest, red, green and blue from 0 to 255."""
+        self.do(AT_REST)
         box = self.do("(({left, top, width, height}) => [left, top, width, height])(view.getBoundingClientRect())")
         clip = dict(zip(("x", "y", "width", "height"), box, strict=True))
         with Image.open(io.BytesIO(self.page.screenshot(clip=clip))) as image:
@@ -246,6 +246,17 @@ def test_the_cut_shows_the_fluence_of_the_volume(wide: Page, folder: Path) -> No
     weights = np.column_stack([1 - inner.sum(axis=1), inner])
     own = int(np.argmax(weights.min(axis=1)))
     assert number(lines["fluence"]) == pytest.approx(float(weights[own] @ values[cells[own]]), rel=1e-3)
+
+
+def test_it_is_drawn_coarsely_in_motion_and_finely_at_rest(wide: Page) -> None:
+    wide.do(RESTED)
+    width = "tetlux.renderer.domElement.width / tetlux.size[0]"
+    assert wide.do(width) == 2
+    # As on a machine that is slow.
+    moving = wide.do("tetlux.view.turn(0.1, 0), tetlux.sharpness.moving = 0.5, tetlux.render(false), " + width)
+    assert moving == 0.5
+    wide.do(RESTED)
+    assert wide.do(width) == 2
 
 
 def test_keys_turn_zoom_and_switch(wide: Page) -> None:

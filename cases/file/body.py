@@ -1,22 +1,27 @@
 """The body of a case with its media, built from the case file: a surface and regions, or a mesh and labels."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
+from tetlux.cases.file.channel_context import find_part
 from tetlux.cases.file.channels import check_unique_names
 from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import BODY
 from tetlux.cases.file.media import read_media
 from tetlux.cases.file.reader import Reader
 from tetlux.cases.file.schema.case import CaseSpec, MeshSpec
+from tetlux.cases.file.schema.fluorescence import DyeSpec, FluorescenceSpec
+from tetlux.cases.file.schema.media import Media
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition, SurfacePartition
 from tetlux.fem.labels import find_label, order_outermost_first
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, check_labels
+from tetlux.fem.media.fluorophore import Fluorophore
 from tetlux.fem.media.region import Region
 from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.validity.notes import check_compatible, check_media, check_size
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.mesher.api import check_thickness
 from tetlux.meshing.surface.surface import Surface
@@ -122,6 +127,61 @@ def _read_regions(
             check_regions(surface, inner_surfaces)
         reader.files.nested.add(body)
     return names, tuple(regions)
+
+
+def read_emission(
+    document: Document, spec: FluorescenceSpec | None, body: CaseBody, reader: Reader
+) -> tuple[CaseBody | None, tuple[Fluorophore, ...]]:
+    """Read the body with its media at the wavelength that dyes emit, and the dyes; None and none without dyes.
+
+    Raises
+    ------
+    InputError
+        With the file, the line and the key.
+    """
+    if spec is None:
+        return None, ()
+    key: Key = ("fluorescence",)
+    dyes, count = [], len(body.media)
+    whole = body.surface.points if body.mesh is None else body.mesh.points
+    for i, dye in enumerate(spec.dyes):
+        with document.at((*key, "dyes", i), {name: (name,) for name in DyeSpec.model_fields}):
+            region = find_part(body.parts, dye.region)
+            dyes.append(Fluorophore(dye.absorption, dye.quantum_yield, dye.lifetime, region))
+    own: dict[int | None, tuple[AnyMedium, ...]] = {}
+
+    def read(where: Key, medium: Media, points: FloatArray) -> tuple[AnyMedium, ...]:
+        return read_media(document, where, medium, points, body.surface.unit, count, reader)
+
+    for name, medium in spec.regions.items():
+        where: Key = (*key, "regions", name)
+        with document.at(where):
+            number = find_part(body.parts, name)
+            if number is None or (body.mesh is None and number == 0):
+                raise InputError("this is the medium of the body; give it as fluorescence.emission.", field="regions")
+        own[number] = read(where, medium, whole if body.mesh else body.regions[number - 1].surface.points)
+    outer = read((*key, "emission"), spec.emission, whole)
+    regions = tuple(
+        Region(region.surface, own.get(number, region.medium)) for number, region in enumerate(body.regions, 1)
+    )
+    by_label = tuple(
+        {label: own.get(label, outer)[channel] for label in media} for channel, media in enumerate(body.by_label)
+    )
+    emitting = replace(body, media=outer, regions=regions, by_label=by_label)
+    with document.at((*key, "emission")):
+        for each in emitting.bodies:
+            check_media(each)
+    return emitting, tuple(dyes)
+
+
+def join_regions(body: CaseBody, emitting: CaseBody) -> tuple[Region, ...]:
+    """The regions of a body with their media in its channels, and after these in those of the emission."""
+    pairs = zip(body.regions, emitting.regions, strict=True)
+    return tuple(Region(a.surface, [*_list_of(a.medium), *_list_of(b.medium)]) for a, b in pairs)
+
+
+def _list_of(medium: AnyMedium | Sequence[AnyMedium]) -> Sequence[AnyMedium]:
+    return [medium] if isinstance(medium, AnyMedium) else medium
 
 
 def _read_mesh_body(document: Document, spec: MeshSpec, unit: str, channels: int, reader: Reader) -> CaseBody:

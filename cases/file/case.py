@@ -10,6 +10,7 @@ from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.picture.view import UPRIGHT
 from tetlux.fem.lights import Light
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
+from tetlux.fem.media.fluorophore import Fluorophore
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
 from tetlux.fem.outcome.plan import Plan
@@ -94,6 +95,9 @@ class Case:
         The values of this run of a sweep, plain data by dotted key; empty without a sweep.
     plan : Plan, optional
         Which model solves it, where the case file leaves that to the program.
+    fluorophores : tuple of Fluorophore
+        If there are any, the second half of the channels are what they emit, lit by the first half; and regions have
+        media for all of these.
     """
 
     name: str
@@ -118,6 +122,12 @@ class Case:
     comparison: "Comparison | None" = None
     mesh: TetMesh | None = None
     plan: Plan | None = None
+    fluorophores: tuple[Fluorophore, ...] = ()
+
+    @property
+    def excitations(self) -> tuple[Channel, ...]:
+        """The channels that are lit, of a case with dyes the first half."""
+        return self.channels[: len(self.channels) // 2] if self.fluorophores else self.channels
 
     @property
     def channel_names(self) -> tuple[str, ...]:

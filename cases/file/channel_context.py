@@ -42,8 +42,19 @@ class ChannelContext:
         InputError
             If no region has this name.
         """
-        if name is None:
-            return None
-        if str(name) not in self.regions:
-            raise InputError(f'there is no region "{name}"; the regions here are {", ".join(self.regions)}.')
-        return self.regions[str(name)]
+        return find_part(self.regions, name)
+
+
+def find_part(parts: Mapping[str, int | None], name: str | int | None) -> int | None:
+    """The number of a region or label by its name; None stands for the whole body.
+
+    Raises
+    ------
+    InputError
+        If none has this name.
+    """
+    if name is None:
+        return None
+    if str(name) not in parts:
+        raise InputError(f'there is no region "{name}"; the regions here are {", ".join(parts)}.', field="region")
+    return parts[str(name)]

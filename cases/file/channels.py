@@ -9,6 +9,8 @@ from tetlux.cases.file.schema.media import MaterialSpec, Media, TissueSpec
 
 # The name of a single channel, and that of the sum of all lights.
 ALL = "all"
+# What the light that excites dyes and the light that they emit are called, alone or after the name of a channel.
+EXCITATION, EMISSION = "excitation", "emission"
 
 
 def value_in_channel(value: float | list[float], channel: int) -> float:
@@ -44,6 +46,12 @@ def channel_names(document: Document, spec: CaseSpec) -> tuple[str, ...]:
     if set(spec.channels) == set(RGB) and tuple(spec.channels) != RGB:
         raise document.error(("channels",), "give red, green and blue in this order, that of materials and images.")
     return tuple(spec.channels)
+
+
+def names_with_emission(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the channels of a case with dyes: of the light that excites them, then of the light that they emit."""
+    kinds = EXCITATION, EMISSION
+    return kinds if names == (ALL,) else tuple(f"{name}_{kind}" for kind in kinds for name in names)
 
 
 def check_unique_names(document: Document, section: str, names: list[str] | tuple[str, ...]) -> None:
@@ -104,6 +112,14 @@ def _media(spec: CaseSpec) -> Iterator[tuple[Key, Media]]:
         yield ("regions", i, "medium"), region.medium
 
 
+def _media_of_emission(spec: CaseSpec) -> Iterator[tuple[Key, Media]]:
+    """The media at the wavelength that dyes emit, which may differ in their wavelengths from all others."""
+    if spec.fluorescence is not None:
+        yield ("fluorescence", "emission"), spec.fluorescence.emission
+        for name, medium in spec.fluorescence.regions.items():
+            yield ("fluorescence", "regions", name), medium
+
+
 def _describe(length: int) -> str:
     return "1 channel" if length == 1 else f"{length} channels"
 
@@ -112,7 +128,7 @@ def _lists(spec: CaseSpec) -> Iterator[tuple[Key, int]]:
     """The keys of all values that are lists by channel, and their lengths."""
     if spec.channels is not None:
         yield ("channels",), len(spec.channels)
-    for key, medium in _media(spec):
+    for key, medium in (*_media(spec), *_media_of_emission(spec)):
         yield from _lists_of_medium(key, medium)
     if spec.modulation is not None and isinstance(spec.modulation.frequency, list):
         yield ("modulation", "frequency"), len(spec.modulation.frequency)

@@ -6,10 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tetlux.cases.file.body import CaseBody, read_body
+from tetlux.cases.file.body import CaseBody, join_regions, read_body, read_emission
 from tetlux.cases.file.case import Case, Channel
 from tetlux.cases.file.channel_context import ChannelContext
-from tetlux.cases.file.channels import ALL, channel_names, check_unique_names, value_in_channel
+from tetlux.cases.file.channels import ALL, channel_names, check_unique_names, names_with_emission, value_in_channel
 from tetlux.cases.file.detectors import NamedDetector, build_detector
 from tetlux.cases.file.documents.base import read_with_base
 from tetlux.cases.file.documents.document import Document, Key
@@ -19,6 +19,7 @@ from tetlux.cases.file.schema.case import CaseSpec, ModulationSpec
 from tetlux.cases.file.sweeps.expand import expand_sweep
 from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
+from tetlux.cases.picture.requests import check_pictures
 from tetlux.cases.picture.view import toward_camera
 from tetlux.cases.start import take_start_seconds
 from tetlux.fem.inputs import unit_vector
@@ -97,7 +98,10 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         _check_for_charges(document, body)
     names = light_names(spec)
     check_unique_names(document, "lights", names)
-    _check_value_names(document, channels, names)
+    emitting, dyes = read_emission(document, spec.fluorescence, body, reader)
+    all_names = channels if emitting is None else names_with_emission(channels)
+    _check_value_names(document, all_names, names)
+    check_pictures(document, spec, body.surface, all_names, names)
     frequencies = _build_frequencies(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
     if spec.model == "closed-form":
@@ -106,9 +110,10 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         name=name,
         source=document.path,
         surface=body.surface,
-        channels=tuple(map(Channel, channels, body.media, lights, body.by_label or body.media, frequencies)),
+        channels=_channels_of(all_names, [body] if emitting is None else [body, emitting], lights, frequencies),
+        fluorophores=dyes,
         light_names=names,
-        regions=body.regions,
+        regions=body.regions if emitting is None else join_regions(body, emitting),
         mesh=body.mesh,
         tolerance=spec.tolerances.exitance,
         detector_tolerance=spec.tolerances.detectors,
@@ -123,6 +128,18 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         toward=_direction_to_camera(document, spec, body.surface),
         comparison=_build_comparison(document, spec, body, deposits),
     )
+
+
+def _channels_of(
+    names: Sequence[str],
+    bodies: Sequence[CaseBody],
+    lights: Sequence[Mapping[str, Light]],
+    frequencies: Sequence[float],
+) -> tuple[Channel, ...]:
+    """The channels, those of each body after one another."""
+    media = [medium for body in bodies for medium in body.media]
+    in_parts = [medium for body in bodies for medium in body.by_label or body.media]
+    return tuple(map(Channel, names, media, [*lights] * len(bodies), in_parts, [*frequencies] * len(bodies)))
 
 
 def _build_frequencies(document: Document, spec: CaseSpec, body: CaseBody) -> list[float]:
@@ -146,8 +163,9 @@ def _build_comparison(
     from tetlux.cases.compare.comparison import comparison_for  # noqa: PLC0415
 
     with document.at(("compare",)):
-        if spec.modulation:
-            raise InputError("closed forms here are those of steady light; leave compare or modulation out.")
+        if spec.modulation or spec.fluorescence:
+            beside = "modulation" if spec.modulation else "fluorescence"
+            raise InputError(f"closed forms here are those of steady light alone; leave compare or {beside} out.")
         if len(body.media) > 1 or body.regions or not isinstance(body.media[0], Medium):
             raise InputError("closed forms exist for one channel and one uniform medium only; leave compare out.")
         return comparison_for(body.surface.shape, body.media[0], deposits, spec.compare)

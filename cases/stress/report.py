@@ -38,15 +38,16 @@ def as_markdown(trials: Sequence[Trial]) -> str:
     groups = list(_groups(trials))
     lines = [f"| {' | '.join(HEADS)} |", "|---|---|" + "---:|" * (len(HEADS) - 2)]
     lines += [f"| {' | '.join(_row(group))} |" for group in groups]
-    lines += ["", NOTE, "", "## Violations", ""]
-    found = [f"* {_place(trial)}: {rule}, {figure}." for trial in trials for rule, figure in violations(trial).items()]
-    lines += found or ["None."]
-    lines += ["", "## What breaks where", ""]
+    lines += ["", NOTE, "", "## What breaks where", ""]
     breaking = [line for group in groups for line in _ranges(group)]
     lines += breaking or ["Nothing."]
     lines += ["", "## Refused", ""]
     refused = Counter((trial.panel.name, trial.message) for trial in trials if trial.outcome == "refused")
     lines += [f"* {panel}, {_times(count)}: {message}" for (panel, message), count in refused.items()] or ["Nothing."]
+    # Last, since the end of a long log is what its reader sees.
+    lines += ["", "## Violations", ""]
+    found = [f"* {_place(trial)}: {rule}, {figure}." for trial in trials for rule, figure in violations(trial).items()]
+    lines += found or ["None."]
     return "\n".join(lines) + "\n"
 
 

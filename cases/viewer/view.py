@@ -1,4 +1,4 @@
-"""`view`: open the viewer of a run in the browser."""
+"""`open_viewer`: open the viewer of a run in the browser."""
 
 import webbrowser
 from pathlib import Path
@@ -7,7 +7,7 @@ from tetlux.cases.viewer import PAGE
 from tetlux.meshing.errors import InputError
 
 
-def view(result: Path) -> Path:
+def open_viewer(result: Path) -> Path:
     """Open ``viewer.html`` of a run in the web browser.
 
     Parameters

@@ -78,6 +78,14 @@ class Results:
         of_channels = [modulus(self._amplitude(name, light)) for name in names]
         return reduce(np.add, of_channels, np.zeros(len(self.surface.points)))
 
+    def shown(self) -> FloatArray:
+        """What pictures show at the vertices, (v,), W/unit²: all channels, or of a case with dyes what these emit."""
+        case = self.case
+        if not case.fluorophores:
+            return self.exitance()
+        emitted = case.channel_names[len(case.excitations) :]
+        return reduce(np.add, [self.exitance(name) for name in emitted])
+
     def phase(self, channel: str, light: str = ALL) -> FloatArray:
         """How far the exitance of a channel and a light, or of all lights, lags at the vertices, (v,), degrees."""
         return lag(self._amplitude(channel, light))
@@ -135,7 +143,7 @@ def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
 
 def _shows_surface(case: Case) -> bool:
     """Whether the exitance is written or drawn, or an even preview of it needs vertices everywhere."""
-    return bool({"surface", "picture", "viewer"} & set(case.outputs)) or case.channel_names == RGB
+    return bool(set(case.outputs) - {"volume"}) or case.channel_names == RGB
 
 
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:

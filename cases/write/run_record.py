@@ -37,7 +37,7 @@ def _case_file_of(case: Case) -> dict[str, Any]:
     for section, names_of_section in names.items():
         for entry, name in zip(scene[section], names_of_section, strict=True):
             entry["name"] = name
-    if len(case.channels) > 1:
+    if len(case.channels) > 1 and not case.fluorophores:
         scene["channels"] = list(case.channel_names)
     _make_paths_absolute(scene, case.source.parent)
     return scene

@@ -31,6 +31,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 MORE_TOLERANCES = ("detector_tolerance", "everywhere_tolerance", "volume_tolerance")
 # Finite elements on the whole body have a name of their own in summaries.
 MODEL_NAMES = {"full": "fem"}
+# What becomes of the power that a dye takes from steady light.
+DYE_LEDGER = ("absorbed", "lost", "emitted")
 LIBRARIES = ("tetlux", "numpy", "scipy", "scikit-fem", "pyamg", "pytetwild", "embreex", "pyvista", "trimesh")
 
 
@@ -70,7 +72,11 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
         **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
         **({"plan": describe_plan(plan, results.solutions)} if plan else {}),
-        **({"mesh": _mesh(case, mesh, _meshed_surface(results.mesh_solutions[0]))} if mesh else {}),
+        **(
+            {"mesh": _mesh(case, mesh, _meshed_surface(results.mesh_solutions[0]))}
+            if mesh
+            else {"left_out": _left_out(results.solutions[0].model)}
+        ),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
@@ -78,6 +84,16 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
         "warnings": warnings,
         "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
+    }
+
+
+def _left_out(model: str) -> dict[str, str]:
+    """Why a run without a mesh lacks what other runs have."""
+    instead = "write model: full"
+    return {
+        "mesh": f"model {model} makes none; {instead}",
+        "fluence": f"it has no largest value at points, whose fluence model {model} does not spread over a mesh",
+        "validity": f"valid and model_error are computed on a mesh; {instead}",
     }
 
 
@@ -118,6 +134,7 @@ def _channel(
         },
         "error_estimate": finite(solution.error_estimate),
         **_figures_of_model(solution),
+        **_dyes(solution),
     }
     if several:
         lights = solutions_by_light(list(channel.lights), solution)
@@ -145,6 +162,13 @@ def _labels(mesh: TetMesh) -> list[dict[str, Any]]:
     """The labels of a mesh that the case gives, with their names and volumes."""
     volumes = mesh.region_volumes.items()
     return [{"label": label, "name": mesh.labels.get(label), "volume": volume} for label, volume in volumes]
+
+
+def _dyes(solution: AnySolution) -> dict[str, list[dict[str, float]]]:
+    """The ledger of each dye that emits the light of a channel, in the order of the case; of modulated light moduli."""
+    dyes = solution.dyes if isinstance(solution, Solution) else ()
+    names = ("absorbed", "lost", "emitted", "stored") if any(dye.stored for dye in dyes) else DYE_LEDGER
+    return {"dyes": [{name: _size(getattr(dye, name)) for name in names} for dye in dyes]} if dyes else {}
 
 
 def _size(value: Number) -> Number:

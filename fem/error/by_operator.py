@@ -34,8 +34,10 @@ def estimate_by_operator(
     estimates = []
     for operator in dict.fromkeys(load.operator for load in loads):
         own = [light for light, load in enumerate(loads) if load.operator is operator]
-        emission = sum((loads[light].deposit.terms.emission for light in own), 0.0)
-        # Emission is uniform, and only nonuniform deposits make the exitance ripple.
+        terms = [loads[light].deposit.terms for light in own]
+        emission = sum((each.emission for each in terms), 0.0)
+        emission = emission + sum(source.density for each in terms for source in each.volume_sources)
+        # Only nonuniform deposits make the exitance ripple.
         uneven = [loads[light].at_nodes for light in own if not loads[light].deposit.terms.is_distributed]
         estimates.append(
             estimate_error(
@@ -53,4 +55,5 @@ def estimate_by_operator(
         np.sum([each.exitance_indicators for each in estimates], axis=0),
         np.sum([each.power_indicators for each in estimates], axis=0),
         np.max([each.splits for each in estimates], axis=0),
+        estimates[-1].duals,
     )

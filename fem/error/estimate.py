@@ -58,11 +58,14 @@ class Estimate:
         Indicators of the tetrahedra; they sum to the relative errors of the exitance and of the total exited power.
     splits : (m,) ndarray of int
         How often a tetrahedron has to be split at once for its error in the exitance to become less.
+    duals : (n, 2) ndarray
+        The dual solutions of both; of several parts those of the last.
     """
 
     exitance_indicators: FloatArray
     power_indicators: FloatArray
     splits: IntArray
+    duals: NumberArray
 
     @property
     def error(self) -> float:
@@ -111,9 +114,26 @@ def estimate_error(
     if total <= ROUNDING * abs(whole.power.incident):
         # Where no light leaves, the exitance has no error.
         count = len(mesh.tetrahedra)
-        return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64))
+        no_duals = np.zeros((len(mesh.points), 2))
+        return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64), no_duals)
     duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
-    mean = nodal_averaging(mesh)
+    indicators, power_indicators = weigh_residual(solution, coefficients, duals, emission, inner, fitting)
+    indicators += ripple_indicators(mesh, coefficients, load, norm)
+    unresolved = _unresolved_indicators(solution, norm)
+    splits = np.where(unresolved > indicators, _splits_to_resolve(solution), 1)
+    return Estimate(indicators + unresolved, power_indicators, splits, duals)
+
+
+def weigh_residual(
+    solution: Solution,
+    coefficients: Coefficients,
+    duals: NumberArray,
+    emission: float | FloatArray = 0.0,
+    inner: Sequence[Surface] = (),
+    fitting: LayerFitting | None = None,
+) -> list[FloatArray]:
+    """Indicators of the tetrahedra, (m,), by each of several dual solutions (n, k): see `estimate_error`."""
+    mesh, mean = solution.mesh, nodal_averaging(solution.mesh)
     smooth, difference = subtract_patches(solution, mean)
     gradient_error = root_mean_square(difference)
     remainder, outward_flux = _remainder(solution)
@@ -142,11 +162,7 @@ def estimate_error(
             mesh, coefficients, inner, emission, (solution.fluence, dual)
         )
 
-    indicators, power_indicators = map_in_threads(indicators_for_dual, list(duals.T))
-    indicators += ripple_indicators(mesh, coefficients, load, norm)
-    unresolved = _unresolved_indicators(solution, norm)
-    splits = np.where(unresolved > indicators, _splits_to_resolve(solution), 1)
-    return Estimate(indicators + unresolved, power_indicators, splits)
+    return map_in_threads(indicators_for_dual, list(duals.T))
 
 
 def _dual_loads(

@@ -9,6 +9,7 @@ from tetlux.fem.media.fresnel import boundary_factor_classic, boundary_factor_ex
 from tetlux.fem.media.phase import PhaseFunction
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.html import html_table
 
 BoundaryKind = Literal["exact", "classic"]
 
@@ -174,3 +175,14 @@ class Medium:
         return self.sigma_s * (1.0 - peak), (g - peak) / (1.0 - peak)
 
     __repr__ = one_line
+
+    def _repr_html_(self) -> str:
+        rows = [
+            ("absorption sigma_a", f"{self.sigma_a:.4g} /unit"),
+            ("reduced scattering sigma_s'", f"{self.reduced_scattering:.4g} /unit"),
+            ("refractive index eta", f"{self.eta:.4g}"),
+            ("transport mean free path", f"{self.mean_free_path:.4g} unit"),
+            ("reduced albedo", f"{self.albedo:.4g}"),
+            ("effective attenuation sigma_tr", f"{self.sigma_tr:.4g} /unit"),
+        ]
+        return html_table("Medium", rows)

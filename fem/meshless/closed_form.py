@@ -13,6 +13,7 @@ from tetlux.fem.meshless.exact_field import ExactField, exact_field
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.outcome.shown import Shown
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
@@ -28,7 +29,7 @@ RESOLUTION = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedFormSolution:
+class ClosedFormSolution(Shown):
     """Light in a body by closed forms; what `tetlux.fem.Solution` is with a mesh.
 
     Attributes

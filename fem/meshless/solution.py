@@ -25,6 +25,7 @@ from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.outcome.shown import Shown
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -51,7 +52,7 @@ class LightLedger:
 
 
 @dataclass(frozen=True, eq=False)
-class ChargeSolution:
+class ChargeSolution(Shown):
     """Light in one body, as sums of screened charges; what `tetlux.fem.Solution` is with a mesh.
 
     Attributes
@@ -294,7 +295,6 @@ def charge_solution(
     light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
     fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
-    fitted_at = tuple(each.placement.fitted for each in fit.placements)
-    return ChargeSolution(
-        surface, medium, tuple(interfaces), fit.fields, fitted_at, sources, tuple(ledgers), fit.errors
-    )
+    samples_of_all = tuple(each.placement.fitted for each in fit.placements)
+    solved = tuple(interfaces), fit.fields, samples_of_all, sources, tuple(ledgers), fit.errors
+    return ChargeSolution(surface, medium, *solved)

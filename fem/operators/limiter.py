@@ -32,16 +32,19 @@ def limit_to_nonnegative(fluence: FloatArray, edges: IntArray, weights: FloatArr
     Returns
     -------
     fluence : (n,) ndarray
-        None below zero, and the sum of weights times fluence as before; as it was if that sum is below 1e-250.
+        None below zero, and the sum of weights times fluence as before. Where that sum is below 1e-250, nodes together
+        lack more than they have: those below zero are then raised to it, and the sum grows.
     limited_power : float
         Power that was taken from some nodes and given to others, W.
     """
     power = weights * fluence
     total = float(power.sum())
-    if fluence.min(initial=0.0) >= 0 or total < SMALLEST_DIVISOR:
+    if fluence.min(initial=0.0) >= 0:
         return fluence, 0.0
     deficit, available = np.maximum(-power, 0.0), np.maximum(power, 0.0)
     limited_power = float(deficit.sum())
+    if total < SMALLEST_DIVISOR:
+        return np.maximum(fluence, 0.0), limited_power
 
     def ratio(a: FloatArray, b: FloatArray) -> FloatArray:
         return divide_or_zero(a, b, SMALLEST_DIVISOR)

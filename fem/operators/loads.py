@@ -16,7 +16,7 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.ledger import Ledger
 from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
-from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
@@ -33,12 +33,12 @@ class Load:
     operator : Operator
         The operator that is solved with.
     at_nodes : (n,) ndarray
-        The right-hand side, W.
+        The right-hand side, W; complex where modulated light excites dyes.
     """
 
     deposit: Deposit
     operator: Operator
-    at_nodes: FloatArray
+    at_nodes: NumberArray
 
     @property
     def has_first_moment(self) -> bool:
@@ -67,7 +67,7 @@ def load_of(deposit: Deposit, operator: Operator) -> Load:
 
 def load_vector(
     mesh: TetMesh, coefficients: Coefficients, terms: SourceTerms, boundary: BoundaryCondition | None = None
-) -> FloatArray:
+) -> NumberArray:
     """Load of source terms on the nodes of a mesh.
 
     Parameters
@@ -99,7 +99,7 @@ def load_vector(
         load[mesh.boundary_nodes] += mesh.boundary_node_areas * inflow
     if np.any(terms.emission):
         load += mesh.to_nodes(terms.emission * mesh.volumes)
-    return load
+    return np.asarray(load + sum(source.at_nodes for source in terms.volume_sources))
 
 
 def _point_load(mesh: TetMesh, points: FloatArray, powers: FloatArray, point_cells: IntArray) -> FloatArray:

@@ -9,7 +9,8 @@ from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
+from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -37,7 +38,7 @@ def solution_of_light(
     Solution
     """
     deposited, terms, operator = load.deposit.ledger, load.deposit.terms, load.operator
-    mesh, limited_power = operator.mesh, 0.0
+    mesh, limited_power, solved = operator.mesh, 0.0, fluence
     may_be_negative = load.has_first_moment or any(each.patch.charges.has_negative_source for each in subtractions)
     if limit and operator.model.nonnegative and not may_be_negative:
         fluence, limited_power = limit_to_nonnegative(fluence, mesh.edges, operator.loss_weights)
@@ -45,6 +46,8 @@ def solution_of_light(
     transmitted = mesh.boundary_node_areas * terms.transmitted_irradiance
     emitted = float((mesh.volumes * terms.emission).sum())
     absorbed = (operator.absorption_weights * fluence).sum().item()
+    # Power that nodes lack together stays in the ledger: the known light that is absorbed is too large by it.
+    absorbed += (operator.loss_weights * (solved - fluence)).sum().item()
     ledger = Power(
         incident=deposited.incident + float(outside.sum()) + emitted,
         specular=deposited.specular + float((outside - transmitted).sum()),
@@ -63,6 +66,8 @@ def solution_of_light(
         tuple(each.patch for each in subtractions),
         terms.transmitted_irradiance,
         limited_power=limited_power,
+        known_absorption=tuple(each.terms.absorbed for each in subtractions),
+        fitting=operator.fitting,
     )
     exited = (mesh.boundary_node_areas @ solution.exitance).item() + sum(each.terms.exited for each in subtractions)
     return replace(solution, power=replace(ledger, exited=exited))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tetlux.meshing.describe import percent
+from tetlux.meshing.html import html_table
 
 Model = Literal["closed-form", "charges", "truncated", "full"]
 
@@ -29,6 +30,10 @@ class Candidate:
         What it does, or why it is not a way.
     suits : bool
         Whether it can give what is asked for, within the tolerance.
+    kind : str
+        What runs are told apart by that others are predicted from.
+    learned : tuple of (float, float)
+        Factors of past runs, see `tetlux.fem.planner.costs`, on the seconds and the error, which contain them.
     """
 
     model: Model
@@ -37,6 +42,8 @@ class Candidate:
     bytes: float
     reason: str
     suits: bool
+    kind: str = ""
+    learned: tuple[float, float] = (1.0, 1.0)
 
     def __str__(self) -> str:
         name = f"{self.model:{WIDTH}}  "
@@ -104,6 +111,13 @@ class Plan:
                 f"  diffusion itself is off by {near}{percent(self.model_error)} elsewhere, whatever the model"
             )
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        title, *lines = str(self).splitlines()
+        # Those of candidates begin with the name of the model.
+        first = len(self.candidates)
+        rows = [(each.model, str(each).partition("  ")[2].strip()) for each in self.candidates]
+        return html_table(title, [*rows, *(("note", line.strip()) for line in lines[first:])])
 
 
 def cheapest(candidates: tuple[Candidate, ...]) -> Model:

@@ -40,3 +40,25 @@ class Power:
         """What the ledger lacks, as a share of the incident power."""
         out = self.specular + self.absorbed + self.exited + self.ballistic + self.stored
         return (self.incident - out) / self.incident
+
+
+@dataclass(frozen=True)
+class DyePower:
+    """The ledger of a fluorophore: ``absorbed = lost + emitted + stored``, all in W.
+
+    Attributes
+    ----------
+    absorbed : float or complex
+        Of the light that excites it, a part of the absorbed power there.
+    lost : float or complex
+        Turned to heat, for want of quantum yield.
+    emitted : float or complex
+        Part of the incident power of the emitted light.
+    stored : float or complex
+        Taken by excited molecules: 0 for steady light.
+    """
+
+    absorbed: Number
+    lost: Number
+    emitted: Number
+    stored: Number = 0.0

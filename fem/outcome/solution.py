@@ -12,14 +12,16 @@ from tetlux.fem.known.patch import Patch
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import BoundaryCondition
 from tetlux.fem.models.modulation import lag
+from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.between_nodes import follow_fading, interpolate
 from tetlux.fem.outcome.plan import Plan
-from tetlux.fem.outcome.power import Power
+from tetlux.fem.outcome.power import DyePower, Power
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.outcome.shown import Shown
 from tetlux.fem.quadratic.error import fluence_with_error
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.validity.local import Validity
-from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
+from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -28,7 +30,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Shown):
     """Light in one body, solved.
 
     Attributes
@@ -76,6 +78,12 @@ class Solution:
         Why this model was chosen, if it was.
     frequency : float
         Of modulated light, Hz: fluence, exitance, power and readings then are complex amplitudes. 0 for steady light.
+    known_absorption : tuple of float or complex
+        Of one light, the power that each patch absorbs beyond the interpolation of its values at nodes, W.
+    fitting : LayerFitting, optional
+        Of one light, coefficients where its layers are thinner than tetrahedra.
+    dyes : tuple of DyePower
+        Of emitted light, what became of the power that each fluorophore absorbed: see `tetlux.fem.fluorescence`.
     """
 
     mesh: TetMesh
@@ -100,6 +108,9 @@ class Solution:
     volume_error: float = np.nan
     plan: Plan | None = None
     frequency: float = 0.0
+    known_absorption: tuple[Number, ...] = ()
+    fitting: LayerFitting | None = None
+    dyes: tuple[DyePower, ...] = ()
 
     model = "full"
 

@@ -21,5 +21,7 @@ def sum_solutions(parts: Sequence[Solution]) -> Solution:
         patches=tuple(patch for part in parts for patch in part.patches),
         transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
         limited_power=sum(part.limited_power for part in parts),
+        known_absorption=tuple(absorbed for part in parts for absorbed in part.known_absorption),
+        fitting=None,
         of_lights=tuple(parts),
     )

@@ -1,6 +1,7 @@
 """What all candidates share."""
 
 import math
+from dataclasses import replace
 
 from tetlux.fem.outcome.plan import Candidate, Model
 from tetlux.fem.planner.request import Request
@@ -15,6 +16,19 @@ def impossible(model: Model, error: InputError) -> Candidate:
 def reason_of(error: InputError) -> str:
     """What is wrong, without the remedy."""
     return error.text.split(";")[0].split(", and model")[0].rstrip(".")
+
+
+def corrected(request: Request, candidate: Candidate, kind: str) -> Candidate:
+    """A candidate of some kind, its predictions corrected by what past runs of that kind took and were off by."""
+    kind = f"{candidate.model} {kind}"
+    seconds, error = request.costs.factors(kind)
+    return replace(
+        candidate,
+        seconds=candidate.seconds * seconds,
+        error=candidate.error * error,
+        kind=kind,
+        learned=(seconds, error),
+    )
 
 
 def refuse_mesh(request: Request) -> None:

@@ -1,7 +1,7 @@
 """`Request`: what is asked for, which decides what a scene needs."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from tetlux.fem.assessment import Tolerances
@@ -16,6 +16,7 @@ from tetlux.fem.meshless.exact_field import ExactField, exact_field
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import PlacedDetector, place_detector
 from tetlux.fem.outcome.exitance_field import Dark
+from tetlux.fem.planner.costs import Costs, read_costs
 from tetlux.fem.scenes import build_scenes
 from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
@@ -23,6 +24,7 @@ from tetlux.fem.sources.light import Light
 from tetlux.fem.truncated.part import Box, dark_box
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.mesher.api import is_cached
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -53,6 +55,10 @@ class Request:
         Why a mesh is needed in any case; empty if it is not.
     runs : int
         Number of runs like this one, which share what can be shared.
+    costs : Costs
+        What past runs took.
+    is_meshed : bool
+        Whether the cache has the mesher's mesh of the body.
     """
 
     surface: Surface
@@ -65,6 +71,8 @@ class Request:
     mesh: TetMesh | None
     need_of_mesh: str = ""
     runs: int = 1
+    costs: Costs = field(default_factory=Costs)
+    is_meshed: bool = False
 
     @property
     def exitance_tolerance(self) -> float:
@@ -115,8 +123,11 @@ def make_request(
     mesh: TetMesh | None = None,
     need_of_mesh: str = "",
     runs: int = 1,
+    cache: bool = True,
 ) -> Request:
-    """Check what is asked for: the arguments of `tetlux.fem.solve_each`, and the last two of `Request`.
+    """Check what is asked for: arguments of `tetlux.fem.solve_each`, and `need_of_mesh` and `runs` of `Request`.
+
+    Without `cache` past runs are neither looked at nor learned from.
 
     Raises
     ------
@@ -135,6 +146,7 @@ def make_request(
         tuple(light.deposit_in(each) for light in some) for some, each in zip(scenes, built.bodies, strict=True)
     )
     wanted = Tolerances(checked.exitance, checked.readings, placed, checked.everywhere, checked.volume)
+    costs = read_costs() if cache else Costs()
     return Request(
         built.surface,
         built.inner,
@@ -146,4 +158,6 @@ def make_request(
         given,
         "a mesh is given" if given is not None else need_of_mesh,
         runs,
+        costs,
+        costs.directory is not None and given is None and is_cached(built.surface, built.inner),
     )

@@ -8,10 +8,10 @@ from tetlux.fem.meshless.closed_form import ClosedFormSolution, solution_of
 from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.outcome.detectors import read_all
-from tetlux.fem.outcome.plan import Plan, seconds_in_words
+from tetlux.fem.outcome.plan import Candidate, Plan, seconds_in_words
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner.candidate import reason_of
-from tetlux.fem.planner.charges import most_charges
+from tetlux.fem.planner.charges import learn_charges, most_charges
 from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.closed_form import closed_form_candidate
 from tetlux.fem.planner.request import Request
@@ -68,24 +68,43 @@ def solve_by_plan(
     if plan is None:
         plan = plan_of(request)
         report_plan(plan, report)
-    found: Sequence[AnySolution] = ()
-    missed = ""
-    if plan.chosen == "closed-form":
-        # The plan may be that of another run of a group.
-        candidate = closed_form_candidate(request)
-        missed = "" if candidate.suits else candidate.reason
-        found = solve_closed_forms(request) if candidate.suits else ()
-    elif plan.chosen == "charges":
-        found, missed = _try_charges(request, plan)
-    elif plan.chosen == "truncated":
-        found, missed = _try_part(request, elements, report)
-    else:
-        found = elements.whole()
+    watch = Stopwatch()
+    found, missed = _solve_by(request, elements, report, plan)
+    if request.runs == 1:
+        _learn(request, plan.best, found, watch.read()["total"])
     if missed:
         plan = plan.without(plan.chosen, missed)
         report(f"{missed}: going on with {plan.chosen}")
         return solve_by_plan(request, elements, report, plan=plan)
     return [replace(solution, plan=plan) for solution in found]
+
+
+def _solve_by(
+    request: Request, elements: FiniteElements, report: Report, plan: Plan
+) -> tuple[Sequence[AnySolution], str]:
+    """Solve each scene by the chosen model, and say what the solutions miss; "" if nothing."""
+    if plan.chosen == "closed-form":
+        # The plan may be that of another run of a group.
+        candidate = closed_form_candidate(request)
+        return (solve_closed_forms(request), "") if candidate.suits else ((), candidate.reason)
+    if plan.chosen == "charges":
+        return _try_charges(request, plan)
+    if plan.chosen == "truncated":
+        return _try_part(request, elements, report)
+    return elements.whole(), ""
+
+
+def _learn(request: Request, candidate: Candidate, found: Sequence[AnySolution], seconds: float) -> None:
+    """Learn from a run what its kind takes and is off by."""
+    fitted = [each for each in found if isinstance(each, ChargeSolution)]
+    if len(found) == 0 or not candidate.kind:
+        return
+    if fitted:
+        learn_charges(request, candidate, fitted, seconds)
+        return
+    error = max(each.error_estimate for each in found)
+    of_seconds, of_error = candidate.learned
+    request.costs.learn(candidate.kind, seconds / candidate.seconds * of_seconds, error / candidate.error * of_error)
 
 
 def report_plan(plan: Plan, report: Report) -> None:

@@ -3,14 +3,15 @@
 import numpy as np
 
 from tetlux.fem.outcome.plan import Candidate
-from tetlux.fem.planner.candidate import impossible, refuse_mesh
-from tetlux.fem.planner.full import (
+from tetlux.fem.planner.candidate import corrected, impossible, refuse_mesh
+from tetlux.fem.planner.effort import (
     SECONDS_OF_MESHER,
-    bytes_of_elements,
+    SECONDS_OF_REGION,
+    kind_of_light,
     seconds_of_elements,
-    seconds_of_regions,
     tetrahedra_needed,
 )
+from tetlux.fem.planner.full import bytes_of_elements
 from tetlux.fem.planner.request import Request
 from tetlux.meshing.errors import InputError
 
@@ -33,9 +34,11 @@ def truncated_candidate(request: Request) -> Candidate:
     tetrahedra = tetrahedra_needed(request)
     # Most points have two triangles.
     triangles = 2 * int(((request.surface.points > box.low) & (request.surface.points < box.high)).all(axis=1).sum())
-    seconds = SECONDS_OF_CUT * len(request.surface.faces) + SECONDS_OF_MESHER + SECONDS_OF_TRIANGLE * triangles
+    seconds = SECONDS_OF_CUT * len(request.surface.faces) + SECONDS_OF_MESHER["box"] + SECONDS_OF_TRIANGLE * triangles
     seconds += seconds_of_elements(request, tetrahedra)
-    seconds += seconds_of_regions(float(np.linalg.norm(box.high - box.low)), request.inner)
+    size = float(np.linalg.norm(box.high - box.low))
+    seconds += SECONDS_OF_REGION * max((size / region.diagonal for region in request.inner), default=0.0)
     reason = f"finite elements within {box.distance:.3g} {request.surface.unit} of the light, beyond which it is dark"
     needed = bytes_of_elements(request, tetrahedra)
-    return Candidate("truncated", request.exitance_tolerance, seconds, needed, reason, suits=True)
+    found = Candidate("truncated", request.exitance_tolerance, seconds, needed, reason, suits=True)
+    return corrected(request, found, f"{kind_of_light(request)}{' with regions' if request.inner else ''}")

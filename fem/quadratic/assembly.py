@@ -26,7 +26,12 @@ def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: Numbe
     """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
     faces = space.faces(space.mesh.boundary_faces)
     boundary_matrices = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
-    return csr_array(_assemble(space.cells, elements, space.size) + _assemble(faces, boundary_matrices, space.size))
+    return csr_array(assemble(space, elements) + _assemble(faces, boundary_matrices, space.size))
+
+
+def assemble(space: QuadraticSpace, elements: NumberArray) -> csr_array:
+    """The matrix of a space, (size, size), without boundary terms, from the matrices of tetrahedra (m, 10, 10)."""
+    return _assemble(space.cells, elements, space.size)
 
 
 def _assemble(dofs: IntArray, values: NumberArray, size: int) -> csr_array:
@@ -118,6 +123,17 @@ def face_normals(space: QuadraticSpace, faces: IntArray, barycentric: FloatArray
     return np.asarray(0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0]))
 
 
+def weighted_product(space: QuadraticSpace, weights: NumberArray, function: NumberArray) -> NumberArray:
+    """``∫ w u v`` of weights in tetrahedra (m,) and a function (size,), (size,)."""
+    mesh, curved = space.mesh, space.curved
+    at_dofs = function[space.cells]
+    values = (weights * mesh.volumes)[:, None] * (at_dofs @ reference_mass().reshape(10, 10))
+    shape_values = shape_functions(cell_rule().points)
+    volumes = mesh.volumes[curved, None] * cell_rule().weights * space.curved_determinants
+    values[curved] = (weights[curved, None] * volumes * (at_dofs[curved] @ shape_values.T)) @ shape_values
+    return sum_by_index(space.cells, values, space.size)
+
+
 def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     """``∫ Q0 v`` of densities in tetrahedra (m,), (size,)."""
     mesh = space.mesh
@@ -125,9 +141,7 @@ def volume_load(space: QuadraticSpace, density: FloatArray) -> FloatArray:
     means[:, 4:] = 0.2
     values = (density * mesh.volumes)[:, None] * means
     curved = space.curved
-    volumes = (
-        mesh.volumes[curved][:, None] * cell_rule().weights * np.linalg.det(space.jacobians(curved, cell_rule().points))
-    )
+    volumes = mesh.volumes[curved, None] * cell_rule().weights * space.curved_determinants
     values[curved] = density[curved, None] * (volumes @ shape_functions(cell_rule().points))
     return sum_by_index(space.cells, values, space.size)
 

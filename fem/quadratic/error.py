@@ -30,12 +30,24 @@ CORRELATED_WEIGHT = 0.4
 BEAM_RELATIVE_ERROR = 0.35
 
 
-def weigh_residual(solution: QuadraticSolution, dual: NumberArray, value: Number) -> ReadingError:
-    """The error of a linear function of the fluence by its dual solution (size,); `value` is that of the function."""
+def local_residual(solution: QuadraticSolution, dual: NumberArray) -> NumberArray:
+    """Contributions eta_K to the error of a linear function of the fluence, by its dual solution (size,), (m,)."""
     operator = solution.operator
     steps = recovered_gradient_difference(operator.space, dual)
     local = np.einsum("mij,mij->m", solution.gradient_difference, steps) / 4.0
     local *= operator.coefficients.diffusion * operator.mesh.volumes
+    return np.asarray(local)
+
+
+def weigh_residual(solution: QuadraticSolution, dual: NumberArray, value: Number) -> ReadingError:
+    """The error of a linear function of the fluence by its dual solution (size,); `value` is that of the function.
+
+    That of the light that volume sources are made by contributes too.
+    """
+    local = local_residual(solution, dual)
+    sources = solution.volume_sources
+    if sources:
+        local = local + sources[0].field.local_residual([source.light for source in sources], dual)
     rays = BEAM_RELATIVE_ERROR * abs(solution.broad_beams @ dual)
     squares = (RANDOM_SCALE * np.abs(local)) ** 2
     return ReadingError(value, squares, RANDOM_SCALE * CORRELATED_WEIGHT * local.sum().item(), float(rays))

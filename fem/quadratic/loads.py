@@ -1,6 +1,7 @@
 """The right-hand side of lights and patches for quadratic elements: see `tetlux.fem.operators.loads`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
+from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
 from tetlux.fem.sources.segments import Segments
@@ -48,7 +50,7 @@ class LineLoad:
 
 def quadratic_load(
     space: QuadraticSpace, coefficients: Coefficients, terms: SourceTerms, lines: LineLoad
-) -> FloatArray:
+) -> NumberArray:
     """Load of source terms, as they are on the mesh of a space, and of their beams, (size,)."""
     mesh, load = space.mesh, lines.load.copy()
     points, powers = np.vstack([terms.points, lines.points]), np.concatenate([terms.powers, lines.powers])
@@ -62,7 +64,7 @@ def quadratic_load(
         emitted = volume_load(space, np.broadcast_to(terms.emission, len(mesh.tetrahedra)))
         # The power of emission is that of the mesh with flat facets.
         load += emitted * float((mesh.volumes * terms.emission).sum()) / emitted[: len(mesh.points)].sum()
-    return load
+    return np.asarray(load + sum(source.at_dofs for source in terms.volume_sources))
 
 
 def _point_load(space: QuadraticSpace, points: FloatArray, powers: FloatArray) -> FloatArray:
@@ -113,60 +115,77 @@ class QuadraticPatch:
     Attributes
     ----------
     patch : Patch
-    interpolant : (size,) ndarray
-        The quadratic interpolant of its charges' fluence.
+    space : QuadraticSpace
     load : (size,) ndarray
         Contribution to the load vector, W.
+    is_whole : bool
+        Whether it is the whole body, of one medium: then the load is that of the fluence less that of the charges.
     """
 
     patch: Patch
-    interpolant: NumberArray
+    space: QuadraticSpace
     load: NumberArray
+    is_whole: bool = False
+
+    @cached_property
+    def interpolant(self) -> NumberArray:
+        """The quadratic interpolant of its charges' fluence, (size,); linear on edges outside of it."""
+        if not self.patch.cells.any():
+            return np.zeros(self.space.size)
+        mesh, at_nodes = self.space.mesh, self.patch.at_nodes
+        edges = np.unique(mesh.tetrahedron_edges[self.patch.cells])
+        at_middles = at_nodes[mesh.edges].mean(axis=1)
+        at_middles[edges] = self.patch.charges.fluence(self.space.middles[edges])
+        return self.space.interpolate(at_nodes, at_middles)
 
     @property
     def is_fitted(self) -> bool:
-        """Whether the charges are fitted to the surface, and subtracted in the whole body."""
+        """Whether the charges are fitted to the surface, and subtracted in all of the body where they are accurate."""
         return isinstance(self.patch, FittedPatch)
 
 
-def quadratic_patch(
+def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
+    """A patch with its load, by the matrices of an operator; one that is the whole body needs none of them."""
+    if patch.cells.all() and operator.coefficients.uniform:
+        _, leaving, _ = _boundary_terms(operator.space, patch)
+        return QuadraticPatch(patch, operator.space, -leaving, is_whole=True)
+    return patch_by_elements(operator.space, patch, operator.elements[patch.cells])
+
+
+def patch_by_elements(
     space: QuadraticSpace, patch: Patch, elements: NumberArray, inner: "InnerFaces | None" = None
 ) -> QuadraticPatch:
     """A patch with its load, as in `tetlux.fem.known.patch_terms`, by the matrices (c, 10, 10) of its tetrahedra.
 
-    Its `inner_faces` need not be given.
-
     Across inner faces of the patch the fluence jumps by the interpolation error G - I G. The jump changes a reading by
-    ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change.
+    ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change. The
+    `inner_faces` need not be given.
     """
-    mesh, charges = patch.mesh, patch.charges
+    charges = patch.charges
     if not patch.cells.any():
         count = charges.sources
-        return QuadraticPatch(
-            patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count].real)
-        )
-    inside = np.flatnonzero(patch.cells)
-    interpolant = _interpolant(space, patch, inside)
-    cell, face, on_boundary = patch.outer
-    corners = mesh.tetrahedra[cell[:, None], FACES[face]]
-    faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
-    load = _product(elements, space.cells[inside], interpolant)
+        load = _point_load(space, charges.positions[:count], charges.strengths[:count].real)
+        return QuadraticPatch(patch, space, load)
+    leaving_faces, leaving, has_inner = _boundary_terms(space, patch)
+    found = QuadraticPatch(patch, space, -leaving)
+    load = _product(elements, space.cells[patch.cells], found.interpolant) - leaving
     robin = boundary_condition_of(charges.medium).robin
-    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
+    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, found.interpolant)
+    if has_inner:
+        load += _jump_load(charges, found.interpolant, inner or inner_faces(space, patch))
+    return replace(found, load=load)
+
+
+def _boundary_terms(space: QuadraticSpace, patch: Patch) -> tuple[IntArray, NumberArray, bool]:
+    """DOF numbers of a patch's facets of the boundary, (f, 6), what leaves it, (size,), and whether it ends inside."""
+    charges = patch.charges
+    cell, face, on_boundary = patch.outer
+    corners = space.mesh.tetrahedra[cell[:, None], FACES[face]]
+    faces = space.faces(corners)
     value, flux = _integrals(space, faces, charges)
-    leaving = flux + (robin * on_boundary)[:, None] * value
-    load -= sum_by_index(faces, leaving, space.size)
-    if not on_boundary.all():
-        load += _jump_load(charges, interpolant, inner or inner_faces(space, patch))
-    return QuadraticPatch(patch, interpolant, load)
-
-
-def _interpolant(space: QuadraticSpace, patch: Patch, cells: IntArray) -> NumberArray:
-    """The quadratic interpolant of the charges of a patch, (size,); 0 on edges outside its tetrahedra (c,)."""
-    edges = np.unique(space.mesh.tetrahedron_edges[cells])
-    at_middles = patch.at_nodes[space.mesh.edges].mean(axis=1)
-    at_middles[edges] = patch.charges.fluence(space.middles[edges])
-    return space.interpolate(patch.at_nodes, at_middles)
+    robin = boundary_condition_of(charges.medium).robin
+    leaving = sum_by_index(faces, flux + (robin * on_boundary)[:, None] * value, space.size)
+    return faces[on_boundary], leaving, not bool(on_boundary.all())
 
 
 def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> NumberArray:

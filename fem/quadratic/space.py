@@ -126,6 +126,11 @@ class QuadraticSpace:
         return np.asarray(np.linalg.inv(self.jacobians(self.curved, np.eye(4))))
 
     @cached_property
+    def curved_determinants(self) -> FloatArray:
+        """Determinants of `jacobians` at the quadrature points of curved tetrahedra, (c, q)."""
+        return np.asarray(np.linalg.det(self.jacobians(self.curved, cell_rule().points)))
+
+    @cached_property
     def nodal_averaging(self) -> tuple[IntArray, csr_array]:
         """`corner_groups`, (m, 4), and the matrix of averages over each group, weighted by volume."""
         groups = corner_groups(self.mesh)

@@ -14,7 +14,8 @@ from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
 from tetlux.fem.quadratic.operator import STOP_RESIDUAL
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
+from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.sensitivity.entry_paths import entry_shares
 from tetlux.fem.sensitivity.near_sources import missing_charges
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares

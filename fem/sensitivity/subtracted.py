@@ -25,11 +25,12 @@ from tetlux.fem.quadratic.loads import (
     QuadraticPatch,
     inner_faces,
     line_load,
+    patch_by_elements,
     quadratic_load,
-    quadratic_patch,
 )
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
+from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
@@ -177,7 +178,7 @@ class Readout:
         elements = element_matrices(space, diffusion, sigma, inside)
         if known not in self._inner:
             self._inner[known] = inner_faces(space, known.patch)
-        return quadratic_patch(space, Patch(system.mesh, charges, cells, at_nodes), elements, self._inner[known])
+        return patch_by_elements(space, Patch(system.mesh, charges, cells, at_nodes), elements, self._inner[known])
 
     __repr__ = one_line
 

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tetlux.meshing.arrays import Number
+
 
 @dataclass(frozen=True)
 class Ledger:
@@ -10,7 +12,7 @@ class Ledger:
 
     Parameters
     ----------
-    incident : float
+    incident : float, or complex of what modulated light makes dyes emit
         Power that reaches the body. For an irradiance or an emission leave it at 0: it follows from the area and the
         volume of the mesh.
     specular : float
@@ -21,7 +23,7 @@ class Ledger:
         Power that leaves the body without having been scattered.
     """
 
-    incident: float = 0.0
+    incident: Number = 0.0
     specular: float = 0.0
     absorbed: float = 0.0
     ballistic: float = 0.0

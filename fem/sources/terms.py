@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.fem.sources.arrays import join_cells, no_values, no_vectors
 from tetlux.fem.sources.segments import Segments
+from tetlux.fem.sources.volume import VolumeSource
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 
@@ -29,6 +30,8 @@ class SourceTerms:
         The part of `irradiance` that passes to the inside, W/unit².
     emission : float or (m,) ndarray
         Power that the whole volume emits, or each tetrahedron of a mesh, W/unit³.
+    volume_sources : tuple of VolumeSource
+        What the volume of one mesh emits beside that.
     """
 
     points: FloatArray = field(default_factory=no_vectors)
@@ -38,11 +41,12 @@ class SourceTerms:
     irradiance: float | FloatArray = 0.0
     transmitted_irradiance: float | FloatArray = 0.0
     emission: float | FloatArray = 0.0
+    volume_sources: tuple[VolumeSource, ...] = ()
 
     @property
     def is_distributed(self) -> bool:
-        """Whether all of it is spread over the surface or the volume: no points and no segments."""
-        return len(self.points) == 0 and len(self.segments) == 0
+        """Whether all of it is even over the surface or the volume: no points, no segments, no volume sources."""
+        return len(self.points) == 0 and len(self.segments) == 0 and not self.volume_sources
 
     def select_points(self, some: BoolArray) -> "SourceTerms":
         """The same with some (p,) of the points only."""
@@ -60,6 +64,7 @@ class SourceTerms:
             irradiance=sum((part.irradiance for part in parts), 0.0),
             transmitted_irradiance=sum((part.transmitted_irradiance for part in parts), 0.0),
             emission=sum((part.emission for part in parts), 0.0),
+            volume_sources=tuple(source for part in parts for source in part.volume_sources),
         )
 
     __repr__ = one_line

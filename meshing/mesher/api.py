@@ -13,12 +13,13 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError, RunError
 from tetlux.meshing.mesher.acceptance import NotTheBodyError, check_body, has_lost_part, part_of
-from tetlux.meshing.mesher.cache import cache_directory, load_cached_mesh, mesh_key, store_cached_mesh
+from tetlux.meshing.mesher.cache import cache_directory, is_entry, load_cached_mesh, mesh_key, store_cached_mesh
 from tetlux.meshing.mesher.child import run_pytetwild
+from tetlux.meshing.mesher.lengths import ENVELOPE, default_lengths
 from tetlux.meshing.mesher.proxy import proxy
 from tetlux.meshing.mesher.shells import make_shells
 from tetlux.meshing.repair.topology import bodies, compact
-from tetlux.meshing.resolution import DEBRIS, DEVIATION, DEVIATION_OF_THICKNESS
+from tetlux.meshing.resolution import DEBRIS
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import body_sizes
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
@@ -42,11 +43,6 @@ from tetlux.meshing.tets.tagging import tag_tetrahedra
 # free paths across and at tolerances from .05 to .005, deviations from 0.5 to 2.5 times this one take the same time
 # within 20 % and end with as many nodes.
 #
-# Share of the deviation for fTetWild's envelope; the rest is for the proxy. Time grows with the proxy's triangles and
-# with the inverse of the envelope; between .45 and .7 it is constant within 20 %.
-ENVELOPE = 0.55
-# Default edge length, as a share of the diagonal. An eighth gives 20 % fewer tetrahedra in the same time.
-EDGE_LENGTH = 1.0 / 12.0
 # Default stop energy. Worst quality in six runs of spot, rocker-arm and nefertiti, and the mesher's seconds for each:
 # 8: .13; 1.4, 2.4, 2.0. 9: .12; 1.5, 2.3, 1.9. 10: .08; 1.1, 1.8, 1.8. 14: .03. 30: .01, three times faster than 10.
 STOP_ENERGY = 9.5
@@ -137,31 +133,15 @@ def tetrahedralize(
     ):
         if value is not None and not 0 < value < math.inf:
             raise InputError(f"{name} is {value:g}; give a number greater than 0.")
-    if importlib.util.find_spec("pytetwild") is None:
+    if not _is_installed():
         raise RunError(f"{surface.name}: {NOT_INSTALLED}")
     if deviation is None and epsilon is None:
         check_thickness(surface)
-    size = surface.diagonal
-    target_length = EDGE_LENGTH * size if edge_length is None else edge_length
-    if deviation is None:
-        # The volume of a surface that crosses itself, and so its thickness, is unknown before it is meshed.
-        thickness = math.inf if surface.overlaps else 2.0 * surface.volume / surface.area
-        by_default = min(DEVIATION * size, DEVIATION_OF_THICKNESS * thickness)
-        deviation = by_default if epsilon is None else epsilon * size / ENVELOPE
-    envelope = ENVELOPE * deviation if epsilon is None else epsilon * size
+    target_length, deviation, envelope = default_lengths(surface, edge_length, deviation, epsilon)
     directory = None if cache is False else cache_directory() if cache is True else Path(cache)
     key = ""
     if directory is not None:
-        key = mesh_key(
-            surface,
-            regions,
-            edge_length=target_length,
-            deviation=deviation,
-            envelope=envelope,
-            stop_energy=stop_energy,
-            pytetwild=version("pytetwild"),
-            fast_simplification=version("fast-simplification"),
-        )
+        key = _key(surface, regions, target_length, deviation, envelope, stop_energy)
         cached = load_cached_mesh(key, directory, surface.unit)
         if cached is not None:
             return cached
@@ -169,6 +149,28 @@ def tetrahedralize(
     if directory is not None:
         store_cached_mesh(key, directory, mesh)
     return mesh
+
+
+def is_cached(surface: Surface, regions: Sequence[Surface] = ()) -> bool:
+    """Whether the mesh that `tetrahedralize` makes by default is in the user's cache."""
+    directory = cache_directory()
+    # Surfaces need not be hashed where the cache has no mesh at all.
+    if directory is None or next(directory.glob("*.npz"), None) is None or not _is_installed():
+        return False
+    return is_entry(_key(surface, regions, *default_lengths(surface), STOP_ENERGY), directory)
+
+
+def _is_installed() -> bool:
+    return importlib.util.find_spec("pytetwild") is not None
+
+
+def _key(
+    surface: Surface, regions: Sequence[Surface], length: float, deviation: float, envelope: float, stop: float
+) -> str:
+    """The cache key of a mesh."""
+    versions = {name.replace("-", "_"): version(name) for name in ("pytetwild", "fast-simplification")}
+    lengths = {"edge_length": length, "deviation": deviation, "envelope": envelope}
+    return mesh_key(surface, regions, **lengths, stop_energy=stop, **versions)
 
 
 def check_thickness(surface: Surface) -> None:

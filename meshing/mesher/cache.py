@@ -51,6 +51,11 @@ def mesh_key(surface: Surface, regions: Sequence[Surface] = (), **settings: floa
     return digest.hexdigest()
 
 
+def is_entry(key: str, directory: Path) -> bool:
+    """Whether the cache has a file under a key."""
+    return _entry_path(key, directory).is_file()
+
+
 def load_cached_mesh(key: str, directory: Path, unit: str) -> TetMesh | None:
     """The cached mesh of a key, or None if there is none or its file is unusable."""
     path = _entry_path(key, directory)

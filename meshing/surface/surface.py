@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import count, size
+from tetlux.meshing.html import surface_html
 from tetlux.meshing.search.closest import ClosestPoint
 from tetlux.meshing.search.proximity import cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
@@ -293,3 +294,5 @@ class Surface:
             f'Surface("{self.name}", {count(len(self.faces), "triangle")}, {size(self.points, self.unit)}, '
             f"volume {self.volume:.3g} {self.unit}³)"
         )
+
+    _repr_html_ = surface_html

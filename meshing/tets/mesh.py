@@ -9,6 +9,7 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray, sum_by_index
 from tetlux.meshing.describe import count, size
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.html import mesh_html
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
@@ -276,11 +277,8 @@ class TetMesh:
     def label_text(self, labels: Iterable[int]) -> str:
         """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
         texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
-        shown = (
-            texts
-            if len(texts) <= MOST_LABELS_NAMED
-            else [*texts[:MOST_LABELS_NAMED], f"{len(texts) - MOST_LABELS_NAMED} more"]
-        )
+        more = len(texts) - MOST_LABELS_NAMED
+        shown = texts if more <= 0 else [*texts[:MOST_LABELS_NAMED], f"{more} more"]
         return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
     @cached_property
@@ -298,3 +296,5 @@ class TetMesh:
             f"TetMesh({count(len(self.points), 'node')}, {count(len(self.tetrahedra), 'tetrahedron', 'tetrahedra')}, "
             f"{parts}{size(self.points, self.unit)}, volume {self.volume:.3g} {self.unit}³)"
         )
+
+    _repr_html_ = mesh_html

@@ -22,7 +22,7 @@ FEW = 20
 MOST_NOTES = 10
 
 
-def choose_display(runs: int, *, quiet: bool = False) -> Listener:
+def choose_display(runs: int, *, quiet: bool = False, verbose: bool = False) -> Listener:
     """Choose how a batch is shown.
 
     Parameters
@@ -31,6 +31,8 @@ def choose_display(runs: int, *, quiet: bool = False) -> Listener:
         How many runs there are.
     quiet : bool
         Whether only failures are shown.
+    verbose : bool
+        Whether each run gets lines of its own, however many there are.
 
     Returns
     -------
@@ -40,7 +42,7 @@ def choose_display(runs: int, *, quiet: bool = False) -> Listener:
     """
     if quiet:
         return Quiet()
-    if runs == 1 or (runs <= FEW and not _is_live()):
+    if verbose or runs == 1 or (runs <= FEW and not _is_live()):
         return Lines()
     return LiveDisplay() if _is_live() else PlainDisplay()
 

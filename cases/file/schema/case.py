@@ -7,9 +7,11 @@ from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.camera import CameraSpec
 from tetlux.cases.file.schema.detectors import DetectorSpec
+from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
 from tetlux.cases.file.schema.sweep import SweepSpec
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
@@ -114,7 +116,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
@@ -161,6 +163,9 @@ class CaseSpec(Section):
     modulation: ModulationSpec | None = Field(
         None, description="lights are modulated at a frequency: results are amplitudes and phases"
     )
+    fluorescence: FluorescenceSpec | None = Field(
+        None, description="dyes that emit at another wavelength, which is a channel of its own"
+    )
     model: Model = Field(
         "full",
         description="full: finite elements on a mesh; truncated: the same where light reaches; charges: fitted to the "
@@ -174,6 +179,7 @@ class CaseSpec(Section):
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
     up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
+    picture: Pictures | None = Field(None, description="what the picture shows, or a list for several pictures")
     outputs: list[Output] = Field(
         ["surface", "volume", "picture"],
         description="default: surface, volume, picture; with another model than full without volume",
@@ -195,6 +201,13 @@ class CaseSpec(Section):
         if isinstance(self.tolerance, ToleranceSpec):
             return self.tolerance
         return ToleranceSpec(exitance=self.tolerance, detectors=None, everywhere=None, volume=None)
+
+    @property
+    def pictures(self) -> list[PictureSpec]:
+        """All pictures."""
+        if self.picture is None:
+            return [PictureSpec.model_validate({})]
+        return self.picture if isinstance(self.picture, list) else [self.picture]
 
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
@@ -246,6 +259,10 @@ class CaseSpec(Section):
                         "write model: full",
                         {"key": key, "what": what, "model": self.model},
                     )
+        if self.fluorescence and self.model != "full":
+            raise PydanticCustomError(
+                "no_mesh", "dyes are solved for by model full; leave fluorescence or model out", {"key": "fluorescence"}
+            )
         return self
 
     @model_validator(mode="after")

@@ -148,7 +148,7 @@ class EnvironmentSpec(LightSection):
         return None if pixels is None else EnvironmentLight(brightest * pixels, up=self.up, front=self.front)
 
 
-def _number_as_text(value: object) -> object:
+def number_as_text(value: object) -> object:
     """Turn the number of a label into the text that it is looked up by."""
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
@@ -157,7 +157,7 @@ class EmissionSpec(LightSection):
     """Light that the volume emits, as `tetlux.fem.Emission`."""
 
     density: Each = Field(description="W/unit³")
-    region: Annotated[str | None, BeforeValidator(_number_as_text)] = Field(
+    region: Annotated[str | None, BeforeValidator(number_as_text)] = Field(
         None,
         description="name of a region, body for the part outside of all, or name or number of a mesh's label",
     )

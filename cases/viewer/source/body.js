@@ -1,42 +1,85 @@
-// A surface of triangles that share no corners, in the colours of a field.
+// `Body`: a surface of triangles in the colours of a field.
 
 import { BufferAttribute, BufferGeometry, Mesh } from "three";
+import { cornerNormals } from "./normals.js";
 import { UNKNOWN, colourMaterial } from "./shaders.js";
 
-function spread(values, width, triangles) {
-  const found = new values.constructor(width * triangles.length);
+// Cosine of the angle, .8 degrees, between normals that count as one.
+const ALIKE = 1 - 1e-4;
+
+// Corners of triangles whose vertex and normal are the same become one: `corners` has one of each, `index` (3 m,) says
+// which it is.
+export function weld(triangles, normals) {
+  const first = new Int32Array(triangles.reduce((most, v) => Math.max(most, v), 0) + 1).fill(-1);
+  const next = new Int32Array(triangles.length).fill(-1);
+  const corners = [];
+  const index = new Uint32Array(triangles.length);
+  const alike = (i, j) =>
+    normals[3 * i] * normals[3 * j] + normals[3 * i + 1] * normals[3 * j + 1] + normals[3 * i + 2] * normals[3 * j + 2] >
+    ALIKE;
   for (let i = 0; i < triangles.length; i += 1) {
-    for (let k = 0; k < width; k += 1) found[width * i + k] = values[width * triangles[i] + k];
+    let found = first[triangles[i]];
+    while (found >= 0 && !alike(i, corners[found])) found = next[found];
+    if (found < 0) {
+      found = corners.length;
+      next[found] = first[triangles[i]];
+      first[triangles[i]] = found;
+      corners.push(i);
+    }
+    index[i] = found;
+  }
+  return { corners, index };
+}
+
+// Rows of `values`, `width` wide.
+function rowsOf(values, width, rows) {
+  const found = new values.constructor(width * rows.length);
+  for (let i = 0; i < rows.length; i += 1) {
+    for (let k = 0; k < width; k += 1) found[width * i + k] = values[width * rows[i] + k];
   }
   return found;
 }
 
-function cornerMarks(triangles) {
-  const marks = new Uint8Array(3 * triangles.length);
-  for (let i = 0; i < triangles.length; i += 1) marks[3 * i + (i % 3)] = 255;
-  return marks;
+export class Body {
+  constructor(points, triangles) {
+    const normals = cornerNormals(points, triangles);
+    const { corners, index } = weld(triangles, normals);
+    this.vertices = Uint32Array.from(corners, (corner) => triangles[corner]);
+    this.shared = new BufferGeometry();
+    this.shared.setIndex(new BufferAttribute(index, 1));
+    this.set("position", rowsOf(points, 3, this.vertices), 3);
+    this.set("normal", rowsOf(normals, 3, corners), 3);
+    this.mesh = new Mesh(this.shared, colourMaterial());
+    this.mesh.frustumCulled = false;
+    this.edges = false;
+  }
+
+  set(name, numbers, width, normalized = false) {
+    this.shared.setAttribute(name, new BufferAttribute(numbers, width, normalized));
+    this.stale = true;
+  }
+
+  setValues(values) {
+    this.set("value", rowsOf(Float32Array.from(values, (value) => (Number.isNaN(value) ? UNKNOWN : value)), 1, this.vertices), 1);
+  }
+
+  setColours(colours) {
+    this.set("colour", rowsOf(colours, 3, this.vertices), 3, true);
+  }
+
+  // Edges are found by marks at the corners of each triangle, so that triangles share none then.
+  show(edges) {
+    if (edges === this.edges && !(edges && this.stale)) return;
+    if (this.edges) this.mesh.geometry.dispose();
+    this.mesh.geometry = edges ? withCorners(this.shared.toNonIndexed()) : this.shared;
+    this.edges = edges;
+    this.stale = false;
+  }
 }
 
-// The smallest value that is drawn: others are unknown.
-const known = (value) => (Number.isNaN(value) ? UNKNOWN : value);
-
-export function makeBody(points, triangles, normals) {
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(spread(points, 3, triangles), 3));
-  geometry.setAttribute("normal", new BufferAttribute(normals, 3));
-  geometry.setAttribute("corner", new BufferAttribute(cornerMarks(triangles), 3, true));
-  geometry.setAttribute("value", new BufferAttribute(new Float32Array(triangles.length), 1));
-  const mesh = new Mesh(geometry, colourMaterial(false));
-  mesh.frustumCulled = false;
-  return mesh;
-}
-
-export function setValues(mesh, values, triangles) {
-  const attribute = mesh.geometry.getAttribute("value");
-  for (let i = 0; i < triangles.length; i += 1) attribute.array[i] = known(values[triangles[i]]);
-  attribute.needsUpdate = true;
-}
-
-export function setColours(mesh, colours, triangles) {
-  mesh.geometry.setAttribute("colour", new BufferAttribute(spread(colours, 3, triangles), 3, true));
+// Mark the three corners of each triangle by red, green and blue.
+export function withCorners(geometry) {
+  const marks = new Uint8Array(3 * geometry.getAttribute("position").count);
+  for (let i = 0; 3 * i < marks.length; i += 1) marks[3 * i + (i % 3)] = 255;
+  return geometry.setAttribute("corner", new BufferAttribute(marks, 3, true));
 }

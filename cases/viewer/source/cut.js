@@ -1,10 +1,11 @@
 // The cut of a plane through tetrahedra, or through triangles.
 
 import { BufferAttribute, BufferGeometry, LineBasicMaterial, LineSegments, Mesh } from "three";
+import { withCorners } from "./body.js";
 import { colourMaterial } from "./shaders.js";
 
 export function makeCut() {
-  const mesh = new Mesh(new BufferGeometry(), colourMaterial(true));
+  const mesh = new Mesh(new BufferGeometry(), colourMaterial());
   mesh.frustumCulled = false;
   return mesh;
 }
@@ -78,19 +79,13 @@ export function cutTriangles(points, triangles, normal, offset) {
   return crossings;
 }
 
-function cornersOf(count) {
-  const marks = new Uint8Array(3 * count);
-  for (let i = 0; i < count; i += 1) marks[3 * i + (i % 3)] = 255;
-  return new BufferAttribute(marks, 3, true);
-}
-
 // Show triangles or lines where something was cut; values are divided by `factor` when they are stored.
 export function showCrossings(object, crossings) {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(crossings.places), 3));
   if (crossings.values) {
     geometry.setAttribute("value", new BufferAttribute(new Float32Array(crossings.found), 1));
-    geometry.setAttribute("corner", cornersOf(crossings.found.length));
+    withCorners(geometry);
   }
   object.geometry.dispose();
   object.geometry = geometry;

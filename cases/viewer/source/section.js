@@ -4,6 +4,7 @@ import { unpack, unpackPoints } from "./arrays.js";
 import { cutTetrahedra, cutTriangles, makeCut, makeRings, showCrossings } from "./cut.js";
 import { Fields, rangeOf } from "./fields.js";
 import { firstHit, valueAt } from "./pick.js";
+import { compileWith } from "./shaders.js";
 
 export class Section {
   constructor(data, regions) {
@@ -39,7 +40,7 @@ export class Section {
   colour(state, texture) {
     const uniforms = this.face.material.uniforms;
     if (texture) uniforms.map.value = texture;
-    uniforms.edges.value = state.edges ? 1 : 0;
+    compileWith(this.face.material, { BY_VALUE: true, EDGES: state.edges });
     uniforms.logarithmic.value = state.logarithmic ? 1 : 0;
     this.logarithmic = state.logarithmic;
     if (!this.field) return;

@@ -2,11 +2,12 @@
 
 import { Color, ColorManagement, LinearSRGBColorSpace, Scene, Vector3, WebGLRenderer } from "three";
 import { unpack, unpackPoints } from "./arrays.js";
-import { makeBody, setColours, setValues } from "./body.js";
+import { Body } from "./body.js";
 import { View } from "./camera.js";
 import { label, tableOf, textureOf } from "./colours.js";
 import { Fields, rangeOf, ALL } from "./fields.js";
-import { cornerNormals } from "./normals.js";
+import { compileWith } from "./shaders.js";
+import { Sharpness } from "./sharpness.js";
 import { drawAxes, drawBar, drawNothing, drawScale, drawWhite, pen } from "./legend.js";
 import { Labels, makeArrows, makeRegion } from "./marks.js";
 import { Panel, SWITCHES, element } from "./panel.js";
@@ -18,7 +19,9 @@ const PAPER = { light: "#f3f4f6", dark: "#1c1f24" };
 const INK = { light: "#20242b", dark: "#e8eaee" };
 // Room for the title above and for the legends on the right of the body, pixels.
 const ROOM = { top: 52, right: 84, bottom: 44, left: 4 };
+// Milliseconds without a change after which it is drawn finely, and the width of the crossed axes, pixels.
 const REST = 150;
+const AXES = 84;
 
 // Colours are those of the pictures, as they are.
 ColorManagement.enabled = false;
@@ -28,8 +31,9 @@ class Viewer {
     this.data = scene;
     this.fields = new Fields(scene.fields);
     this.scene = new Scene();
-    this.renderer = new WebGLRenderer({ canvas: element("view"), antialias: true, preserveDrawingBuffer: true });
+    this.renderer = new WebGLRenderer({ canvas: element("view"), antialias: false });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.sharpness = new Sharpness(this.renderer);
     this.maps = Object.fromEntries(Object.entries(scene.maps).map(([name, colours]) => [name, tableOf(colours)]));
     this.textures = Object.fromEntries(Object.entries(this.maps).map(([name, table]) => [name, textureOf(table)]));
     this.view = new View(scene, element("view"), () => this.draw());
@@ -58,12 +62,12 @@ class Viewer {
     const { data } = this;
     this.points = await unpackPoints(data.points);
     this.triangles = await unpack(data.triangles);
-    this.body = makeBody(this.points, this.triangles, cornerNormals(this.points, this.triangles));
-    if (data.colours) setColours(this.body, await unpack(data.colours.values), this.triangles);
+    this.body = new Body(this.points, this.triangles);
+    if (data.colours) this.body.setColours(await unpack(data.colours.values));
     this.arrows = makeArrows(data.lights.arrows, this.view.diagonal);
     this.regions = await Promise.all(data.regions.map((region) => makeRegion(region, data.up)));
     this.section = new Section(data, this.regions);
-    this.scene.add(this.body, this.arrows, ...this.regions.map((region) => region.group), ...this.section.objects);
+    this.scene.add(this.body.mesh, this.arrows, ...this.regions.map((region) => region.group), ...this.section.objects);
     for (const place of data.lights.points) this.labels.add("lights", place);
     for (const { name, place } of data.detectors) this.labels.add("detectors", place, name);
     for (const { name, top } of this.regions) this.labels.add("regions", top, name);
@@ -108,15 +112,17 @@ class Viewer {
     const { field, state, range, body, data } = this;
     const { factor } = field.values;
     this.values = values;
-    if (this.shown !== field) setValues(body, values, this.triangles);
+    if (this.shown !== field) body.setValues(values);
     this.shown = field;
-    const uniforms = body.material.uniforms;
+    const { material } = body.mesh;
+    const uniforms = material.uniforms;
     uniforms.low.value = range[0] / factor;
     uniforms.high.value = range[1] / factor;
     uniforms.logarithmic.value = this.logarithmic ? 1 : 0;
     uniforms.map.value = this.textures[state.map];
-    uniforms.ownColours.value = state.quantity === "preview" ? 1 : 0;
-    uniforms.edges.value = state.edges ? 1 : 0;
+    body.show(state.edges);
+    const own = state.quantity === "preview";
+    compileWith(material, { OWN_COLOURS: own, EDGES: state.edges, CUT: state.cut !== "off" });
     this.section.colour(state, this.textures[state.map]);
     this.arrows.visible = state.lights;
     for (const { group } of this.regions) group.visible = state.regions;
@@ -150,42 +156,46 @@ class Viewer {
   resize() {
     const { clientWidth: width, clientHeight: height } = element("stage");
     this.size = [width, height];
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.renderer.setSize(width, height, false);
     this.view.resize(width, height, ROOM);
     this.draw();
   }
 
-  // Draw before the next frame of the screen, once however often it is asked.
+  // Draw before the next frame of the screen, once however often it is asked, and finely when nothing moves any more.
   draw() {
     if (this.asked || !this.shown) return;
     this.asked = requestAnimationFrame(() => {
       this.asked = null;
-      this.render();
+      this.render(false);
     });
   }
 
-  render() {
-    const { view, state, body } = this;
+  render(resting) {
+    const { view } = this;
+    clearTimeout(this.rest);
+    this.sharpness.set(resting);
     const plane = this.plane;
-    const uniforms = body.material.uniforms;
-    uniforms.cut.value = plane ? 1 : 0;
-    if (plane) uniforms.plane.value.set(...plane.normal, plane.offset);
+    if (plane) this.body.mesh.material.uniforms.plane.value.set(...plane.normal, plane.offset);
     this.renderer.render(this.scene, view.camera);
-    this.labels.place(view.camera, ...this.size, { ...state, picked: this.picked !== null });
+    this.sharpness.learn();
+    this.labels.place(view.camera, ...this.size, { ...this.state, picked: this.picked !== null });
     this.drawOver();
     this.frames += 1;
-    clearTimeout(this.resting);
-    this.resting = setTimeout(() => this.hideBehind(), REST);
+    if (resting) this.hideBehind();
+    else this.rest = setTimeout(() => this.render(true), REST);
   }
 
+  // What stands over the body: the directions of the axes, and the rest where it changed.
   drawOver() {
     const { data, view } = this;
     const [width, height] = this.size;
     const ink = INK[this.tone];
+    drawAxes(pen(element("axes"), AXES, AXES), view.camera, [AXES / 2, AXES / 2], ink);
+    const drawn = JSON.stringify([this.size, this.state, this.range, this.tone, view.camera.zoom]);
+    if (drawn === this.drawn) return;
+    this.drawn = drawn;
     const context = pen(element("over"), width, height);
     drawScale(context, view, data.unit, [20, height - 22], ink);
-    drawAxes(context, view.camera, [width - 42, height - 40], ink);
     const inside = this.section.bar(this.maps[this.state.map]);
     const [high, low] = [Math.max(100, 0.12 * height), height - 90];
     const middle = inside ? (high + low) / 2 : low;
@@ -281,7 +291,7 @@ export async function start(data) {
   new ResizeObserver(() => viewer.resize()).observe(element("stage"));
   viewer.resize();
   await viewer.change({});
-  viewer.render();
+  viewer.render(false);
   document.documentElement.dataset.ready = "yes";
   window.tetlux = viewer;
 }

@@ -1,0 +1,41 @@
+// `Sharpness`: how many pixels are drawn for each one of the page. At rest they are averaged, which smooths edges;
+// while something moves, as few as it takes to be quick.
+
+// Most of a frame's seconds times 1000: to be drawn as finely in motion as at rest, and in motion before it is coarser.
+const QUICK = 25;
+const SLOW = 60;
+const COARSEST = 0.5;
+
+export class Sharpness {
+  constructor(renderer) {
+    this.renderer = renderer;
+    const own = window.devicePixelRatio || 1;
+    this.fine = Math.min(own < 2 ? 2 * own : own, 3);
+    this.moving = Math.min(own, 2);
+    this.resting = false;
+  }
+
+  set(resting) {
+    this.resting = resting;
+    const ratio = resting ? this.fine : this.moving;
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+  }
+
+  // Learn from how long the frame takes that was just asked for.
+  async learn() {
+    if (this.waiting) return;
+    this.waiting = true;
+    const { resting } = this;
+    const gl = this.renderer.getContext();
+    const started = performance.now();
+    const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+    do await new Promise(requestAnimationFrame);
+    while (!gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
+    gl.deleteSync(fence);
+    const taken = performance.now() - started;
+    if (resting && taken < QUICK) this.moving = this.fine;
+    if (!resting && taken > SLOW) this.moving = Math.max(this.moving / 2, COARSEST);
+    this.waiting = false;
+  }
+}
