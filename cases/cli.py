@@ -175,6 +175,15 @@ def _add_inspections(commands: "argparse._SubParsersAction[_Parser]") -> None:
     view.add_argument("result", type=Path, metavar="RESULT", help="the folder of the run, in which viewer.html is")
     view.set_defaults(command=does.view)
 
+    compare = commands.add_parser("compare", help="compare two finished runs: figures, and a picture side by side")
+    compare.add_argument("first", type=Path, metavar="A", help="the folder of a run")
+    compare.add_argument("second", type=Path, metavar="B", help="the folder of another run")
+    compare.add_argument("--field", default="exitance", help="an array of surface.ply; default: exitance")
+    compare.add_argument(
+        "--out", type=Path, default=Path("compare.png"), metavar="PNG", help="the picture; default: compare.png"
+    )
+    compare.set_defaults(command=does.compare)
+
 
 def _add_helpers(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that help to write cases and to report trouble."""

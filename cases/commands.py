@@ -123,6 +123,15 @@ def schema(_: argparse.Namespace) -> int:
     return 0
 
 
+def compare(options: argparse.Namespace) -> int:
+    """Compare two finished runs."""
+    from tetlux.cases.results.compare import compare_results  # noqa: PLC0415
+
+    for line in compare_results(options.first, options.second, options.out, options.field):
+        print(line)
+    return 0
+
+
 def new(options: argparse.Namespace) -> int:
     """Write a commented case file."""
     from tetlux.cases.new import write_new_case  # noqa: PLC0415

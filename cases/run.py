@@ -3,21 +3,22 @@
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tetlux.cases.file.case import Case
-from tetlux.cases.file.channels import ALL, EMISSION
+from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
-from tetlux.cases.solve import solve_case
+from tetlux.cases.solve import solve_case, solve_pulse
 from tetlux.cases.viewer import PAGE
 from tetlux.cases.write.content import content_of
 from tetlux.cases.write.fields import surface_values, volume_values
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
+from tetlux.cases.write.pulse import PULSE_FILES, PulseResults
 from tetlux.cases.write.results import Results, collect_results
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
@@ -29,20 +30,25 @@ from tetlux.meshing.files.meshes import write_mesh
 from tetlux.meshing.notes import add_prefix
 
 # Pictures and comparisons are imported where they are used: together they take as long as a small solve.
-if TYPE_CHECKING:
-    from tetlux.cases.picture.draw import PictureScene
-
 Report = Callable[[str], None]
-FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png", "viewer": PAGE}
+FILES = {
+    "surface": "surface.ply",
+    "volume": "volume.vtu",
+    "picture": "picture.png",
+    "viewer": PAGE,
+    "glb": "surface.glb",
+}
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
+MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
+FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, *PULSE_FILES, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -133,13 +139,15 @@ def finish_case(
     try:
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
-            solutions = solve_case(case, report, cache=cache, start=start)
+            transients = solve_pulse(case, report, cache=cache) if case.times else []
+            solutions = [each.as_steady for each in transients] or solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
-                publish(folder, target, ALL_FILES)
+                results = replace(collect_results(case, solutions), transients=tuple(transients))
+                summary, warnings, readings = _write(results, folder, started, writing)
+                publish(folder, target, [*_more_pictures(folder, target), *ALL_FILES])
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
                 raise write_error(target, error) from error
@@ -157,12 +165,15 @@ def _write(
     case = results.case
     unit = case.surface.unit
     warnings = _warnings(results)
+    pulse = PulseResults(results) if results.transients else None
     if "surface" in case.outputs:
-        _write_surface(results, folder)
+        _write_surface(results, folder, {} if pulse is None else pulse.arrays())
     if "volume" in case.outputs:
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     _draw(results, readings, folder)
+    if pulse is not None:
+        pulse.write(readings, folder)
     if readings:
         write_readings(readings, unit, folder / READINGS)
         if len(case.detectors) >= ENOUGH_TO_DRAW:
@@ -188,6 +199,11 @@ def _write(
     return figures, warnings, readings
 
 
+def _more_pictures(*folders: Path) -> set[str]:
+    """Pictures beside the first one, of this run and of an earlier one."""
+    return {path.name for folder in folders for pattern in MORE_PICTURES for path in folder.glob(pattern)}
+
+
 def _seconds(results: Results, started: float, writing: float) -> dict[str, float]:
     """Seconds by stage, from the start of the command until now, of a run that began and was written at some time."""
     case, of_solve, now = results.case, results.solutions[0].seconds, time.perf_counter()
@@ -211,9 +227,9 @@ def _places_lit(case: Case) -> FloatArray:
     return np.vstack([np.zeros((0, 3)), *places])
 
 
-def _write_surface(results: Results, folder: Path) -> None:
-    """Write the surface with its values, as PLY for mesh tools and as VTP for VTK."""
-    unit, values = results.case.surface.unit, surface_values(results)
+def _write_surface(results: Results, folder: Path, more: dict[str, FloatArray]) -> None:
+    """Write the surface with its values and more, as PLY for mesh tools and as VTP for VTK."""
+    unit, values = results.case.surface.unit, surface_values(results) | more
     notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
     if results.has_colours:
         notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"
@@ -225,43 +241,27 @@ def _write_surface(results: Results, folder: Path) -> None:
 
 
 def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
-    """Draw the picture and write the viewer, which show the same."""
-    if not {"picture", "viewer"} & set(results.case.outputs):
-        return
-    scene = _picture_scene(results, readings)
-    if "picture" in results.case.outputs:
-        from tetlux.cases.picture.draw import draw_picture  # noqa: PLC0415
+    """Draw pictures and figures, and write the viewer and what renderers read."""
+    outputs = set(results.case.outputs)
+    if "figures" in outputs:
+        from tetlux.cases.write.figures import write_figures  # noqa: PLC0415
 
-        draw_picture(scene, folder / FILES["picture"])
-    if "viewer" in results.case.outputs:
+        write_figures(results, _places_lit(results.case), folder)
+    if not outputs & {"picture", "viewer", "glb", "mitsuba"}:
+        return
+    from tetlux.cases.write.pictures import draw_pictures, picture_scene  # noqa: PLC0415
+
+    if "picture" in outputs:
+        draw_pictures(results, readings, folder)
+    scene = picture_scene(results, readings)
+    if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
         write_viewer(results, readings, scene, folder / FILES["viewer"])
+    if outputs & {"glb", "mitsuba"}:
+        from tetlux.cases.write.renderers import write_for_renderers  # noqa: PLC0415
 
-
-def _picture_scene(results: Results, readings: list[dict[str, Any]]) -> "PictureScene":
-    """Collect what the picture shows."""
-    from tetlux.cases.picture.arrows import light_rays  # noqa: PLC0415
-    from tetlux.cases.picture.draw import PictureScene, RegionOutline  # noqa: PLC0415
-
-    case = results.case
-    # Lights of all channels: one that is dark in the first may be bright in another.
-    lights = {name: light for channel in case.channels for name, light in channel.lights.items()}
-    return PictureScene(
-        points=results.surface.points,
-        triangles=results.surface.faces,
-        exitance=results.shown(),
-        unit=case.surface.unit,
-        title=f"{case.name}: {EMISSION}" if case.fluorophores else case.name,
-        lights=tuple(ray for light in lights.values() for ray in light_rays(light, case.surface)),
-        colours=results.preview if results.has_colours else None,
-        up=case.up,
-        toward=case.toward,
-        regions=tuple(
-            RegionOutline(region.surface.name, region.surface.points, region.surface.faces) for region in case.regions
-        ),
-        detectors=tuple({row["name"]: tuple(row["position"]) for row in readings}.items()),
-    )
+        write_for_renderers(results, scene, folder)
 
 
 def _warnings(results: Results) -> list[str]:

@@ -44,7 +44,7 @@ from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.fem.system import System
 from tetlux.fem.transient.moments import Moments, moments
-from tetlux.fem.transient.pulse import Transient, read_pulse
+from tetlux.fem.transient.transient import Transient
 from tetlux.fem.truncated import TruncatedSolution
 
 __all__ = [
@@ -96,7 +96,6 @@ __all__ = [
     "plan",
     "radiance",
     "read",
-    "read_pulse",
     "solve",
     "solve_each",
     "table",

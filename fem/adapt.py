@@ -13,11 +13,13 @@ from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, g
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
+from tetlux.fem.outcome.detectors import PlacedDetector
 from tetlux.fem.scenes import Scenes
 from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution, System
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine_often
@@ -164,16 +166,14 @@ def first_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
         if tolerances.readings is not None:
-            detector_points = np.array([placed.position for placed in tolerances.placed])
-            all_points, _ = places_to_resolve([each for split in problem.lights for each in split.deposits])
+            ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):
                 mesh = grade_between(
                     mesh,
                     scenes.surface,
                     scenes.inner,
                     media,
-                    all_points,
-                    detector_points,
+                    ways,
                     tolerances.readings,
                     most_tetrahedra,
                     shift,
@@ -181,6 +181,18 @@ def first_mesh(
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh it was given"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
+
+
+def _ways_of_light(problem: Problem, tolerances: Tolerances) -> list[tuple[FloatArray, FloatArray]]:
+    """Where light is deposited, (s, 3), and where it is read, (d, 3), for scenes of the same detectors together."""
+    by_detectors: dict[tuple[PlacedDetector, ...], list[Deposit]] = {}
+    for scene, split in enumerate(problem.lights):
+        by_detectors.setdefault(tolerances.placed_in(scene), []).extend(split.deposits)
+    return [
+        (places_to_resolve(deposits)[0], np.array([placed.position for placed in detectors]))
+        for detectors, deposits in by_detectors.items()
+        if deposits and detectors
+    ]
 
 
 @contextmanager
@@ -225,7 +237,7 @@ def solve_and_refine(
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = tolerances.assess(list(steps.values()))
+            found = tolerances.assess(steps)
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")

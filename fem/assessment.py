@@ -1,6 +1,6 @@
 """`Tolerances`: what a mesh is refined for, and how far solutions on it are from that."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +28,9 @@ class Tolerances:
     readings : float, optional
         Wanted relative error of what each detector reads.
     placed : tuple of PlacedDetector
-        The detectors.
+        The detectors of all scenes.
+    of_scenes : tuple of tuple of PlacedDetector
+        Those of each scene, where scenes differ in them.
     everywhere, volume : float, optional
         Wanted relative error of the exitance at almost every point of the surface, and of the fluence inside: see
         `tetlux.fem.quadratic.field_error`.
@@ -39,6 +41,11 @@ class Tolerances:
     placed: tuple[PlacedDetector, ...] = ()
     everywhere: float | None = None
     volume: float | None = None
+    of_scenes: tuple[tuple[PlacedDetector, ...], ...] = ()
+
+    def placed_in(self, scene: int) -> tuple[PlacedDetector, ...]:
+        """The detectors of a scene."""
+        return self.of_scenes[scene] if self.of_scenes else self.placed
 
     @property
     def fields(self) -> dict[Where, float]:
@@ -51,8 +58,9 @@ class Tolerances:
         """Whether quadratic elements are solved for on each mesh."""
         return self.readings is not None or len(self.fields) > 0
 
-    def assess(self, steps: Sequence[MeshSolution]) -> "Assessment":
-        """Compare the errors of solutions on one mesh with the tolerances."""
+    def assess(self, by_scene: Mapping[int, MeshSolution]) -> "Assessment":
+        """Compare the errors of solutions of scenes, by their number, on one mesh with the tolerances."""
+        steps = list(by_scene.values())
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
@@ -60,7 +68,7 @@ class Tolerances:
             largest_ratio = error / self.exitance
             splits += cells_to_split((step.estimate for step in steps), self.exitance)
         if self.readings is not None:
-            readings = [reading for step in steps for reading in self._read(step)]
+            readings = [reading for scene, step in by_scene.items() for reading in self._read(scene, step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
             largest_ratio = max(largest_ratio, of_readings / self.readings)
             summary += f", of readings {of_readings:.2%}"
@@ -73,10 +81,10 @@ class Tolerances:
             splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
         return Assessment(largest_ratio, splits, summary)
 
-    def _read(self, step: MeshSolution) -> list[ReadingError]:
+    def _read(self, scene: int, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
         assert quadratic is not None
-        parts = quadratic.prepare([placed.measurement for placed in self.placed])
+        parts = quadratic.prepare([placed.measurement for placed in self.placed_in(scene)])
         return [estimate_reading(step.solution, measurement) for some in parts for measurement in some]
 
 

@@ -113,8 +113,7 @@ def grade_between(
     surface: Surface,
     inner: Sequence[Surface],
     media: Sequence[AnyMedium],
-    source_points: FloatArray,
-    detector_points: FloatArray,
+    ways: Sequence[tuple[FloatArray, FloatArray]],
     tolerance: float,
     most: int,
     shift: complex = 0.0,
@@ -130,7 +129,7 @@ def grade_between(
         Those of the mesh's regions.
     media : sequence of medium
         Of the body and of its regions.
-    source_points, detector_points : (s, 3), (d, 3) ndarray
+    ways : sequence of pairs of (s, 3), (d, 3) ndarray
         Where light is deposited, and where it is read.
     tolerance : float
         Of readings.
@@ -143,18 +142,19 @@ def grade_between(
     -------
     TetMesh
     """
-    some = source_points[:: max(1, -(-len(source_points) // MOST_SOURCE_POINTS))]
-    lengths = cdist(some, detector_points)
-    while len(some):
+    some = [(points[:: max(1, -(-len(points) // MOST_SOURCE_POINTS))], detectors) for points, detectors in ways]
+    while any(len(points) for points, _ in some):
         coefficients = replace(coefficients_on(mesh, media), shift=shift)
         decay = np.broadcast_to(coefficients.decay, len(mesh.tetrahedra))
         middles = mesh.points[mesh.tetrahedra].mean(axis=1)
-        from_light, to_detector = cdist(middles, some), cdist(middles, detector_points)
-        excess = np.full(len(middles), np.inf)
-        for light, length in enumerate(lengths):
-            excess = np.minimum(excess, (from_light[:, [light]] + to_detector - length).min(axis=1))
+        excess, nearest = np.full((2, len(middles)), np.inf)
+        for points, detectors in some:
+            to_detector = cdist(middles, detectors)
+            nearest = np.minimum(nearest, to_detector.min(axis=1))
+            for from_light, length in zip(cdist(points, middles), cdist(points, detectors), strict=True):
+                excess = np.minimum(excess, from_light + (to_detector - length).min(axis=1))
         wanted = FADING * (tolerance / AT_TOLERANCE) ** 0.25 * np.exp(0.25 * decay * excess)
-        near = decay * to_detector.min(axis=1) / NEAR_DETECTOR
+        near = decay * nearest / NEAR_DETECTOR
         wanted *= np.minimum(AT_DETECTOR + (1.0 - AT_DETECTOR) * near, 1.0)
         marked = mesh.longest_edges * decay > wanted
         if not marked.any():

@@ -153,12 +153,12 @@ def _refine_for_most(
         solve_on = problem.solver_on(mesh)
         steps = {scene: solve_on(scene, coarser) for scene, coarser in pending.items()}
         with problem.watch.stage("solve"):
-            missing = {scene: step for scene, step in steps.items() if tolerances.assess([step]).splits.any()}
+            missing = {scene: step for scene, step in steps.items() if tolerances.assess({scene: step}).splits.any()}
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {len(missing)} of {len(problem.lights)} need more")
         if len(missing) <= allowed:
             return mesh
         with problem.watch.stage("mesh"):
-            splits = tolerances.assess(list(missing.values())).splits
+            splits = tolerances.assess(missing).splits
             inner = problem.scenes.inner
             finer = refine_often(mesh, splits, problem.scenes.surface, inner, most_tetrahedra)
         if not len(mesh.tetrahedra) < len(finer.tetrahedra) <= most_tetrahedra:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Unpack, overload
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
-from tetlux.fem.assessment import Tolerances
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.known.split import Subtract
 from tetlux.fem.labels import GivenMedia
@@ -16,12 +15,12 @@ from tetlux.fem.meshless.solve import solve_with_charges
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.solution import Solution
+from tetlux.fem.planner.channels import solve_channels, solve_times
 from tetlux.fem.planner.options import Options, check_options_of
-from tetlux.fem.planner.request import MODULATED, make_request
-from tetlux.fem.planner.solve import AnySolution, FiniteElements, solve_by_plan, solve_closed_forms, solve_on_part
-from tetlux.fem.scenes import media_by_channel
+from tetlux.fem.planner.solve import AnySolution
 from tetlux.fem.solve_scenes import Report, no_report, solve_each
 from tetlux.fem.sources.light import Light
+from tetlux.fem.transient.transient import Transient
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -101,6 +100,30 @@ def solve(
 ) -> list[AnySolution]: ...
 
 
+@overload
+def solve(  # type: ignore[overload-overlap]  # as above
+    body: Surface | TetMesh,
+    medium: AnyMedium | Mapping[Any, AnyMedium],
+    lights: Sequence[Light],
+    *,
+    times: Sequence[float],
+    model: Literal["full", "auto"] = ...,
+    **options: Unpack[Options],
+) -> Transient: ...
+
+
+@overload
+def solve(
+    body: Surface | TetMesh,
+    medium: Sequence[AnyMedium | Mapping[Any, AnyMedium]] | Mapping[Any, AnyMedium | Sequence[AnyMedium]],
+    lights: Sequence[Light],
+    *,
+    times: Sequence[float],
+    model: Literal["full", "auto"] = ...,
+    **options: Unpack[Options],
+) -> list[Transient]: ...
+
+
 def solve(
     body: Surface | TetMesh,
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
@@ -121,8 +144,9 @@ def solve(
     report: Report = no_report,
     frequency: float = 0.0,
     outside_index: float = 1.0,
+    times: Sequence[float] | None = None,
     model: Literal["full", "auto", "closed-form", "charges", "truncated"] = "full",
-) -> AnySolution | Sequence[AnySolution]:
+) -> AnySolution | Transient | Sequence[AnySolution] | Sequence[Transient]:
     """Solve the diffusion approximation for the light in a body.
 
     A `Surface` is tetrahedralized and refined until the estimated error of the exitance is within the
@@ -183,6 +207,9 @@ def solve(
         Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
     outside_index : float
         Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
+    times : sequence of float, optional
+        s, rising: at these times after a short pulse of the lights, of 1 J for each watt. The solution then is a
+        `Transient`, see `tetlux.fem.transient`, for which model is "full" or "auto", both by finite elements.
     model : {"full", "auto", "closed-form", "charges", "truncated"}
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
@@ -196,7 +223,7 @@ def solve(
 
     Returns
     -------
-    Solution, ChargeSolution or ClosedFormSolution, or list of these
+    Solution, ChargeSolution, ClosedFormSolution or Transient, or list of these
         A list with a solution for each channel if `medium` is a sequence or holds one for a label. Its `model` says
         how it was solved and, for ``model="auto"``, its `plan` why; its `mesh` is None where none was made.
 
@@ -243,6 +270,8 @@ def solve(
         frequency=frequency,
         outside_index=outside_index,
     )
+    if times is not None:
+        return solve_times(body, medium, lights, times, model, options)
     if model not in ("full", "auto"):
         check_options_of(model, options)
     if model == "charges":
@@ -255,50 +284,4 @@ def solve(
             detectors=detectors,
             detector_tolerance=detector_tolerance,
         )
-    return _solve_channels(body, medium, lights, model, options)
-
-
-def _solve_channels(
-    body: Surface | TetMesh,
-    medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
-    lights: Sequence[Light],
-    model: Literal["full", "auto", "truncated", "closed-form"],
-    options: Options,
-) -> AnySolution | Sequence[AnySolution]:
-    """Solve each channel: all on one mesh, or all by one closed form."""
-    channels, several = media_by_channel(body, options["mesh"], medium)
-    scenes = [lights] * len(channels)
-    solutions: Sequence[AnySolution]
-    if model == "full":
-        solutions = solve_each(body, channels, scenes, **options)
-    else:
-        request = make_request(
-            body,
-            channels,
-            scenes,
-            regions=options["regions"],
-            tolerances=Tolerances(
-                options["tolerance"],
-                options["detector_tolerance"],
-                everywhere=options["everywhere_tolerance"],
-                volume=options["volume_tolerance"],
-            ),
-            detectors=options["detectors"],
-            mesh=options["mesh"],
-            need_of_mesh=MODULATED if options["frequency"] else "",
-            cache=options["cache"],
-        )
-        elements = FiniteElements(
-            lambda: solve_each(body, channels, scenes, **options),
-            lambda part, media, inside, start: solve_each(
-                part, media, scenes, start=start, **options | {"regions": inside}
-            ),
-            options["cache"],
-        )
-        if model == "closed-form":
-            solutions = solve_closed_forms(request)
-        elif model == "truncated":
-            solutions = solve_on_part(request, elements, options["report"])
-        else:
-            solutions = solve_by_plan(request, elements, options["report"])
-    return solutions if several else solutions[0]
+    return solve_channels(body, medium, lights, model, options)

@@ -45,7 +45,7 @@ def solve_each(
     *,
     regions: Sequence[Region] = (),
     tolerance: float | None = DEFAULT_TOLERANCE,
-    detectors: Sequence[Detector] = (),
+    detectors: Sequence[Detector] | Sequence[Sequence[Detector]] = (),
     detector_tolerance: float | None = None,
     everywhere_tolerance: float | None = None,
     volume_tolerance: float | None = None,
@@ -74,8 +74,8 @@ def solve_each(
         Closed surfaces within the body; a region has one medium for all scenes, or one for each.
     tolerance : float, optional
         Wanted relative L2 error of each scene's exitance over the surface; None to refine for detectors alone.
-    detectors : sequence of detectors
-        What is to be read in each scene.
+    detectors : sequence of detectors, or of sequences of these
+        What is to be read in each scene; a list for each scene if they differ, such as those near its light.
     detector_tolerance : float, optional
         Wanted relative error of what each detector reads.
     everywhere_tolerance, volume_tolerance : float, optional
@@ -148,12 +148,12 @@ def solve_each(
             split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene, shift=checked.shifts[scene])
             for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
         ]
-        dark = Dark(checked.surface, checked.bodies[0].outer)
-        tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
+        by_scene = detectors_by_scene(detectors, len(scenes))
+        tolerances = place_all(tolerances, by_scene, Dark(checked.surface, checked.bodies[0].outer))
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
     problem = Problem(checked, split, mass, limit, watch, start)
-    solutions = solve_problem(problem, tolerances, detectors, mesh, most_tetrahedra, report, cache=cache)
+    solutions = solve_problem(problem, tolerances, by_scene, mesh, most_tetrahedra, report, cache=cache)
     keep_fits(solutions[0].mesh, kept)
     return solutions
 
@@ -161,7 +161,7 @@ def solve_each(
 def solve_problem(
     problem: Problem,
     tolerances: Tolerances,
-    detectors: Sequence[Detector],
+    detectors: Sequence[Sequence[Detector]],
     mesh: TetMesh | None,
     most_tetrahedra: int,
     report: Report,
@@ -170,9 +170,9 @@ def solve_problem(
 ) -> list[Solution]:
     """Mesh a body unless a mesh is given, solve for all scenes and refine, and note what a user should know.
 
-    The arguments are those of `solve_each`, checked. Returns a solution for each scene.
+    The arguments are those of `solve_each`, checked, with detectors of each scene. Returns a solution for each.
     """
-    given, reading = mesh is not None, len(detectors) > 0 or tolerances.need_quadratic
+    given, reading = mesh is not None, any(detectors) or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     if mesh is None:
         mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
@@ -182,7 +182,9 @@ def solve_problem(
     solutions, scenes = [], problem.scenes
     for number, step in enumerate(steps):
         with problem.watch.stage("solve"):
-            solution = _with_fields(replace(step.solution, readings=read_all(detectors, step.solution)), tolerances)
+            solution = _with_fields(
+                replace(step.solution, readings=read_all(detectors[number], step.solution)), tolerances
+            )
         notes = notes_on(solution, problem.lights[number], tolerances.exitance, where)
         notes += notes_on_readings(solution.readings, tolerances.readings, where)
         notes += notes_on_fields(solution, tolerances.everywhere, tolerances.volume, where)
@@ -190,6 +192,33 @@ def solve_problem(
         solutions.append(replace(solution, warnings=list(dict.fromkeys(notes)), frequency=scenes.frequencies[number]))
     seconds = problem.watch.read()
     return [replace(solution, seconds=seconds) for solution in solutions]
+
+
+def detectors_by_scene(
+    detectors: Sequence[Detector] | Sequence[Sequence[Detector]], scenes: int
+) -> list[Sequence[Detector]]:
+    """The detectors of each scene.
+
+    Raises
+    ------
+    InputError
+        If there are lists of them, and not one for each scene.
+    """
+    if not detectors or not isinstance(detectors[0], Sequence):
+        return [detectors] * scenes  # type: ignore[list-item]
+    if len(detectors) != scenes or not all(isinstance(some, Sequence) for some in detectors):
+        raise InputError(
+            f"there are {len(detectors)} lists of detectors for {scenes} scenes; give one for each, or one for all.",
+            field="detectors",
+        )
+    return list(detectors)  # type: ignore[arg-type]
+
+
+def place_all(tolerances: Tolerances, detectors: Sequence[Sequence[Detector]], dark: Dark) -> Tolerances:
+    """Tolerances with the places of the detectors of each scene, each of which is placed once."""
+    placed = {id(each): place_detector(each, dark) for some in detectors for each in some}
+    of_scenes = tuple(tuple(placed[id(each)] for each in some) for some in detectors)
+    return replace(tolerances, placed=tuple(placed.values()), of_scenes=of_scenes)
 
 
 def _kept_for(mesh: TetMesh | None, start: SharedMesh | None) -> KeptFits:
@@ -220,7 +249,7 @@ def _with_fields(solution: Solution, tolerances: Tolerances) -> Solution:
     )
 
 
-def check_tolerances(given: Tolerances, detectors: Sequence[Detector]) -> Tolerances:
+def check_tolerances(given: Tolerances, detectors: Sequence[Detector] | Sequence[Sequence[Detector]]) -> Tolerances:
     """Refuse tolerances out of range, without a detector, or none at all.
 
     A tolerance everywhere is one of the L2 error too.

@@ -8,22 +8,20 @@ import pytest
 from matplotlib import colormaps
 from PIL import Image
 
-from tetlux.cases.picture import draw as picture
+from tetlux.cases.picture.canvas import Canvas
+from tetlux.cases.picture.colour_maps import DARKEST, color_table
 from tetlux.cases.picture.draw import PictureScene, Ray, draw_picture
-from tetlux.cases.picture.frame import LEFT, TOP, bar_ticks
+from tetlux.cases.picture.frame import LEFT, TOP
 from tetlux.cases.picture.rasterizer import visible_triangles
-from tetlux.cases.picture.shading import SIZE, draw_stage, place_samples
+from tetlux.cases.picture.scale import bar_ticks, scale_of
+from tetlux.cases.picture.shading import draw_stage, place_samples, samples_of
 from tetlux.cases.picture.stage import (
     BACKGROUND,
     DARK,
-    DARKEST,
     OVERSAMPLING,
     SHADED,
     build_stage,
-    color_table,
     corner_normals,
-    exitance_range,
-    map_shares,
 )
 from tetlux.cases.picture.view import PANEL, Camera
 from tetlux.meshing import box, sphere, torus
@@ -81,8 +79,8 @@ def test_rays_hit_the_triangles_that_are_visible() -> None:
     body = torus(10.0, 4.0, segments=48)
     scene = lit(body, (-14.0, 0.0, 0.0), (-30.0, 0.0, 0.0))
     camera = camera_of(scene)
-    drawn = visible_triangles(place_samples(camera, body.points[body.faces]), SIZE, closed=True)
-    row, column = np.divmod(np.arange(17, drawn.owner.size, 997), SIZE[0])
+    drawn = visible_triangles(place_samples(camera, body.points[body.faces]), samples_of(camera), closed=True)
+    row, column = np.divmod(np.arange(17, drawn.owner.size, 997), samples_of(camera)[0])
     across, down = (column + 0.5) / OVERSAMPLING - 0.5 * PANEL[0], 0.5 * PANEL[1] - (row + 0.5) / OVERSAMPLING
     eye = camera.center + 100.0 * camera.toward
     origins = eye + camera.pixel * (across[:, None] * camera.right + down[:, None] * camera.up)
@@ -137,11 +135,11 @@ def test_a_body_in_its_own_colours_is_drawn_on_a_dark_ground(tmp_path: Path) -> 
 def test_a_failure_leaves_the_old_picture_and_nothing_else(
     ball: PictureScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def half(path: Path, *_: object, **__: object) -> None:
+    def half(_: Canvas, path: Path) -> None:
         path.write_bytes(b"half a picture")
         raise OSError("the disk is full")
 
-    monkeypatch.setattr(picture, "draw_frame", half)
+    monkeypatch.setattr(Canvas, "save", half)
     target = tmp_path / "picture.png"
     target.write_bytes(b"the old one")
     with pytest.raises(OSError, match="disk is full"):
@@ -183,11 +181,12 @@ def test_the_camera_moves_so_that_the_body_does_not_hide_the_entry_point() -> No
 
 def test_colours_follow_the_logarithm_over_six_decades_at_most() -> None:
     exitance = np.array([0.0, -1e-18, np.nan, 1e-12, 1e-7, 1e-4, 1e-1])
-    ends = exitance_range(exitance)
-    assert ends == pytest.approx((1e-7, 1e-1))
-    np.testing.assert_allclose(map_shares(exitance, ends), [0, 0, 0, 0, 0, 0.5, 1], atol=1e-12)
+    scale = scale_of(exitance, "exitance", "W/mm²")
+    assert scale.ends == pytest.approx((1e-7, 1e-1))
+    np.testing.assert_allclose(scale.shares(exitance), [0, 0, 0, 0, 0, 0.5, 1], atol=1e-12)
+    assert scale.has_below(exitance)
     # Noise on an even glow must not fill the colour map.
-    even = exitance_range(np.array([1.0, 1.0 + 1e-9]))
+    even = scale_of(np.array([1.0, 1.0 + 1e-9]), "exitance", "").ends
     assert even is not None
     assert math.isclose(even[1] / even[0], 2.0)
 

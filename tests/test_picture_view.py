@@ -22,6 +22,7 @@ from tetlux.cases.picture.stage import (
 )
 from tetlux.cases.picture.view import PANEL, Camera, camera_at, choose_view, direction_of, upright_axes
 from tetlux.cases.run import run_case
+from tetlux.cases.write import pictures
 from tetlux.meshing import InputError, box, sphere
 from tetlux.meshing.arrays import FloatArray, Vector
 
@@ -233,7 +234,7 @@ def test_a_run_draws_its_regions_and_detectors(tmp_path: Path, monkeypatch: pyte
         scenes.append(scene)
         path.write_bytes(b"")
 
-    monkeypatch.setattr(picture, "draw_picture", kept)
+    monkeypatch.setattr(pictures, "draw_picture", kept)
     case = case_of(
         "up: [0, 1, 0]\ncamera: {azimuth: 10}\n"
         "regions: [{name: core, surface: {sphere: {radius: 4}}, medium: {sigma_a: 0.1, sigma_s_prime: 1, eta: 1.4}}]\n"

@@ -13,7 +13,8 @@ import pytest
 from tests.viewer_made import CASE, data_of, run_with_viewer, unpack
 from tetlux.cases import viewer
 from tetlux.cases.cli import main
-from tetlux.cases.picture.stage import color_table, exitance_range
+from tetlux.cases.picture.colour_maps import color_table
+from tetlux.cases.picture.scale import exitance_range
 from tetlux.cases.viewer.pack import pack_bytes, pack_floats, pack_indices
 from tetlux.meshing.arrays import FloatArray
 

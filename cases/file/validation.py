@@ -28,7 +28,7 @@ YAML_WORDS = {None: "nothing", True: "true", False: "false"}
 # How to write a section for which a single word was given.
 ONE_WORD = {"surface": "surface: {{file: {0}}}", "medium": "medium: {{material: {0}}}"}
 # Lists that do not hold three numbers.
-COUNTS: dict[str | int, str] = {"values": "two"}
+COUNTS: dict[str | int, str] = {"values": "two", "range": "two", "pixels": "two"}
 
 
 def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
@@ -54,7 +54,8 @@ def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
 
 def _sentence(kind: str, message: str, given: object, key: Key) -> str:
     """What is wrong with the value of a key: by the type, message and input of a pydantic error."""
-    several = f"expected a list of {COUNTS.get(key[-2] if len(key) > 1 else '', 'three')} numbers"
+    count = next((COUNTS[part] for part in key[-2:] if part in COUNTS), "three")
+    several = f"expected a list of {count} numbers"
     if kind == "missing":
         return f"{several}." if isinstance(key[-1], int) else "this key is missing; the case needs it."
     text = message[0].lower() + message[1:]
@@ -67,7 +68,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep"):
+    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep", "picture"):
         return f"{text}."
     hint = ""
     if kind == "literal_error" and isinstance(given, str):

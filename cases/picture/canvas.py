@@ -34,6 +34,11 @@ class Canvas:
         self._image = Image.new("RGB", size, (red, green, blue))
         self._draw = ImageDraw.Draw(self._image)
 
+    @property
+    def image(self) -> Image.Image:
+        """What is drawn so far."""
+        return self._image
+
     def paste(self, pixels: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], left: int, top: int) -> None:
         """Put an image (h, w, 3) at a place."""
         self._image.paste(Image.fromarray(pixels), (left, top))

@@ -7,9 +7,9 @@ import numpy as np
 
 from tetlux.cases.picture.canvas import Canvas
 from tetlux.cases.picture.rasterizer import visible_triangles
-from tetlux.cases.picture.shading import SIZE, place_samples
+from tetlux.cases.picture.shading import place_samples, samples_of
 from tetlux.cases.picture.stage import OVERSAMPLING
-from tetlux.cases.picture.view import PANEL, Camera, caster_of, in_view
+from tetlux.cases.picture.view import Camera, caster_of, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 
 INK, PAPER = "#20242b", "#ffffff"
@@ -90,9 +90,9 @@ def project_marks(
 def _coverage(camera: Camera, region: RegionOutline) -> FloatArray:
     """The share of each pixel of the panel that a region covers, (h, w)."""
     placed = place_samples(camera, region.points[region.triangles])
-    covered = visible_triangles(placed, SIZE, closed=True).owner >= 0
-    n = OVERSAMPLING
-    return np.asarray(covered.reshape(PANEL[1], n, PANEL[0], n).mean(axis=(1, 3)))
+    covered = visible_triangles(placed, samples_of(camera), closed=True).owner >= 0
+    n, (width, height) = OVERSAMPLING, camera.panel
+    return np.asarray(covered.reshape(height, n, width, n).mean(axis=(1, 3)))
 
 
 def draw_marks(canvas: Canvas, marks: Marks, left: int, top: int) -> None:

@@ -6,15 +6,13 @@ import numpy as np
 
 from tetlux.cases.picture.rasterizer import Visible, gradients, visible_triangles
 from tetlux.cases.picture.stage import ARROW_OPACITY, FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage
-from tetlux.cases.picture.view import PANEL, Camera, caster_of
+from tetlux.cases.picture.view import Camera, caster_of
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 
 # Triangles whose means differ by less have one colour: of the map's positions, or of red, green and blue.
 ONE_COLOUR = 0.02
 # Rays through a pixel on the outline, along each side: more than samples, since there the contrast is largest.
 RAYS = 4
-# Samples of the panel.
-SIZE = (OVERSAMPLING * PANEL[0], OVERSAMPLING * PANEL[1])
 
 
 def draw_stage(stage: Stage) -> Image:
@@ -25,35 +23,36 @@ def draw_stage(stage: Stage) -> Image:
     body is behind them.
     """
     placed, arrows = (place_samples(stage.camera, corners) for corners in (stage.corners, stage.arrows))
-    body = visible_triangles(placed, SIZE, closed=True)
+    width, height = stage.camera.panel
+    body = visible_triangles(placed, samples_of(stage.camera), closed=True)
     owner = _by_pixel(body.owner)
     paint = _paint_of_body(stage, placed)
     image = np.empty((owner.shape[1], 3))
     image[:] = stage.background
     lit: BoolArray = np.zeros(len(image), dtype=bool)
     if len(arrows):
-        lit_pixels, arrow = _visible_arrows(arrows, body)
+        lit_pixels, arrow = _visible_arrows(arrows, body, (width, height))
         lit[lit_pixels] = True
     plain = paint.is_even(owner) & ~lit
     pixels = np.flatnonzero(plain & (owner[0] >= 0))
-    row, column = np.divmod(pixels, PANEL[0])
+    row, column = np.divmod(pixels, width)
     middle = 0.5 * OVERSAMPLING
     image[pixels] = paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle)
     mixed = np.flatnonzero(~plain & ~lit)
     image[mixed] = _paint_mixed(stage, paint, owner[:, mixed], mixed)
     if lit.any():
         own = owner[:, lit_pixels]
-        under = _paint_samples(paint, own, lit_pixels, _ground(stage, len(lit_pixels)))
-        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow, lit_pixels, under)
+        under = _paint_samples(paint, own, lit_pixels, _ground(stage, len(lit_pixels)), width)
+        over = _paint_samples(_paint_of_arrows(stage, arrows), arrow, lit_pixels, under, width)
         share = np.where(own >= 0, ARROW_OPACITY, 1.0)[:, :, None]
         image[lit_pixels] = (under + share * (over - under)).mean(axis=0)
-    return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(PANEL[1], PANEL[0], 3)
+    return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(height, width, 3)
 
 
-def _visible_arrows(arrows: FloatArray, body: Visible) -> tuple[IntArray, IntArray]:
+def _visible_arrows(arrows: FloatArray, body: Visible, panel: tuple[int, int]) -> tuple[IntArray, IntArray]:
     """The pixels (n,) in which arrows (m, 3, 3) are visible, and the triangles at their samples, (samples, n)."""
     corners = arrows[:, :, :2].reshape(-1, 2)
-    last = np.array(PANEL) - 1
+    last = np.array(panel) - 1
     low = np.clip(np.floor(corners.min(axis=0) / OVERSAMPLING).astype(np.int64), 0, last)
     high = np.clip(np.floor(corners.max(axis=0) / OVERSAMPLING).astype(np.int64), 0, last) + 1
     (left, top), (right, bottom) = OVERSAMPLING * low, OVERSAMPLING * high
@@ -62,7 +61,7 @@ def _visible_arrows(arrows: FloatArray, body: Visible) -> tuple[IntArray, IntArr
     owner = _by_pixel(visible_triangles(shifted, (right - left, bottom - top), closed=False, before=before).owner)
     seen = np.flatnonzero((owner >= 0).any(axis=0))
     row, column = np.divmod(seen, int(high[0] - low[0]))
-    return (row + low[1]) * PANEL[0] + column + low[0], owner[:, seen]
+    return (row + low[1]) * panel[0] + column + low[0], owner[:, seen]
 
 
 def _ground(stage: Stage, pixels: int) -> FloatArray:
@@ -72,7 +71,7 @@ def _ground(stage: Stage, pixels: int) -> FloatArray:
 
 def _paint_mixed(stage: Stage, paint: "_Paint", owner: IntArray, pixels: IntArray) -> FloatArray:
     """Colours (n, 3) of pixels (n,) that show several triangles, or the body and the background."""
-    colours = _paint_samples(paint, owner, pixels, _ground(stage, len(pixels)))
+    colours = _paint_samples(paint, owner, pixels, _ground(stage, len(pixels)), stage.camera.panel[0])
     mean: FloatArray = colours.mean(axis=0)
     inside = owner >= 0
     outline = np.flatnonzero(inside.any(axis=0) & ~inside.all(axis=0))
@@ -85,10 +84,10 @@ def _paint_mixed(stage: Stage, paint: "_Paint", owner: IntArray, pixels: IntArra
 def _coverage(stage: Stage, pixels: IntArray) -> FloatArray:
     """The share of each pixel (n,) of the panel that the body covers, by rays through it."""
     camera, n = stage.camera, RAYS
-    row, column = np.divmod(pixels, PANEL[0])
+    row, column = np.divmod(pixels, camera.panel[0])
     down, right = ((np.indices((n, n)).reshape(2, -1) + 0.5) / n)[:, None]
-    across = (column[:, None] + right).ravel() - 0.5 * PANEL[0]
-    above = 0.5 * PANEL[1] - (row[:, None] + down).ravel()
+    across = (column[:, None] + right).ravel() - 0.5 * camera.panel[0]
+    above = 0.5 * camera.panel[1] - (row[:, None] + down).ravel()
     eye = camera.center + np.linalg.norm(np.ptp(stage.corners, axis=(0, 1))) * camera.toward
     places = eye + camera.pixel * (across[:, None] * camera.right + above[:, None] * camera.up)
     _, hit = caster_of(stage.corners).first(places, np.broadcast_to(-camera.toward, places.shape))
@@ -98,6 +97,11 @@ def _coverage(stage: Stage, pixels: IntArray) -> FloatArray:
 def place_samples(camera: Camera, corners: FloatArray) -> FloatArray:
     """Corners (m, 3, 3) of triangles in the panel: column and row, in samples, and nearness to the eye."""
     return camera.project(corners.reshape(-1, 3)).reshape(-1, 3, 3) * OVERSAMPLING
+
+
+def samples_of(camera: Camera) -> tuple[int, int]:
+    """Samples of the panel, by column and by row."""
+    return OVERSAMPLING * camera.panel[0], OVERSAMPLING * camera.panel[1]
 
 
 def _by_pixel(samples: IntArray) -> IntArray:
@@ -166,11 +170,11 @@ def _make_paint(
     return _Paint(corner, means, (np.stack([value[:, 0] for value in values]), by_column, by_row), table)
 
 
-def _paint_samples(paint: _Paint, owner: IntArray, pixels: IntArray, under: FloatArray) -> FloatArray:
+def _paint_samples(paint: _Paint, owner: IntArray, pixels: IntArray, under: FloatArray, width: int) -> FloatArray:
     """Colours (samples of a pixel, pixels, 3) of samples; where they belong to no triangle, those `under` them."""
     colours = under.copy()
     sample, pixel = np.nonzero(owner >= 0)
-    row, column = np.divmod(pixels[pixel], PANEL[0])
+    row, column = np.divmod(pixels[pixel], width)
     down, right = np.divmod(sample, OVERSAMPLING)
     places = OVERSAMPLING * column + right + 0.5, OVERSAMPLING * row + down + 0.5
     colours[sample, pixel] = paint(owner[sample, pixel], *places)

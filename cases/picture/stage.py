@@ -5,27 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.picture.view import UPRIGHT, Camera, Ray, camera_at, choose_view, unit
+from tetlux.cases.picture.scale import Scale, scale_of
+from tetlux.cases.picture.view import PANEL, UPRIGHT, Camera, Ray, camera_at, choose_view, unit
 from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 # A pixel has 2 x 2 samples, whose mean smooths edges.
 OVERSAMPLING = 2
-# The colour map spans at most this many decades below the maximum.
-DECADES = 6.0
-# The colour map spans at least this factor, since a narrower range would show rounding errors as a pattern.
-NARROWEST = 2.0
-# The darkest colours of the map are left out, in which no shape could be seen.
-DARKEST = 0.2
-# Every fifth colour of matplotlib's map "inferno" (CC0), which is linear between them within 0.005. Importing it from
-# matplotlib would take a quarter of a second.
-INFERNO = (
-    "000004 02020c 050417 0a0722 10092d 160b39 1e0c45 260c51 2f0a5b 380962 400a67 490b6a 510e6c 59106e 61136e 69166e "
-    "71196e 781c6d 801f6c 88226a 902568 982766 a02a63 a82e5f b0315b b73557 bf3952 c63d4d cc4248 d34743 d94d3d df5337 "
-    "e45a31 e9612b ed6925 f1711f f47918 f78212 f98b0b fa9407 fb9d07 fca60c fcb014 fbba1f fac42a f8cd37 f6d746 f4e156 "
-    "f2ea69 f2f27d f5f992 fcffa4"
-)
 BACKGROUND: Vector = (0.953, 0.957, 0.965)
 # Background of a body with colours of its own.
 DARK: Vector = (0.11, 0.12, 0.14)
@@ -79,36 +66,6 @@ class Stage:
         return BACKGROUND if self.colours is None else DARK
 
 
-def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
-    """The exitance at the ends of the colour map; None if no light leaves.
-
-    The range ends at the largest value. It begins at the smallest positive one, but at most `DECADES` below the
-    largest, and spans at least a factor of `NARROWEST`.
-    """
-    positive = exitance[np.isfinite(exitance) & (exitance > 0)]
-    if len(positive) == 0:
-        return None
-    top = float(positive.max())
-    bottom = max(float(positive.min()), top * 10.0**-DECADES)
-    return min(bottom, top / NARROWEST), top
-
-
-def map_shares(exitance: FloatArray, ends: tuple[float, float] | None) -> FloatArray:
-    """Positions on the colour map, 0 to 1, by the logarithm of the exitance; values that are not positive are at 0."""
-    if ends is None:
-        return np.zeros(len(exitance))
-    bottom, top = ends
-    clipped = np.clip(np.nan_to_num(exitance, nan=0.0, posinf=top, neginf=0.0), bottom, top)
-    return np.asarray(np.log(clipped / bottom) / math.log(top / bottom))
-
-
-def color_table() -> FloatArray:
-    """The colour map at 256 steps, red, green and blue from 0 to 1, (256, 3)."""
-    knots = np.array([list(bytes.fromhex(colour)) for colour in INFERNO.split()]) / 255.0
-    at = np.linspace(DARKEST, 1.0, 256) * (len(knots) - 1)
-    return np.column_stack([np.interp(at, np.arange(len(knots)), column) for column in knots.T])
-
-
 def build_stage(
     points: FloatArray,
     triangles: IntArray,
@@ -118,21 +75,28 @@ def build_stage(
     *,
     up: Vector = UPRIGHT,
     toward: FloatArray | None = None,
+    panel: tuple[int, int] = PANEL,
+    scale: Scale | None = None,
+    values: FloatArray | None = None,
 ) -> Stage:
-    """Make the camera, arrows, normals and colours of a picture; `toward`, if given, sets the direction to the eye."""
-    shares = map_shares(exitance, exitance_range(exitance))
+    """Make the camera, arrows, normals and colours of a picture.
+
+    `toward`, if given, sets the direction to the eye, `values` and their `scale` the colours in place of the exitance.
+    """
+    scale = scale or scale_of(exitance, "exitance", "")
+    shares = scale.shares(exitance if values is None else values)
     corners = points[triangles]
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point]
     arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
     return Stage(
-        camera=choose_camera(points, triangles, exitance, lights, up=up, toward=toward),
+        camera=choose_camera(points, triangles, exitance, lights, up=up, toward=toward, panel=panel),
         corners=corners,
         normals=corner_normals(corners, triangles),
         shares=shares[triangles],
         arrows=np.concatenate([np.empty((0, 3, 3)), *(c for c, _ in arrows)]),
         arrow_normals=np.concatenate([np.empty((0, 3, 3)), *(n for _, n in arrows)]),
-        table=color_table(),
+        table=scale.table,
         colours=None if colours is None else colours[triangles],
     )
 
@@ -145,6 +109,7 @@ def choose_camera(
     *,
     up: Vector = UPRIGHT,
     toward: FloatArray | None = None,
+    panel: tuple[int, int] = PANEL,
 ) -> Camera:
     """The camera of a picture of a body and its lights; `toward`, if given, sets the direction to the eye."""
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -156,7 +121,7 @@ def choose_camera(
     near = [place[None] for place in marked if np.linalg.norm(place - middle) < diagonal]
     if toward is None:
         toward = choose_view(points[triangles], exitance[triangles].mean(axis=1), lights, diagonal, up)
-    return camera_at(np.vstack([points, *near]), toward, up)
+    return camera_at(np.vstack([points, *near]), toward, up, panel)
 
 
 def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:

@@ -11,7 +11,7 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
 
-# Pixels of the panel that shows the body.
+# Pixels of the panel that shows the body, unless the picture has a size of its own.
 PANEL = (1150, 880)
 # Direction to the lamp in the camera's axes: above the viewer's left shoulder.
 LAMP = (-0.35, 0.5, 0.8)
@@ -53,6 +53,8 @@ class Camera:
         The point at the centre of the panel.
     pixel : float
         Size of a pixel of the panel, unit of length.
+    panel : (int, int)
+        Pixels of the panel.
     """
 
     right: FloatArray
@@ -60,6 +62,7 @@ class Camera:
     toward: FloatArray
     center: FloatArray
     pixel: float
+    panel: tuple[int, int] = PANEL
 
     @property
     def lamp(self) -> FloatArray:
@@ -70,7 +73,7 @@ class Camera:
         """Column and row in the panel, from its left and top edges, and nearness to the eye, pixels, (n, 3)."""
         offset = np.asarray(points) - self.center
         across, above, near = (offset @ axis / self.pixel for axis in (self.right, self.up, self.toward))
-        return np.column_stack([0.5 * PANEL[0] + across, 0.5 * PANEL[1] - above, near])
+        return np.column_stack([0.5 * self.panel[0] + across, 0.5 * self.panel[1] - above, near])
 
 
 def unit(vectors: FloatArray) -> FloatArray:
@@ -184,7 +187,7 @@ def caster_of(corners: FloatArray) -> RayCaster:
     return RayCaster(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
-def camera_at(points: FloatArray, toward: FloatArray, up: Vector) -> Camera:
+def camera_at(points: FloatArray, toward: FloatArray, up: Vector, panel: tuple[int, int] = PANEL) -> Camera:
     """The camera that looks from the direction `toward`, with all points (n, 3) within its panel."""
     first, _, above = upright_axes(up)
     right = np.cross(above, toward)
@@ -195,5 +198,5 @@ def camera_at(points: FloatArray, toward: FloatArray, up: Vector) -> Camera:
     placed = points @ axes
     low, high = placed.min(axis=0), placed.max(axis=0)
     room = 1.0 - 2.0 * MARGIN
-    pixel = max((high[0] - low[0]) / (room * PANEL[0]), (high[1] - low[1]) / (room * PANEL[1]))
-    return Camera(right, upward, toward, axes @ (0.5 * (low + high)), float(pixel))
+    pixel = max((high[0] - low[0]) / (room * panel[0]), (high[1] - low[1]) / (room * panel[1]))
+    return Camera(right, upward, toward, axes @ (0.5 * (low + high)), float(pixel), panel)

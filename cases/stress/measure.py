@@ -154,7 +154,7 @@ def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
     mesh = scenario.mesh
     if mesh is None and not variant.adaptive:
         mesh = tetrahedralize(scenario.surface, [region.surface for region in scenario.regions])
-    return solve(
+    solution: AnySolution = solve(
         scenario.surface,
         scenario.medium,
         [scenario.light],
@@ -167,6 +167,7 @@ def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
         model="full",
         **variant.options,
     )
+    return solution
 
 
 def _true_error(solution: AnySolution, truth: Truth) -> float:

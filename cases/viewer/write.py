@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from tetlux.cases.picture.colour_maps import hexadecimal_map
 from tetlux.cases.picture.draw import PictureScene
-from tetlux.cases.picture.stage import arrow_ends, choose_camera, exitance_range
+from tetlux.cases.picture.scale import exitance_range
+from tetlux.cases.picture.stage import arrow_ends, choose_camera
 from tetlux.cases.picture.view import PANEL
 from tetlux.cases.plain import finite
-from tetlux.cases.viewer.colour_maps import colour_maps
 from tetlux.cases.viewer.pack import pack_bytes, pack_floats, pack_indices
 from tetlux.cases.write.fields import Field, surface_fields, volume_fields
 from tetlux.cases.write.results import Results
 from tetlux.meshing.arrays import FloatArray
 
 HERE = Path(__file__).parent
+# Colour maps to choose from, that of the pictures first.
+MAPS = ("inferno", "viridis", "grey")
 
 
 def write_viewer(results: Results, readings: Sequence[dict[str, Any]], scene: PictureScene, path: Path) -> None:
@@ -84,7 +87,7 @@ def describe_scene(results: Results, readings: Sequence[dict[str, Any]], scene: 
             for region in scene.regions
         ],
         "errors": _errors(results),
-        "maps": colour_maps(),
+        "maps": {name: hexadecimal_map(name) for name in MAPS},
     }
 
 

@@ -202,17 +202,25 @@ def fit_for_remainder(
         spacing = refine_spacing(fitted.placement.checked, error_of_each(fitted))
 
 
-def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: LightSources) -> FittedCharges:
-    """Fit the strengths of charges at given positions."""
-    samples, checked = placement.fitted, placement.checked
-    weights = placement.weights[:, None]
+def fit_strengths(
+    placement: ChargePlacement, equation: Equation, lights: LightSources
+) -> tuple[ChargeField, LeastSquaresFactors]:
+    """Fit the strengths of charges at given positions: the sources with the charges, and the factors."""
+    samples, weights = placement.fitted, placement.weights[:, None]
     factors = factorise(weights * equation.residual_of_each(samples.points, samples.normals, placement.charges))
     right = (
         lights.boundary_source
         - equation.residual_of_each(samples.points, samples.normals, lights.points) @ lights.powers
     )
     strengths = factors.solve(weights * right)
-    field = ChargeField(equation, np.vstack([lights.points, placement.charges]), np.vstack([lights.powers, strengths]))
+    positions = np.vstack([lights.points, placement.charges])
+    return ChargeField(equation, positions, np.vstack([lights.powers, strengths])), factors
+
+
+def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: LightSources) -> FittedCharges:
+    """Fit the strengths of charges at given positions, and estimate their errors."""
+    checked = placement.checked
+    field, factors = fit_strengths(placement, equation, lights)
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation = (residual - lights.boundary_source).sum(axis=1)
     errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)

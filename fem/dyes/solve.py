@@ -1,7 +1,6 @@
 """`fluorescence`: solve for the light that excites dyes, and for what they emit."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem
 from tetlux.fem.assessment import Tolerances
@@ -16,11 +15,11 @@ from tetlux.fem.media.fluorophore import Fluorophore
 from tetlux.fem.media.region import Region, check_list_of_regions
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector
+from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.scenes import build_scenes
-from tetlux.fem.solve_scenes import Report, check_tolerances, no_report, solve_problem
+from tetlux.fem.solve_scenes import Report, check_tolerances, no_report, place_all, solve_problem
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
@@ -178,13 +177,13 @@ def solve_pairs(
         deposits = [tuple(light.deposit_in(scenes.bodies[i]) for light in own) for i, own in enumerate(lights)]
         # What dyes emit follows on each mesh.
         split += [split_glows([Deposit()] * len(own)) for own in lights]
-        dark = Dark(scenes.surface, scenes.bodies[0].outer)
-        tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
+        by_scene = [detectors] * (2 * count)
+        tolerances = place_all(tolerances, by_scene, Dark(scenes.surface, scenes.bodies[0].outer))
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
     emitters = {count + i: DyeEmitter(dyes, i, frequency[i], mass, deposits[i]) for i in range(count)}
     problem = Problem(scenes, split, mass, limit, watch, emitters=emitters)
-    found = solve_problem(problem, tolerances, detectors, mesh, most_tetrahedra, report, cache=cache)
+    found = solve_problem(problem, tolerances, by_scene, mesh, most_tetrahedra, report, cache=cache)
     keep_fits(found[0].mesh, kept)
     return [(found[i], emitters[count + i].add_ledger(found[count + i])) for i in range(count)]
 

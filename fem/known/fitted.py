@@ -16,8 +16,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_for_remainder, fit_placed_charges
+from tetlux.fem.charges.adapt import LightSources, fit_for_remainder, fit_strengths
 from tetlux.fem.charges.check import exitance_error
+from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import Equation, equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import group_size, quadrature
@@ -80,20 +81,39 @@ class FittedLight:
     Attributes
     ----------
     charges : Charges
-    residual : BoundaryResidual
+    points : Samples
+        The points at which `residual` is integrated.
     placement : ChargePlacement
         Where charges were put and fitted; for the same light in other coefficients.
-    accurate : (q,) ndarray of bool
-        Whether the charges are accurate at each point of `residual`.
     surface : Surface
         What they were fitted to.
+    like : FittedLight, optional
+        The same light in other coefficients, where it is accurate.
     """
 
     charges: Charges
-    residual: BoundaryResidual
+    points: Samples
     placement: ChargePlacement
-    accurate: BoolArray
     surface: Surface
+    like: "FittedLight | None" = None
+
+    @cached_property
+    def residual(self) -> BoundaryResidual:
+        """What the charges leave of the boundary condition."""
+        return residual_at(self.points, self.charges)
+
+    @cached_property
+    def accurate(self) -> BoolArray:
+        """Whether the charges are accurate at each of the points, (q,)."""
+        return _accurate(self.residual, self.charges.equation) if self.like is None else self.like.accurate
+
+    def refit(self, shift: complex) -> Charges:
+        """The charges with another shift, 1/unit, at the same places."""
+        known = self.charges
+        sources, powers = known.positions[: known.sources], known.strengths[: known.sources, None]
+        lights = LightSources(sources, powers, np.zeros(1))
+        field, _ = fit_strengths(self.placement, equation_of(known.medium, shift), lights)
+        return replace(known, equation=field.equation, strengths=field.strengths[:, 0])
 
     def accurate_at(self, points: FloatArray) -> BoolArray:
         """Whether the charges are accurate at the point of `residual` nearest to each of some points (n, 3), (n,)."""
@@ -142,23 +162,19 @@ def fit_light(
         return None
     lights = LightSources(deposit.terms.points, deposit.terms.powers[:, None], np.zeros(1))
     equation = equation_of(medium, shift)
-    placement = None if like is None else like.placement
-    fitted = None
+    placement, field = None if like is None else like.placement, None
     if placement is None:
         real = replace(equation, wave_number=equation.wave_number.real)
-        fitted = fit_for_remainder(surface, real, lights, tolerance=tolerance)
-        if fitted is None:
+        found = fit_for_remainder(surface, real, lights, tolerance=tolerance)
+        if found is None:
             return None
-        placement = fitted.placement
-    if fitted is None or shift != 0:
-        fitted = fit_placed_charges(placement, equation, lights)
-    charges = _charges(fitted, surface, medium)
+        placement, field = found.placement, found.field
+    if field is None or shift != 0:
+        field, _ = fit_strengths(placement, equation, lights)
+    charges = _charges(field, placement, surface, medium)
     if like is not None and like.surface is surface:
-        residual = residual_at(like.residual.points, charges)
-    else:
-        residual = residual_at(_residual_points(fitted.placement, surface), charges)
-    accurate = like.accurate if like is not None else _accurate(residual, equation)
-    return FittedLight(charges, residual, fitted.placement, accurate, surface)
+        return FittedLight(charges, like.points, placement, surface, like)
+    return FittedLight(charges, _residual_points(placement, surface), placement, surface, like)
 
 
 def _accurate(residual: BoundaryResidual, equation: Equation) -> BoolArray:
@@ -184,11 +200,11 @@ def _is_fit(deposit: Deposit, surface: Surface, medium: Medium) -> bool:
     return bool((depths > SHALLOWEST * medium.mean_free_path).all() and surface.contains(terms.points).all())
 
 
-def _charges(fitted: FittedCharges, surface: Surface, medium: Medium) -> Charges:
+def _charges(field: ChargeField, placement: ChargePlacement, surface: Surface, medium: Medium) -> Charges:
     """Sources and charges as one sum."""
-    field, sources = fitted.field, fitted.lights.points
+    sources = field.positions[: len(field.positions) - len(placement.charges)]
     depths = surface.distances(sources)
-    heights = np.asarray(cKDTree(fitted.placement.fitted.points).query(fitted.placement.charges)[0])
+    heights = np.asarray(cKDTree(placement.fitted.points).query(placement.charges)[0])
     closest = min(CLOSEST * min(medium.mean_free_path, float(depths.min())), CLEAR * float(heights.min()))
     return Charges(field.equation, field.positions, field.strengths[:, 0], closest, sources=len(sources), medium=medium)
 

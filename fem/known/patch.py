@@ -48,6 +48,10 @@ class Patch:
     cells: BoolArray
     at_nodes: NumberArray
 
+    def with_charges(self, charges: Charges) -> "Patch":
+        """The same tetrahedra with other charges."""
+        return Patch(self.mesh, charges, self.cells, charges.fluence(self.mesh.points))
+
     @cached_property
     def faces(self) -> tuple[IntArray, BoolArray]:
         """Its outer faces (f, 3), oriented outward, and whether each is a facet of the body's boundary (f,)."""

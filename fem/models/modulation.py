@@ -66,7 +66,7 @@ def shift_of_frequency(frequency: float, medium: Medium, unit: str, outside_inde
         )
     if frequency == 0:
         return 0.0
-    omega_over_v = 2.0 * math.pi * frequency * medium.eta * outside_index * MILLIMETRES[unit] / SPEED_OF_LIGHT
+    omega_over_v = 2.0 * math.pi * frequency * seconds_per_length(medium, unit, outside_index)
     if omega_over_v > REFUSED * medium.sigma_t_prime:
         raise InputError(
             f"frequency is {frequency:g} Hz, at which light does not diffuse: omega is "
@@ -74,6 +74,11 @@ def shift_of_frequency(frequency: float, medium: Medium, unit: str, outside_inde
             field="frequency",
         )
     return 1j * omega_over_v
+
+
+def seconds_per_length(medium: Medium, unit: str, outside_index: float = 1.0) -> float:
+    """``n/c``, the time that light takes for a unit of length in a medium, s/unit."""
+    return medium.eta * outside_index * MILLIMETRES[unit] / SPEED_OF_LIGHT
 
 
 def shifts_of_scenes(

@@ -9,7 +9,8 @@ from tetlux.fem.operators.loads import Load
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.quadratic.operator import QuadraticOperator
-from tetlux.fem.quadratic.solution import QuadraticScene, QuadraticSolution
+from tetlux.fem.quadratic.scene import QuadraticScene
+from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.surface.surface import Surface
 

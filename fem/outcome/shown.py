@@ -116,8 +116,19 @@ class Shown:
             cmap=colours,
             log_scale=logarithmic,
             clim=_ends(values, logarithmic),
-            scalar_bar_args={"title": f"{name}{_unit_of(name, _surface(self).unit)}"},
+            # Where it is cut, colours are those of the bar.
+            lighting=cut is None,
+            scalar_bar_args={
+                "title": f"{name}{_unit_of(name, _surface(self).unit)}",
+                "fmt": "%.2g",
+                "vertical": True,
+                "position_x": 0.86,
+                "title_font_size": 16,
+                "label_font_size": 14,
+            },
         )
+        axes: Any = plotter.add_axes  # its types are those of an unbound method
+        axes()
         if show or screenshot:
             plotter.show(screenshot=screenshot or False)
         return plotter

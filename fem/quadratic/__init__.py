@@ -13,6 +13,7 @@ the boundary and of interfaces are bent onto the true surface, and with them the
     loads               the right-hand side of lights
     measurement         weighted points at which the solution is read
     operator            the matrix with its solver, and the dual solutions of measurements
+    scene               the lights of a scene, solved for
     solution            the fluence of lights, and measurements of it
     recovered_gradient  the difference between averaged and own gradients (Zienkiewicz & Zhu 1987)
     reading_error       a reading, and the contribution of each tetrahedron to its error

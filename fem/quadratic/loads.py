@@ -1,6 +1,7 @@
 """The right-hand side of lights and patches for quadratic elements: see `tetlux.fem.operators.loads`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -114,19 +115,28 @@ class QuadraticPatch:
     Attributes
     ----------
     patch : Patch
-    interpolant : (size,) ndarray
-        The quadratic interpolant of its charges' fluence.
+    space : QuadraticSpace
     load : (size,) ndarray
         Contribution to the load vector, W.
+    is_whole : bool
+        Whether it is the whole body, of one medium: then the load is that of the fluence less that of the charges.
     """
 
     patch: Patch
-    interpolant: NumberArray
+    space: QuadraticSpace
     load: NumberArray
+    is_whole: bool = False
+
+    @cached_property
+    def interpolant(self) -> NumberArray:
+        """The quadratic interpolant of its charges' fluence, (size,)."""
+        if not self.patch.cells.any():
+            return np.zeros(self.space.size)
+        return self.space.interpolate(self.patch.at_nodes, self.patch.charges.fluence(self.space.middles))
 
     @property
     def is_fitted(self) -> bool:
-        """Whether the charges are fitted to the surface, and subtracted in the whole body."""
+        """Whether the charges are fitted to the surface, and subtracted in all of the body where they are accurate."""
         return isinstance(self.patch, FittedPatch)
 
 
@@ -140,24 +150,24 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch
     mesh, charges = patch.mesh, patch.charges
     if not patch.cells.any():
         count = charges.sources
-        return QuadraticPatch(
-            patch, np.zeros(space.size), _point_load(space, charges.positions[:count], charges.strengths[:count].real)
-        )
-    interpolant = space.interpolate(patch.at_nodes, charges.fluence(space.middles))
-    inside = np.flatnonzero(patch.cells)
+        load = _point_load(space, charges.positions[:count], charges.strengths[:count].real)
+        return QuadraticPatch(patch, space, load)
     cell, face, on_boundary = patch.outer
     corners = mesh.tetrahedra[cell[:, None], FACES[face]]
     faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
-    load = _product(operator.elements[inside], space.cells[inside], interpolant)
     robin = boundary_condition_of(coefficients.outer).robin
-    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
     value, flux = _integrals(space, faces, charges)
-    leaving = flux + (robin * on_boundary)[:, None] * value
-    load -= sum_by_index(faces, leaving, space.size)
+    leaving = sum_by_index(faces, flux + (robin * on_boundary)[:, None] * value, space.size)
+    if patch.cells.all() and operator.coefficients.uniform:
+        return QuadraticPatch(patch, space, -leaving, is_whole=True)
+    found = QuadraticPatch(patch, space, -leaving)
+    inside, interpolant = np.flatnonzero(patch.cells), found.interpolant
+    load = _product(operator.elements[inside], space.cells[inside], interpolant) - leaving
+    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
     within = ~on_boundary
     if within.any():
         load += _jump_load(space, charges, interpolant, cell[within], face[within])
-    return QuadraticPatch(patch, interpolant, load)
+    return replace(found, load=load)
 
 
 def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> NumberArray:

@@ -14,7 +14,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
-from tetlux.fem.quadratic.assembly import element_matrices, matrix_of
+from tetlux.fem.quadratic.assembly import assemble, element_matrices, matrix_of
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -33,6 +33,8 @@ COLUMNS_PER_GROUP = 4
 EXPECTED_RIGHT_HAND_SIDES = 10
 # Memory for dual solutions that are kept for measurements that come again; the oldest are dropped.
 BYTES_OF_KEPT_DUALS = 2**28
+# Names of what solves.
+SOLVING = ("_product", "_precondition")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +49,25 @@ class QuadraticOperator:
     inner : sequence of Surface
         True surfaces of the regions.
     coefficients : Coefficients
+    steady : QuadraticOperator, optional
+        That of the same coefficients without their shift: see `shifted`.
     """
 
     mesh: TetMesh
     surface: Surface
     inner: Sequence[Surface]
     coefficients: Coefficients
+    steady: "QuadraticOperator | None" = None
     _duals: dict[Measurement, NumberArray] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
-        return {name: value for name, value in vars(self).items() if name not in ("_product", "_precondition")}
+        return {name: value for name, value in vars(self).items() if name not in SOLVING}
+
+    def release(self) -> None:
+        """Drop the matrices, which are made anew when they are needed."""
+        for name in ("elements", "matrix", *SOLVING):
+            vars(self).pop(name, None)
 
     @cached_property
     def space(self) -> QuadraticSpace:
@@ -67,11 +77,25 @@ class QuadraticOperator:
     @cached_property
     def elements(self) -> NumberArray:
         """The matrices of tetrahedra, (m, 10, 10)."""
+        if self.steady is not None:
+            return self.steady.elements + self.coefficients.shift * self.steady.mass_elements
         return element_matrices(self.space, self.coefficients)
+
+    @cached_property
+    def mass_elements(self) -> NumberArray:
+        """Integrals of products of shape functions over tetrahedra, (m, 10, 10)."""
+        return element_matrices(self.space, replace(self.coefficients, sigma_a=1.0, sigma_t_prime=np.inf))
+
+    @cached_property
+    def mass(self) -> csr_array:
+        """The mass matrix, (size, size)."""
+        return assemble(self.space, self.mass_elements)
 
     @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size); complex for modulated light."""
+        if self.steady is not None:
+            return csr_array(self.steady.matrix + self.coefficients.shift * self.steady.mass)
         return matrix_of(self.space, self.coefficients, self.elements)
 
     @cached_property
@@ -98,6 +122,10 @@ class QuadraticOperator:
 
         return precondition
 
+    def shifted(self, shift: complex) -> "QuadraticOperator":
+        """The operator with another shift, which shares the assembled matrices of this steady one."""
+        return replace(self, coefficients=replace(self.coefficients, shift=shift), steady=self, _duals={})
+
     def solve(self, loads: NumberArray, stop_residual: float = STOP_RESIDUAL) -> NumberArray:
         """Solutions (size, k) for loads (size, k), to about a relative residual."""
         product, precondition = self._product, self._precondition
@@ -112,6 +140,22 @@ class QuadraticOperator:
         ]
         found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
         return np.asarray(np.hstack([np.zeros((len(loads), 0)), *found]) * size)
+
+    def solve_near(
+        self, loads: NumberArray, known: Sequence[NumberArray], stop_residual: float = STOP_RESIDUAL
+    ) -> NumberArray:
+        """Solutions (size, k) for loads (size, k), beginning with those of similar matrices and loads.
+
+        The combination of them with the least residual is close to the solution for shifts that are next to each
+        other on a contour.
+        """
+        start = np.zeros(loads.shape, dtype=np.result_type(loads, self.matrix.dtype))
+        for column in range(loads.shape[1] if known else 0):
+            basis = np.column_stack([each[:, column] for each in known])
+            start[:, column] = basis @ np.linalg.lstsq(self.matrix @ basis, loads[:, column])[0]
+        rest = loads - self.matrix @ start
+        left = float((norms(rest) / np.maximum(norms(loads), np.finfo(float).tiny)).max(initial=0.0))
+        return start if left <= stop_residual else start + self.solve(rest, min(stop_residual / left, 0.1))
 
     def discretise(self, measurement: Measurement) -> DiscreteMeasurement:
         """A measurement on the mesh."""

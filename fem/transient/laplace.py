@@ -3,14 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from tetlux.fem.models.modulation import SPEED_OF_LIGHT
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.surface import MILLIMETRES
 
 
 def check_arguments(system: System, outside_index: float) -> None:
@@ -32,9 +30,3 @@ def read_with_shift(
     """What each detector reads of each light, a tuple for each light, with a shift, 1/unit."""
     solution = replace(system, shift=shift).solve(lights)
     return [read_all(detectors, part) for part in solution.of_lights or (solution,)]
-
-
-def seconds_per_length(system: System, outside_index: float) -> float:
-    """``n/c``, s/unit."""
-    index = system.coefficients.outer.eta * outside_index
-    return float(index * MILLIMETRES[system.mesh.unit] / SPEED_OF_LIGHT)

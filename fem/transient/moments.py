@@ -14,10 +14,11 @@ import numpy as np
 
 from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.models.modulation import seconds_per_length
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
-from tetlux.fem.transient.laplace import check_arguments, read_with_shift, seconds_per_length
+from tetlux.fem.transient.laplace import check_arguments, read_with_shift
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -120,7 +121,8 @@ def moments(
     values = np.array([[[reading.exitance for reading in row] for row in rows] for rows in found])
     powers = np.exp(-1j * np.outer(np.arange(order + 1), angles)) / radius ** np.arange(order + 1)[:, None]
     coefficients = np.real(np.tensordot(powers, values, axes=1)) * 2.0 / POINTS
-    factors = [(-1) ** m * math.factorial(m) * seconds_per_length(system, outside_index) ** m for m in range(order + 1)]
+    delay = seconds_per_length(system.coefficients.outer, system.mesh.unit, outside_index)
+    factors = [(-1) ** m * math.factorial(m) * delay**m for m in range(order + 1)]
     raw = coefficients * np.array(factors)[:, None, None] / coefficients[0]
     return Moments(raw, coefficients[0])
 

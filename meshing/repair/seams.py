@@ -105,18 +105,22 @@ def _with_vertices_on_edges(points: FloatArray, faces: IntArray, tolerance: floa
     touched[sides[side] % len(faces)] = True
     split: list[tuple[int, int, int]] = []
     for a, b, c in faces[touched].tolist():
-        split += _split(a, b, c, on)
+        split += _split(a, b, c, {side: on[side] for side in ((a, b), (b, c), (c, a)) if side in on})
     added = len(split) - int(touched.sum())
     return np.vstack([faces[~touched], np.array(split, dtype=np.int64)]), added
 
 
 def _split(a: int, b: int, c: int, on: dict[tuple[int, int], list[int]]) -> list[tuple[int, int, int]]:
-    """Split a triangle with vertices on its sides: a fan from the corner opposite each such side."""
+    """Split a triangle with vertices `on` its sides: a fan from the corner opposite each such side.
+
+    The sides that a fan makes are not split, be they those of other triangles.
+    """
     for start, end, apex in ((a, b, c), (b, c, a), (c, a, b)):
         inner = [vertex for vertex in on.get((start, end), []) if vertex != apex]
         if inner:
+            rest = {side: vertices for side, vertices in on.items() if side != (start, end)}
             chain = [start, *inner, end]
-            return [piece for one, following in pairwise(chain) for piece in _split(one, following, apex, on)]
+            return [piece for one, following in pairwise(chain) for piece in _split(one, following, apex, rest)]
     return [(a, b, c)]
 
 

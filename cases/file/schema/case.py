@@ -11,6 +11,8 @@ from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
+from tetlux.cases.file.schema.pulse import PulseSpec, refuse_beside_pulse
 from tetlux.cases.file.schema.sweep import SweepSpec
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
@@ -115,7 +117,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba", "film"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
@@ -162,6 +164,7 @@ class CaseSpec(Section):
     modulation: ModulationSpec | None = Field(
         None, description="lights are modulated at a frequency: results are amplitudes and phases"
     )
+    pulse: PulseSpec | None = Field(None, description="light in time after a short pulse of all lights")
     fluorescence: FluorescenceSpec | None = Field(
         None, description="dyes that emit at another wavelength, which is a channel of its own"
     )
@@ -178,6 +181,7 @@ class CaseSpec(Section):
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
     up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
+    picture: Pictures | None = Field(None, description="what the picture shows, or a list for several pictures")
     outputs: list[Output] = Field(
         ["surface", "volume", "picture"],
         description="default: surface, volume, picture; with another model than full without volume",
@@ -199,6 +203,13 @@ class CaseSpec(Section):
         if isinstance(self.tolerance, ToleranceSpec):
             return self.tolerance
         return ToleranceSpec(exitance=self.tolerance, detectors=None, everywhere=None, volume=None)
+
+    @property
+    def pictures(self) -> list[PictureSpec]:
+        """All pictures."""
+        if self.picture is None:
+            return [PictureSpec.model_validate({})]
+        return self.picture if isinstance(self.picture, list) else [self.picture]
 
     @model_validator(mode="after")
     def _some_tolerance(self) -> "CaseSpec":
@@ -254,6 +265,18 @@ class CaseSpec(Section):
             raise PydanticCustomError(
                 "no_mesh", "dyes are solved for by model full; leave fluorescence or model out", {"key": "fluorescence"}
             )
+        return self
+
+    @model_validator(mode="after")
+    def _beside_pulse(self) -> "CaseSpec":
+        if self.pulse is not None:
+            wanted = self.tolerances
+            fields = {"tolerance.everywhere": wanted.everywhere, "tolerance.volume": wanted.volume}
+            refuse_beside_pulse(
+                self.model, {"modulation": self.modulation, "fluorescence": self.fluorescence, **fields}
+            )
+        elif "film" in self.outputs:
+            raise PydanticCustomError("pulse", "a film shows a pulse; add pulse, or leave film out of outputs")
         return self
 
     @model_validator(mode="after")
