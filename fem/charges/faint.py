@@ -57,6 +57,9 @@ def fit_with_faint(
     best = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
     if best.errors.estimate > tolerance or len(lights.points) == 0 or np.any(lights.boundary_source):
         return best
+    if np.imag(equation.wave_number) != 0.0:
+        # Modulated light has either sign.
+        return best
     distance = distance_from(surface, lights.points)
     fading = float(np.real(equation.wave_number))
     spacing, weight = spacing_by_fading(distance, fading), weight_by_fading(distance, fading)

@@ -36,6 +36,7 @@ def charge_solution(
     tolerance: float | None = DEFAULT_TOLERANCE,
     readings: tuple[FloatArray, float] | None = None,
     most: int = MOST_CHARGES,
+    shift: complex = 0.0,
 ) -> ChargeSolution:
     """Solve for point sources and diffuse light in a body of homogeneous regions.
 
@@ -58,6 +59,8 @@ def charge_solution(
         Points that are read and wanted relative error of each reading, in a body without regions.
     most : int
         Approximate number of charges at which fitting ends in any case.
+    shift : complex
+        What is added to sigma_a, 1/unit, in a body without regions: 0 for steady light.
 
     Returns
     -------
@@ -67,7 +70,7 @@ def charge_solution(
     if not inner:
         transmitted = np.array([ledger.transmitted for ledger in ledgers])
         boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
-        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium), None
+        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium, shift), None
         if readings is not None:
             goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
             fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)

@@ -17,12 +17,13 @@ from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless.reading_error import reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.shown import Shown
 from tetlux.fem.validity.meshless import SurfaceValidity
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -77,6 +78,8 @@ class ChargeSolution(Shown):
         What the charges were fitted for, if it was readings of all lights together.
     validity : SurfaceValidity, optional
         Expected errors of diffusion in a body of one medium, of all lights together.
+    frequency : float
+        Of modulated light, Hz: exitance, fluence, power and readings then are complex amplitudes. 0 for steady light.
     """
 
     surface: Surface
@@ -93,6 +96,7 @@ class ChargeSolution(Shown):
     plan: Plan | None = None
     goal: ReadingGoal | None = None
     validity: SurfaceValidity | None = None
+    frequency: float = 0.0
 
     mesh, model = None, "charges"
 
@@ -107,19 +111,27 @@ class ChargeSolution(Shown):
         return self.errors.bound
 
     @cached_property
-    def exitance(self) -> FloatArray:
+    def exitance(self) -> NumberArray:
         """Exitance at the vertices of `surface`, (v,), W/unit²."""
         return self.exitance_at(self.surface.points)
 
-    def exitance_at(self, points: npt.ArrayLike) -> FloatArray:
+    def exitance_at(self, points: npt.ArrayLike) -> NumberArray:
         """Exitance at the points of the surface nearest to given points (q, 3), (q,), W/unit²; nan if not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
-        values = np.full(len(places), np.nan)
+        values = np.full(len(places), np.nan, dtype=self.fields[0].equation.dtype)
         values[finite] = self.exitance_on(self.surface.project(places[finite])[0])
         return values
 
-    def exitance_on(self, queries: FloatArray) -> FloatArray:
+    def amplitude_at(self, points: npt.ArrayLike) -> FloatArray:
+        """Modulus of `exitance_at`, (q,), W/unit²."""
+        return np.abs(self.exitance_at(points))
+
+    def phase_at(self, points: npt.ArrayLike) -> FloatArray:
+        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        return lag(self.exitance_at(points))
+
+    def exitance_on(self, queries: FloatArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
 
@@ -129,10 +141,10 @@ class ChargeSolution(Shown):
         exitance = self.exitance_on(queries)
         return reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
 
-    def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
+    def fluence_at(self, points: npt.ArrayLike) -> NumberArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
-        fluence = np.full(len(queries), np.nan)
+        fluence = np.full(len(queries), np.nan, dtype=self.fields[0].equation.dtype)
         inside = np.flatnonzero(self.surface.contains(queries))
         regions = region_at(queries[inside], [interface.surface for interface in self.interfaces[1:]])
         for region, each in enumerate(self._sums):
@@ -183,15 +195,18 @@ class ChargeSolution(Shown):
         sources plus the net inflow of each region. The ledger balances as far as the interface conditions hold.
         """
         area, diffused, inflow = self._flows
+        taken, shift = float(self.sources.sum()) + inflow, self.fields[0].equation.shift
+        stored = taken * shift / (self.medium.sigma_a + shift) if shift else 0.0
         known = [ledger.ledger for ledger in self.ledgers]
         irradiance = sum(ledger.irradiance for ledger in self.ledgers)
         transmitted = sum(ledger.transmitted for ledger in self.ledgers)
         return Power(
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
-            absorbed=sum(each.absorbed for each in known) + float(self.sources.sum()) + inflow,
+            absorbed=sum(each.absorbed for each in known) + taken - stored,
             exited=diffused + area * self._unscattered,
             ballistic=sum(each.ballistic for each in known),
+            stored=stored,
         )
 
     @property
@@ -200,20 +215,22 @@ class ChargeSolution(Shown):
         return self._flows[0]
 
     @cached_property
-    def _flows(self) -> tuple[float, float, float]:
+    def _flows(self) -> tuple[float, Number, Number]:
         """Area of the body, integral of ``phi/(2A)`` over it, and the net inflow of all regions, unit² and W."""
+        diffused: Number
+        inflow: Number
         area, diffused, inflow = 0.0, 0.0, 0.0
         for interface, fitted in zip(self.interfaces, self.samples, strict=True):
             tree = cKDTree(fitted.points)
             spacing = EQUATION_REFINEMENT * fitted.spacing
             points = quadrature(interface.surface, _nearest(tree, spacing))
             exitance, residual = self._sums[interface.inside].exitance_and_residual(points.points, points.normals)
-            inflow += float(points.areas @ (residual - exitance))
+            inflow += (points.areas @ (residual - exitance)).item()
             if interface.outside is None:
-                area, diffused = float(points.areas.sum()), float(points.areas @ exitance)
+                area, diffused = float(points.areas.sum()), (points.areas @ exitance).item()
             else:
                 exitance, residual = self._sums[interface.outside].exitance_and_residual(points.points, points.normals)
-                inflow -= float(points.areas @ (residual - exitance))
+                inflow -= (points.areas @ (residual - exitance)).item()
         return area, diffused, inflow
 
     @cached_property
