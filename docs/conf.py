@@ -15,7 +15,8 @@ html_show_sphinx = False
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 # Links are checked by tests/test_readme.py.
-suppress_warnings = ["myst.xref_missing", "image.not_readable"]
+# ref.python: words in the types of parameters are taken for attributes of several classes.
+suppress_warnings = ["myst.xref_missing", "image.not_readable", "ref.python"]
 autosummary_generate = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
