@@ -180,14 +180,13 @@ def print_cube() -> None:
     inside = Region(sphere(10.0), Medium(sigma_a=0.05, sigma_s_prime=0.5, eta=1.37))
     body, medium = box((60.0, 60.0, 60.0)), Medium(sigma_a=0.002, sigma_s_prime=0.99, eta=1.37)
     beam = PencilBeam((0.0, 0.0, 50.0), (0.0, 0.0, -1.0))
-    wanted: tuple[dict[str, float | None], ...]
-    wanted = ({"tolerance": 0.02}, {"tolerance": 0.005}, {"tolerance": None, "volume_tolerance": 0.03})
-    for tolerances in wanted:
+    wanted: tuple[tuple[float | None, float | None], ...] = ((0.02, None), (0.005, None), (None, 0.03))
+    for tolerance, of_volume in wanted:
         started = time.process_time()
-        solution = solve(body, medium, [beam], regions=[inside], **tolerances)
+        solution = solve(body, medium, [beam], regions=[inside], tolerance=tolerance, volume_tolerance=of_volume)
         value, error = solution.fluence_with_error([[0.0, 0.0, 0.0]])
         print(
-            f"{tolerances}: {value[0]:.5g} ± {error[0]:.2%} (linear elements "
+            f"tolerance {tolerance or f'{of_volume} of the volume'}: {value[0]:.5g} ± {error[0]:.2%} (linear elements "
             f"{solution.fluence_at(np.zeros((1, 3)))[0]:.5g}), {time.process_time() - started:.1f} s"
         )
 
