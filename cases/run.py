@@ -3,7 +3,7 @@
 import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,13 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
-from tetlux.cases.solve import solve_case
+from tetlux.cases.solve import solve_case, solve_pulse
 from tetlux.cases.viewer import PAGE
 from tetlux.cases.write.content import content_of
 from tetlux.cases.write.fields import surface_values, volume_values
 from tetlux.cases.write.ply import write_ply
 from tetlux.cases.write.publish import claim_folder, publish, write_error
+from tetlux.cases.write.pulse import PULSE_FILES, PulseResults
 from tetlux.cases.write.results import Results, collect_results
 from tetlux.cases.write.summary import summarize
 from tetlux.cases.write.vtp import write_vtp
@@ -47,7 +48,7 @@ FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm"
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, *PULSE_FILES, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -138,12 +139,14 @@ def finish_case(
     try:
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
-            solutions = solve_case(case, report, cache=cache, start=start)
+            transients = solve_pulse(case, report, cache=cache) if case.times else []
+            solutions = [each.as_steady for each in transients] or solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                summary, warnings, readings = _write(collect_results(case, solutions), folder, started, writing)
+                results = replace(collect_results(case, solutions), transients=tuple(transients))
+                summary, warnings, readings = _write(results, folder, started, writing)
                 publish(folder, target, [*_more_pictures(folder, target), *ALL_FILES])
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
@@ -162,12 +165,15 @@ def _write(
     case = results.case
     unit = case.surface.unit
     warnings = _warnings(results)
+    pulse = PulseResults(results) if results.transients else None
     if "surface" in case.outputs:
-        _write_surface(results, folder)
+        _write_surface(results, folder, {} if pulse is None else pulse.arrays())
     if "volume" in case.outputs:
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     _draw(results, readings, folder)
+    if pulse is not None:
+        pulse.write(readings, folder)
     if readings:
         write_readings(readings, unit, folder / READINGS)
         if len(case.detectors) >= ENOUGH_TO_DRAW:
@@ -221,9 +227,9 @@ def _places_lit(case: Case) -> FloatArray:
     return np.vstack([np.zeros((0, 3)), *places])
 
 
-def _write_surface(results: Results, folder: Path) -> None:
-    """Write the surface with its values, as PLY for mesh tools and as VTP for VTK."""
-    unit, values = results.case.surface.unit, surface_values(results)
+def _write_surface(results: Results, folder: Path, more: dict[str, FloatArray]) -> None:
+    """Write the surface with its values and more, as PLY for mesh tools and as VTP for VTK."""
+    unit, values = results.case.surface.unit, surface_values(results) | more
     notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
     if results.has_colours:
         notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"

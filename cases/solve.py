@@ -24,6 +24,8 @@ from tetlux.fem.scenes import media_by_scene
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
+from tetlux.fem.transient.solve import solve_in_time
+from tetlux.fem.transient.transient import Transient
 from tetlux.meshing.surface.surface import Surface
 
 Report = Callable[[str], None]
@@ -80,6 +82,25 @@ def _solve_fully(
         report=report,
         frequency=case.frequencies,
         outside_index=case.outside_index,
+    )
+
+
+def solve_pulse(case: Case, report: Report, *, cache: bool) -> list[Transient]:
+    """Solve each channel in time."""
+    return solve_in_time(
+        case.mesh or case.surface,
+        [channel.media for channel in case.channels],
+        [list(channel.lights.values()) for channel in case.channels],
+        case.times,
+        {
+            "regions": case.regions,
+            "tolerance": case.tolerance,
+            "detectors": [entry.detector for entry in case.detectors],
+            "detector_tolerance": case.detector_tolerance,
+            "cache": cache,
+            "report": report,
+            "outside_index": case.outside_index,
+        },
     )
 
 

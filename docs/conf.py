@@ -20,4 +20,6 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 default_role = "code"
+# Blocks without a language are no program.
+highlight_language = "text"
 nitpicky = False

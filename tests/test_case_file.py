@@ -123,7 +123,7 @@ def at(line: int) -> str:
         ("depth: 1}", "depth: 1}, scale: 3", at(3) + "surface: scale applies to a surface file"),
         ("width: 6, depth: 1", "width: 0.02, depth: 0.01", "absurdly small for diffusion; check the unit"),
         ("width: 6, depth: 1", "width: 6e6, depth: 1e6", "absurdly large for diffusion; check the unit"),
-        ("outputs: [surface]", "outputs: [film]", at(13) + r"outputs\[0\]: .*'film'"),
+        ("outputs: [surface]", "outputs: [movie]", at(13) + r"outputs\[0\]: .*'movie'"),
         ("tolerance: 0.05", "tolerance: 2", at(12) + "tolerance: expected a number less than 1, but found 2"),
         ("name: plate", "name: ../plate", at(1) + "name: "),
         ("outputs: [surface]", "outputs: [surface", "line 14: not valid YAML"),

@@ -142,7 +142,13 @@ class Case:
     @property
     def outside_index(self) -> float:
         """Refractive index of what surrounds the body."""
-        return self.spec.modulation.outside_index if self.spec.modulation else 1.0
+        given = self.spec.modulation or self.spec.pulse
+        return given.outside_index if given else 1.0
+
+    @property
+    def times(self) -> list[float]:
+        """Times after a pulse, s; none of other light."""
+        return self.spec.pulse.all_times if self.spec.pulse else []
 
     @property
     def repairs(self) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import field_keys, light_names
 from tetlux.cases.file.reader import FilesRead, Reader
 from tetlux.cases.file.schema.case import CaseSpec, ModulationSpec
+from tetlux.cases.file.schema.pulse import PulseSpec
 from tetlux.cases.file.sweeps.expand import expand_sweep
 from tetlux.cases.file.sweeps.names import LONGEST_NAME
 from tetlux.cases.file.validation import validate
@@ -29,6 +30,7 @@ from tetlux.fem.meshless.closed_form import homogeneous
 from tetlux.fem.meshless.exact_field import exact_field
 from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
 from tetlux.fem.models.modulation import shifts_of_scenes
+from tetlux.fem.transient.times import check_times
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
@@ -103,6 +105,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     _check_value_names(document, all_names, names)
     check_pictures(document, spec, body.surface, all_names, names)
     frequencies = _build_frequencies(document, spec, body)
+    _check_times(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
     if spec.model == "closed-form":
         _check_for_closed_form(document, body, deposits)
@@ -152,6 +155,14 @@ def _build_frequencies(document: Document, spec: CaseSpec, body: CaseBody) -> li
         outer = [each.outer for each in body.bodies]
         shifts_of_scenes(frequencies, outer, body.surface.unit, modulation.outside_index)
     return frequencies
+
+
+def _check_times(document: Document, spec: CaseSpec, body: CaseBody) -> None:
+    """Refuse times of a pulse that are none, or too early for diffusion."""
+    if spec.pulse is not None:
+        with document.at(("pulse",), {name: (name,) for name in PulseSpec.model_fields}):
+            for each in body.bodies:
+                check_times(spec.pulse.all_times, each.outer, body.surface.unit, spec.pulse.outside_index)
 
 
 def _build_comparison(

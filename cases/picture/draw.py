@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,9 +20,9 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Vector
 
 __all__ = ["PictureScene", "Ray", "RegionOutline", "draw_picture"]
 
-# Of a picture, pixels, unless the case gives one; seconds of a turn.
+# Of a picture, pixels, unless the case gives one; seconds of a turn and of a film.
 SIZE = (PANEL[0] + AROUND[0], PANEL[1] + AROUND[1])
-SECONDS = 4
+SECONDS, FILM_SECONDS = 4, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +126,28 @@ def draw_turntable(scene: PictureScene, frames: int, path: Path) -> None:
     with replacing(path) as unfinished:
         images[0].save(
             unfinished, format="GIF", save_all=True, append_images=images[1:], duration=SECONDS * 1000 // frames, loop=0
+        )
+
+
+def draw_film(scenes: Sequence[PictureScene], path: Path) -> None:
+    """Write a GIF of scenes, one after the other, and the last for longer.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    toward = scene_stage(scenes[0]).camera.toward
+    images = [canvas_of(replace(scene, toward=toward)).image for scene in scenes]
+    each = FILM_SECONDS * 1000 // len(images)
+    with replacing(path) as unfinished:
+        images[0].save(
+            unfinished,
+            format="GIF",
+            save_all=True,
+            append_images=images[1:],
+            duration=[each] * (len(images) - 1) + [each + 1000],
+            loop=0,
         )
 
 

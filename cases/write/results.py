@@ -16,6 +16,7 @@ from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.fem.planner.solve import AnySolution
+from tetlux.fem.transient.transient import Transient
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
@@ -62,12 +63,15 @@ class Results:
         The case's surface, with vertices added where its triangles are too large to show the exitance.
     parts : dict of (v,) ndarray
         Exitance at the surface's vertices by channel and light, W/unit²; complex of modulated light.
+    transients : tuple of Transient
+        Of a pulse, one for each channel, of which `solutions` are the integrals over time.
     """
 
     case: Case
     solutions: tuple[AnySolution, ...]
     surface: Surface
     parts: dict[tuple[str, str], NumberArray]
+    transients: tuple[Transient, ...] = ()
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
         """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit².

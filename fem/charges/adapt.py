@@ -224,8 +224,9 @@ def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: L
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation = (residual - lights.boundary_source).sum(axis=1)
     errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)
-    total = exitance.sum(axis=1).real
-    below = total < -NEGLIGIBLE_DIP * total.max(initial=0.0)
+    total = exitance.sum(axis=1)
+    # Amplitudes of modulated light may be below zero.
+    below = np.zeros(len(total), bool) if np.iscomplexobj(total) else total < -NEGLIGIBLE_DIP * total.max(initial=0.0)
     negative_share = float(checked.areas[below].sum() / checked.areas.sum())
     return FittedCharges(field, lights, placement, factors, errors, violation, negative_share)
 

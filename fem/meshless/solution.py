@@ -1,6 +1,5 @@
 """`ChargeSolution`: light in a body of homogeneous regions, by charges fitted to their surfaces, without a mesh."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -8,29 +7,25 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
 from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
-from tetlux.fem.charges.fit_readings import fit_for_readings
-from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
-from tetlux.fem.charges.readings import ReadingGoal, reading_goal
-from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
+from tetlux.fem.charges.readings import ReadingGoal
+from tetlux.fem.charges.regions import Interface
 from tetlux.fem.charges.samples import Samples, Spacing
-from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless.reading_error import reading_errors
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.models.modulation import lag
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.shown import Shown
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.tets.nesting import nesting
 from tetlux.meshing.tets.regions import region_at
 
 
@@ -80,6 +75,8 @@ class ChargeSolution(Shown):
         Why this model was chosen, if it was.
     goal : ReadingGoal, optional
         What the charges were fitted for, if it was readings of all lights together.
+    frequency : float
+        Of modulated light, Hz: exitance, fluence, power and readings then are complex amplitudes. 0 for steady light.
     """
 
     surface: Surface
@@ -95,6 +92,7 @@ class ChargeSolution(Shown):
     readings: tuple[Reading, ...] = ()
     plan: Plan | None = None
     goal: ReadingGoal | None = None
+    frequency: float = 0.0
 
     mesh, model = None, "charges"
 
@@ -109,19 +107,27 @@ class ChargeSolution(Shown):
         return self.errors.bound
 
     @cached_property
-    def exitance(self) -> FloatArray:
+    def exitance(self) -> NumberArray:
         """Exitance at the vertices of `surface`, (v,), W/unit²."""
         return self.exitance_at(self.surface.points)
 
-    def exitance_at(self, points: npt.ArrayLike) -> FloatArray:
+    def exitance_at(self, points: npt.ArrayLike) -> NumberArray:
         """Exitance at the points of the surface nearest to given points (q, 3), (q,), W/unit²; nan if not finite."""
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         finite = np.isfinite(places).all(axis=1)
-        values = np.full(len(places), np.nan)
+        values = np.full(len(places), np.nan, dtype=self.fields[0].equation.dtype)
         values[finite] = self.exitance_on(self.surface.project(places[finite])[0])
         return values
 
-    def exitance_on(self, queries: FloatArray) -> FloatArray:
+    def amplitude_at(self, points: npt.ArrayLike) -> FloatArray:
+        """Modulus of `exitance_at`, (q,), W/unit²."""
+        return np.abs(self.exitance_at(points))
+
+    def phase_at(self, points: npt.ArrayLike) -> FloatArray:
+        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        return lag(self.exitance_at(points))
+
+    def exitance_on(self, queries: FloatArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit²."""
         return np.asarray(self._sums[0].exitance(queries) + self._unscattered)
 
@@ -131,10 +137,10 @@ class ChargeSolution(Shown):
         exitance = self.exitance_on(queries)
         return reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
 
-    def fluence_at(self, points: npt.ArrayLike) -> FloatArray:
+    def fluence_at(self, points: npt.ArrayLike) -> NumberArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""
         queries = np.asarray(points, dtype=float).reshape(-1, 3)
-        fluence = np.full(len(queries), np.nan)
+        fluence = np.full(len(queries), np.nan, dtype=self.fields[0].equation.dtype)
         inside = np.flatnonzero(self.surface.contains(queries))
         regions = region_at(queries[inside], [interface.surface for interface in self.interfaces[1:]])
         for region, each in enumerate(self._sums):
@@ -184,15 +190,18 @@ class ChargeSolution(Shown):
         sources plus the net inflow of each region. The ledger balances as far as the interface conditions hold.
         """
         area, diffused, inflow = self._flows
+        taken, shift = float(self.sources.sum()) + inflow, self.fields[0].equation.shift
+        stored = taken * shift / (self.medium.sigma_a + shift) if shift else 0.0
         known = [ledger.ledger for ledger in self.ledgers]
         irradiance = sum(ledger.irradiance for ledger in self.ledgers)
         transmitted = sum(ledger.transmitted for ledger in self.ledgers)
         return Power(
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
-            absorbed=sum(each.absorbed for each in known) + float(self.sources.sum()) + inflow,
+            absorbed=sum(each.absorbed for each in known) + taken - stored,
             exited=diffused + area * self._unscattered,
             ballistic=sum(each.ballistic for each in known),
+            stored=stored,
         )
 
     @property
@@ -201,20 +210,22 @@ class ChargeSolution(Shown):
         return self._flows[0]
 
     @cached_property
-    def _flows(self) -> tuple[float, float, float]:
+    def _flows(self) -> tuple[float, Number, Number]:
         """Area of the body, integral of ``phi/(2A)`` over it, and the net inflow of all regions, unit² and W."""
+        diffused: Number
+        inflow: Number
         area, diffused, inflow = 0.0, 0.0, 0.0
         for interface, fitted in zip(self.interfaces, self.samples, strict=True):
             tree = cKDTree(fitted.points)
             spacing = EQUATION_REFINEMENT * fitted.spacing
             points = quadrature(interface.surface, _nearest(tree, spacing))
             exitance, residual = self._sums[interface.inside].exitance_and_residual(points.points, points.normals)
-            inflow += float(points.areas @ (residual - exitance))
+            inflow += (points.areas @ (residual - exitance)).item()
             if interface.outside is None:
-                area, diffused = float(points.areas.sum()), float(points.areas @ exitance)
+                area, diffused = float(points.areas.sum()), (points.areas @ exitance).item()
             else:
                 exitance, residual = self._sums[interface.outside].exitance_and_residual(points.points, points.normals)
-                inflow -= float(points.areas @ (residual - exitance))
+                inflow -= (points.areas @ (residual - exitance)).item()
         return area, diffused, inflow
 
     @cached_property
@@ -233,68 +244,3 @@ class ChargeSolution(Shown):
 
 def _nearest(tree: cKDTree, values: FloatArray) -> Spacing:
     return lambda places: values[tree.query(places)[1]]
-
-
-def charge_solution(
-    surface: Surface,
-    medium: Medium,
-    points: FloatArray,
-    powers: FloatArray,
-    ledgers: Sequence[LightLedger],
-    *,
-    inner: Sequence[tuple[Surface, Medium]] = (),
-    tolerance: float | None = DEFAULT_TOLERANCE,
-    readings: tuple[FloatArray, float] | None = None,
-    most: int = MOST_CHARGES,
-) -> ChargeSolution:
-    """Solve for point sources and diffuse light in a body of homogeneous regions.
-
-    Parameters
-    ----------
-    surface : Surface
-    medium : Medium
-        Of the body.
-    points : (p, 3) ndarray
-        Sources inside the body.
-    powers : (p, s) ndarray
-        Powers of the sources in each of s lights, W.
-    ledgers : sequence of LightLedger
-        Of each light; diffuse light is for a body without regions.
-    inner : sequence of (Surface, Medium)
-        Regions of the body.
-    tolerance : float, optional
-        Wanted relative L2 error of the exitance.
-    readings : (d, 3) ndarray and float, optional
-        Points that are read and wanted relative error of each reading, in a body without regions.
-    most : int
-        Approximate number of charges at which fitting ends in any case.
-
-    Returns
-    -------
-    ChargeSolution
-    """
-    sources = powers.sum(axis=0)
-    if not inner:
-        transmitted = np.array([ledger.transmitted for ledger in ledgers])
-        boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
-        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium), None
-        if readings is not None:
-            goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
-            fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
-        else:
-            assert tolerance is not None
-            fitted = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
-        samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
-        given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
-        return ChargeSolution(surface, medium, *given, goal=goal)
-    assert tolerance is not None
-    surfaces = [each for each, _ in inner]
-    parents = nesting(surface, surfaces).parents
-    interfaces = [Interface(surface, 0, None)]
-    interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
-    light = RegionSources(points, region_at(points, surfaces), powers)
-    equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
-    fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
-    samples_of_all = tuple(each.placement.fitted for each in fit.placements)
-    solved = tuple(interfaces), fit.fields, samples_of_all, sources, tuple(ledgers), fit.errors
-    return ChargeSolution(surface, medium, *solved)

@@ -15,7 +15,9 @@ from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, only_medium
-from tetlux.fem.meshless.solution import ChargeSolution, LightLedger, charge_solution
+from tetlux.fem.meshless.fit import charge_solution
+from tetlux.fem.meshless.solution import ChargeSolution, LightLedger
+from tetlux.fem.models.modulation import notes_on_frequency, shift_of_frequency
 from tetlux.fem.notes import notes_on_readings
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import place_detector, read_all
@@ -49,6 +51,8 @@ def solve_with_charges(
     detectors: Sequence[Detector] = (),
     detector_tolerance: float | None = None,
     most: int = MOST_CHARGES,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
 ) -> ChargeSolution:
     """Solve for lights in a body of homogeneous regions, without a mesh.
 
@@ -68,6 +72,10 @@ def solve_with_charges(
         Wanted relative error of what each detector reads, in a body without regions.
     most : int
         Charges at which fitting ends even if the tolerance is not met; the solution then carries a warning.
+    frequency : float
+        Of modulated light, Hz, in a body without regions; 0 for steady light.
+    outside_index : float
+        Refractive index of what surrounds the body.
 
     Returns
     -------
@@ -99,6 +107,7 @@ def solve_with_charges(
         check_regions(surface, [each for each, _ in inner])
         whole = Body(surface, (body, *(each for _, each in inner)), SurfacePartition([each for each, _ in inner]))
         check_media(whole)
+        shift = _shift_of(frequency, whole, outside_index)
         deposits = [light.deposit_in(whole) for light in lights]
         for light, deposit in zip(lights, deposits, strict=True):
             check_deposit(light, deposit, whole, [each for each, _ in inner])
@@ -108,12 +117,23 @@ def solve_with_charges(
         points, powers = _point_sources(deposits)
         ledgers = [_light_ledger(deposit) for deposit in deposits]
         solution = charge_solution(
-            surface, body, points, powers, ledgers, inner=inner, tolerance=tolerance, readings=readings, most=most
+            surface,
+            body,
+            points,
+            powers,
+            ledgers,
+            inner=inner,
+            tolerance=tolerance,
+            readings=readings,
+            most=most,
+            shift=shift,
         )
+        solution = replace(solution, frequency=frequency)
         solution = replace(solution, readings=read_all(detectors, solution))
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     warnings += _notes_on_tolerances(solution, tolerance, detector_tolerance)
-    if tolerance is not None:
+    warnings += notes_on_frequency(frequency, shift, [body])
+    if tolerance is not None and shift == 0:
         warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
 
@@ -138,6 +158,21 @@ def _check_arguments(
     check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
+
+
+def _shift_of(frequency: float, body: Body, outside_index: float) -> complex:
+    """What modulation adds to sigma_a, 1/unit.
+
+    Raises
+    ------
+    InputError
+    """
+    shift = shift_of_frequency(frequency, body.outer, body.surface.unit, outside_index)
+    if shift != 0 and body.only_medium is None:
+        raise InputError(
+            f'model "charges" takes a frequency in a body without regions only; leave it out, or {_INSTEAD}'
+        )
+    return shift
 
 
 def _point_sources(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:

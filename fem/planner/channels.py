@@ -44,7 +44,7 @@ def solve_times(
             "detector_tolerance."
         )
     channels, several = media_by_channel(body, options["mesh"], medium)
-    found = solve_in_time(body, channels, lights, times, options)
+    found = solve_in_time(body, channels, [lights] * len(channels), times, options)
     return found if several else found[0]
 
 

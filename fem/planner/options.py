@@ -50,7 +50,7 @@ OF_FINITE_ELEMENTS: Mapping[str, Any] = {
 
 
 # Those that models take all the same.
-ALSO_OF_CHARGES = {"detector_tolerance"}
+ALSO_OF_CHARGES = {"detector_tolerance", "frequency", "outside_index"}
 ALSO_OF_TRUNCATED = set(OF_FINITE_ELEMENTS) - {"everywhere_tolerance", "volume_tolerance", "frequency"}
 TAKEN: Mapping[str, set[str]] = {"charges": ALSO_OF_CHARGES, "truncated": ALSO_OF_TRUNCATED}
 

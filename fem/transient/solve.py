@@ -21,7 +21,6 @@ from tetlux.fem.known.kept_fits import fits_of
 from tetlux.fem.known.split import replace_fitted, split_lights
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium, base_of
-from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
 from tetlux.fem.models.modulation import seconds_per_length
 from tetlux.fem.outcome.detector_kinds import Detector
@@ -34,19 +33,16 @@ from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.transient.contour import contour_for, windows_of
+from tetlux.fem.transient.times import DIFFUSE_AFTER, check_times
 from tetlux.fem.transient.transient import MeshError, Transient
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
-from tetlux.meshing.errors import InputError
 from tetlux.meshing.notes import Note
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 # The mesh is refined for steady light and for light of this angular frequency times the first time.
 FASTEST = 2.5
-# Light has gone so many mean free paths before diffusion describes it; earlier times are reported, and those before a
-# single mean free path refused.
-DIFFUSE_AFTER = 10.0
 # Steps of the inverse iteration for the slowest decay, and the share of it up to which contours reach.
 STEPS, SAFE_SHARE = 5, 0.9
 # Solutions at points before on a contour with which one begins.
@@ -58,7 +54,7 @@ ROUGHEST = 1e-3
 def solve_in_time(
     body: Surface | TetMesh,
     channels: Sequence[AnyMedium | GivenMedia],
-    lights: Sequence[Light],
+    lights: Sequence[Sequence[Light]],
     times: Sequence[float],
     options: Mapping[str, Any],
 ) -> list[Transient]:
@@ -69,7 +65,8 @@ def solve_in_time(
     body : Surface or TetMesh
     channels : sequence of medium or mapping
         The medium, or media by label, of each channel.
-    lights : sequence of Light
+    lights : sequence of sequences of Light
+        Of each channel.
     times : sequence of float
         s, rising.
     options : mapping of str
@@ -84,18 +81,18 @@ def solve_in_time(
     InputError, RunError
         As `tetlux.fem.solve`.
     """
-    at, watch = check_times(times), Stopwatch()
+    watch = Stopwatch()
     given = body if isinstance(body, TetMesh) else options.get("mesh")
     index = options.get("outside_index", 1.0)
     with watch.stage("surface"):
         scenes = build_scenes(body, given, channels, options.get("regions", ()), len(channels), 0.0, index)
         for each in scenes.bodies:
-            _check_first(float(at[0]), each.outer, seconds_per_length(each.outer, scenes.surface.unit, index))
+            at = check_times(times, each.outer, scenes.surface.unit, index)
     rate = FASTEST / float(at[0])
     frequencies = [0.0] * len(channels) + [rate / (2.0 * math.pi)] * len(channels)
     regions = [_twice(region) for region in options.get("regions", ())]
     others: dict[str, Any] = {**options, "regions": regions, "frequency": frequencies}
-    solutions = solve_each(body, [*channels, *channels], [lights] * (2 * len(channels)), **others)
+    solutions = solve_each(body, [*channels, *channels], [*lights, *lights], **others)
     subtract = options.get("subtract", "fitted")
     if isinstance(body, TetMesh):
         subtract = replace_fitted(subtract)
@@ -103,7 +100,7 @@ def solve_in_time(
     for number, each in enumerate(scenes.bodies):
         steady, fast = solutions[number], solutions[number + len(channels)]
         with watch.stage("solve"):
-            split = split_lights(lights, each, subtract, kept=fits_of(steady.mesh), scene=number)
+            split = split_lights(lights[number], each, subtract, kept=fits_of(steady.mesh), scene=number)
             delay = seconds_per_length(each.outer, scenes.surface.unit, index)
             pulse = _Pulse(at, delay, rate, tuple(options.get("detectors", ())))
             transient = _follow_contours(pulse, steady, fast, split.fitted)
@@ -112,42 +109,6 @@ def solve_in_time(
     for name, value in solutions[0].seconds.items():
         seconds[name] = seconds.get(name, 0.0) + value
     return [replace(transient, seconds=seconds) for transient in found]
-
-
-def check_times(times: Sequence[float]) -> FloatArray:
-    """The times (t,), s, if they are some.
-
-    Raises
-    ------
-    InputError
-    """
-    try:
-        at = np.array(times, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError("times are not a list of numbers; give times in s, such as [1e-10, 2e-10].") from error
-    if at.ndim != 1 or len(at) == 0 or not (np.isfinite(at).all() and at.min() > 0):
-        raise InputError(
-            "times are in s after the pulse, each greater than 0; give a list with at least one.", field="times"
-        )
-    if (np.diff(at) <= 0).any():
-        raise InputError("times do not rise; sort them, and give each once.", field="times")
-    return at
-
-
-def _check_first(first: float, medium: Medium, delay: float) -> None:
-    """Refuse times before light has gone a mean free path.
-
-    Raises
-    ------
-    InputError
-    """
-    gone = first / (delay * medium.mean_free_path)
-    if gone < 1.0:
-        raise InputError(
-            f"the first time is {first:g} s, when light has gone {gone:.2g} mean free paths and does not diffuse yet; "
-            f"begin at {DIFFUSE_AFTER * delay * medium.mean_free_path:.2g} s or later.",
-            field="times",
-        )
 
 
 def _twice(region: Region) -> Region:

@@ -1,7 +1,7 @@
 """`Transient`: light in time after a short pulse."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -104,6 +104,11 @@ class Transient:
     def surface(self) -> Surface:
         """What the mesh stands for."""
         return self.steady.surface
+
+    @property
+    def as_steady(self) -> Solution:
+        """`steady` with the seconds and warnings of this."""
+        return replace(self.steady, seconds=self.seconds, warnings=self.warnings)
 
     @cached_property
     def exitance(self) -> FloatArray:

@@ -13,7 +13,8 @@ import numpy as np
 from tests.benchmarks.charges import ellipsoid
 from tetlux.fem import Medium, PointDetector, PointSource, Power, Region, solve
 from tetlux.fem.exact import layered_ball
-from tetlux.fem.meshless.solution import LightLedger, charge_solution
+from tetlux.fem.meshless.fit import charge_solution
+from tetlux.fem.meshless.solution import LightLedger
 from tetlux.meshing import Surface, sphere
 from tetlux.meshing.arrays import FloatArray
 

@@ -12,6 +12,7 @@ from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
 from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
+from tetlux.cases.file.schema.pulse import PulseSpec, refuse_beside_pulse
 from tetlux.cases.file.schema.sweep import SweepSpec
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 
@@ -116,7 +117,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba", "film"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
@@ -163,6 +164,7 @@ class CaseSpec(Section):
     modulation: ModulationSpec | None = Field(
         None, description="lights are modulated at a frequency: results are amplitudes and phases"
     )
+    pulse: PulseSpec | None = Field(None, description="light in time after a short pulse of all lights")
     fluorescence: FluorescenceSpec | None = Field(
         None, description="dyes that emit at another wavelength, which is a channel of its own"
     )
@@ -263,6 +265,18 @@ class CaseSpec(Section):
             raise PydanticCustomError(
                 "no_mesh", "dyes are solved for by model full; leave fluorescence or model out", {"key": "fluorescence"}
             )
+        return self
+
+    @model_validator(mode="after")
+    def _beside_pulse(self) -> "CaseSpec":
+        if self.pulse is not None:
+            wanted = self.tolerances
+            fields = {"tolerance.everywhere": wanted.everywhere, "tolerance.volume": wanted.volume}
+            refuse_beside_pulse(
+                self.model, {"modulation": self.modulation, "fluorescence": self.fluorescence, **fields}
+            )
+        elif "film" in self.outputs:
+            raise PydanticCustomError("pulse", "a film shows a pulse; add pulse, or leave film out of outputs")
         return self
 
     @model_validator(mode="after")

@@ -1,0 +1,124 @@
+"""`charge_solution`: fit charges to a body, without or with regions."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
+from tetlux.fem.charges.fit_readings import fit_for_readings
+from tetlux.fem.charges.kernel import equation_of
+from tetlux.fem.charges.readings import reading_goal
+from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
+from tetlux.fem.inputs import DEFAULT_TOLERANCE
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.meshless.solution import ChargeSolution, LightLedger
+from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.nesting import nesting
+from tetlux.meshing.tets.regions import region_at
+
+# With regions charges are fitted again where their ledger lacks too much power, at most so often, each time aiming this
+# factor below what would suffice.
+MOST_FITS, AIM_BELOW = 4, 0.7
+
+
+def charge_solution(
+    surface: Surface,
+    medium: Medium,
+    points: FloatArray,
+    powers: FloatArray,
+    ledgers: Sequence[LightLedger],
+    *,
+    inner: Sequence[tuple[Surface, Medium]] = (),
+    tolerance: float | None = DEFAULT_TOLERANCE,
+    readings: tuple[FloatArray, float] | None = None,
+    most: int = MOST_CHARGES,
+    shift: complex = 0.0,
+) -> ChargeSolution:
+    """Solve for point sources and diffuse light in a body of homogeneous regions.
+
+    Parameters
+    ----------
+    surface : Surface
+    medium : Medium
+        Of the body.
+    points : (p, 3) ndarray
+        Sources inside the body.
+    powers : (p, s) ndarray
+        Powers of the sources in each of s lights, W.
+    ledgers : sequence of LightLedger
+        Of each light; diffuse light is for a body without regions.
+    inner : sequence of (Surface, Medium)
+        Regions of the body.
+    tolerance : float, optional
+        Wanted relative L2 error of the exitance.
+    readings : (d, 3) ndarray and float, optional
+        Points that are read and wanted relative error of each reading, in a body without regions.
+    most : int
+        Approximate number of charges at which fitting ends in any case.
+    shift : complex
+        What is added to sigma_a, 1/unit, in a body without regions: 0 for steady light.
+
+    Returns
+    -------
+    ChargeSolution
+    """
+    sources = powers.sum(axis=0)
+    if not inner:
+        transmitted = np.array([ledger.transmitted for ledger in ledgers])
+        boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
+        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium, shift), None
+        if readings is not None:
+            goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
+            fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
+        else:
+            assert tolerance is not None
+            fitted = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
+        samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
+        given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
+        return ChargeSolution(surface, medium, *given, goal=goal)
+    assert tolerance is not None
+    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, most)
+
+
+def _in_regions(
+    surface: Surface,
+    medium: Medium,
+    points: FloatArray,
+    powers: FloatArray,
+    ledgers: Sequence[LightLedger],
+    inner: Sequence[tuple[Surface, Medium]],
+    tolerance: float,
+    most: int,
+) -> ChargeSolution:
+    """Fit charges in a body with regions, again and aiming lower while the ledger lacks too much power."""
+    surfaces = [each for each, _ in inner]
+    parents = nesting(surface, surfaces).parents
+    interfaces = [Interface(surface, 0, None)]
+    interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
+    light = RegionSources(points, region_at(points, surfaces), powers)
+    equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
+    aim = tolerance
+    for _ in range(MOST_FITS):
+        fit = fit_regions(interfaces, equations, light, tolerance=aim, most=most)
+        samples_of_all = tuple(each.placement.fitted for each in fit.placements)
+        solved = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
+        solution = _with_imbalance(ChargeSolution(surface, medium, *solved))
+        if solution.error_estimate <= tolerance or solution.charges >= most:
+            break
+        aim *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
+    return solution
+
+
+def _with_imbalance(solution: ChargeSolution) -> ChargeSolution:
+    """The solution with an estimate that is not below the power that its ledger lacks, relative to what exits.
+
+    What charges violate of the conditions between regions adds or takes power. Ten random bodies with a dark ball below
+    the light: residuals alone said 1.3 to 4.6 times less than the true error, what is lacking 1.0 to 1.5 times more.
+    """
+    power = solution.power
+    lacking = abs(power.balance_error * power.incident / power.exited) if power.exited else 0.0
+    errors = replace(solution.errors, estimate=max(solution.errors.estimate, float(lacking)))
+    return replace(solution, errors=errors)
