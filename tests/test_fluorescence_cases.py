@@ -155,7 +155,7 @@ def test_pictures_show_what_is_emitted(tmp_path: Path) -> None:
         ("tolerance: 0.2", "model: truncated", ("fluorescence", "dyes are solved for by model full")),
         (
             "tolerance: 0.2",
-            "pulse: {times: 1e-10}",
+            "pulse: {times: [1.0e-10]}",
             ("a pulse does not go with fluorescence; leave one of the two out.",),
         ),
         ("tolerance: 0.2", "compare: [series]", ("leave compare or fluorescence out",)),
