@@ -259,7 +259,7 @@ def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> Non
 
         write_viewer(results, readings, scene, folder / FILES["viewer"])
     if outputs & {"glb", "mitsuba"}:
-        from tetlux.cases.write.renderers import write_for_renderers  # noqa: PLC0415
+        from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
 
         write_for_renderers(results, scene, folder)
 

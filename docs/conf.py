@@ -8,6 +8,8 @@ html_theme = "furo"
 html_title = "tetlux"
 # Pages load nothing from elsewhere.
 html_theme_options = {"source_edit_link": "", "light_css_variables": {"font-stack": "system-ui, sans-serif"}}
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_show_sphinx = False
 myst_enable_extensions = ["dollarmath"]

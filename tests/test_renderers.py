@@ -13,8 +13,8 @@ import trimesh
 from tetlux.cases.file.colours import to_linear
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture.colour_maps import color_table
+from tetlux.cases.renderers.mitsuba import make_atlas
 from tetlux.cases.run import run_case
-from tetlux.cases.write.mitsuba import make_atlas
 from tetlux.meshing.arrays import FloatArray
 
 CASE = """\

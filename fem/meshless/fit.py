@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
+from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources
+from tetlux.fem.charges.faint import fit_with_faint
 from tetlux.fem.charges.fit_readings import fit_for_readings
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.readings import reading_goal
@@ -75,7 +76,7 @@ def charge_solution(
             fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
         else:
             assert tolerance is not None
-            fitted = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
+            fitted = fit_with_faint(surface, equation, lights, tolerance=tolerance, most=most)
         samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         return ChargeSolution(surface, medium, *given, goal=goal)

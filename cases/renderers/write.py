@@ -6,8 +6,8 @@ import numpy as np
 
 from tetlux.cases.file.colours import RGB
 from tetlux.cases.picture.draw import PictureScene, scene_stage, vertex_colours
-from tetlux.cases.write.glb import write_glb
-from tetlux.cases.write.mitsuba import write_mitsuba
+from tetlux.cases.renderers.glb import write_glb
+from tetlux.cases.renderers.mitsuba import write_mitsuba
 from tetlux.cases.write.results import Results
 
 
