@@ -31,17 +31,24 @@ from tetlux.meshing.notes import add_prefix
 
 # Pictures and comparisons are imported where they are used: together they take as long as a small solve.
 Report = Callable[[str], None]
-FILES = {"surface": "surface.ply", "volume": "volume.vtu", "picture": "picture.png", "viewer": PAGE}
+FILES = {
+    "surface": "surface.ply",
+    "volume": "volume.vtu",
+    "picture": "picture.png",
+    "viewer": PAGE,
+    "glb": "surface.glb",
+}
 # The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
 VTP = "surface.vtp"
 MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
+FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), VTP, *PULSE_FILES, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, *PULSE_FILES, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
 
 
 @dataclass(frozen=True)
@@ -234,17 +241,27 @@ def _write_surface(results: Results, folder: Path, more: dict[str, FloatArray]) 
 
 
 def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
-    """Draw the pictures and write the viewer."""
-    if not {"picture", "viewer"} & set(results.case.outputs):
+    """Draw pictures and figures, and write the viewer and what renderers read."""
+    outputs = set(results.case.outputs)
+    if "figures" in outputs:
+        from tetlux.cases.write.figures import write_figures  # noqa: PLC0415
+
+        write_figures(results, _places_lit(results.case), folder)
+    if not outputs & {"picture", "viewer", "glb", "mitsuba"}:
         return
     from tetlux.cases.write.pictures import draw_pictures, picture_scene  # noqa: PLC0415
 
-    if "picture" in results.case.outputs:
+    if "picture" in outputs:
         draw_pictures(results, readings, folder)
-    if "viewer" in results.case.outputs:
+    scene = picture_scene(results, readings)
+    if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
-        write_viewer(results, readings, picture_scene(results, readings), folder / FILES["viewer"])
+        write_viewer(results, readings, scene, folder / FILES["viewer"])
+    if outputs & {"glb", "mitsuba"}:
+        from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
+
+        write_for_renderers(results, scene, folder)
 
 
 def _warnings(results: Results) -> list[str]:

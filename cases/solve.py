@@ -38,10 +38,12 @@ def solve_case(case: Case, report: Report, *, cache: bool, start: SharedMesh | N
     def solve_fully() -> list[Solution]:
         return _solve_fully(case, report, cache=cache, start=start)
 
-    def solve_part(part: Surface, media: Sequence[AnyMedium], regions: Sequence[Region]) -> list[Solution]:
-        return _solve_fully(case, report, cache=cache, part=(part, media, regions))
+    def solve_part(
+        part: Surface, media: Sequence[AnyMedium], regions: Sequence[Region], begin: SharedMesh
+    ) -> list[Solution]:
+        return _solve_fully(case, report, cache=cache, start=begin, part=(part, media, regions))
 
-    elements = FiniteElements(solve_fully, solve_part)
+    elements = FiniteElements(solve_fully, solve_part, cache)
     if model == AUTO:
         request = request_of(case, case.plan.runs if case.plan else 1, cache=cache)
         plan = case.plan or plan_of(request)

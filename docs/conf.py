@@ -8,6 +8,8 @@ html_theme = "furo"
 html_title = "tetlux"
 # Pages load nothing from elsewhere.
 html_theme_options = {"source_edit_link": "", "light_css_variables": {"font-stack": "system-ui, sans-serif"}}
+html_static_path = ["_static"]
+html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_show_sphinx = False
 myst_enable_extensions = ["dollarmath"]
@@ -20,4 +22,6 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 default_role = "code"
+# Blocks without a language are no program.
+highlight_language = "text"
 nitpicky = False

@@ -2,6 +2,8 @@
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.dyes.solve import fluorescence
+from tetlux.fem.inverse.fit import FitResult, fit
+from tetlux.fem.inverse.problem import FitProblem
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,
@@ -35,6 +37,8 @@ from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.planner import plan
+from tetlux.fem.sensitivity.parameters import Grid
+from tetlux.fem.sensitivity.sensitivity import Sensitivity, sensitivity
 from tetlux.fem.solve import solve
 from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.footprint import Footprint
@@ -62,9 +66,12 @@ __all__ = [
     "Emission",
     "EnvironmentLight",
     "FibreDetector",
+    "FitProblem",
+    "FitResult",
     "Fluorophore",
     "Footprint",
     "Gaussian",
+    "Grid",
     "Image",
     "Ledger",
     "Light",
@@ -80,6 +87,7 @@ __all__ = [
     "Rectangle",
     "Region",
     "Segments",
+    "Sensitivity",
     "Solution",
     "SourceTerms",
     "Spectrum",
@@ -87,6 +95,7 @@ __all__ = [
     "Transient",
     "TruncatedSolution",
     "VaryingMedium",
+    "fit",
     "fluorescence",
     "grid_field",
     "henyey_greenstein",
@@ -96,6 +105,7 @@ __all__ = [
     "plan",
     "radiance",
     "read",
+    "sensitivity",
     "solve",
     "solve_each",
     "table",

@@ -178,7 +178,7 @@ def first_mesh(
                     most_tetrahedra,
                     shift,
                 )
-    begin = "tetrahedralized" if problem.shared is None else "began with the mesh of its group"
+    begin = "tetrahedralized" if problem.shared is None else "began with the mesh it was given"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
     return mesh
 

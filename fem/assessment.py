@@ -11,7 +11,7 @@ from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.system import MeshSolution
-from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 
 # How progress lines call errors of fields.
 FIELD_NAMES: dict[Where, str] = {"surface": "everywhere", "inside": "inside"}
@@ -46,6 +46,13 @@ class Tolerances:
     def placed_in(self, scene: int) -> tuple[PlacedDetector, ...]:
         """The detectors of a scene."""
         return self.of_scenes[scene] if self.of_scenes else self.placed
+
+    def places_in(self, scene: int) -> tuple[FloatArray, float] | None:
+        """Where the detectors of a scene are (d, 3), and their tolerance, if they have one."""
+        placed = self.placed_in(scene)
+        if self.readings is None or not placed:
+            return None
+        return np.array([each.position for each in placed]), self.readings
 
     @property
     def fields(self) -> dict[Where, float]:

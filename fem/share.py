@@ -14,7 +14,7 @@ from tetlux.fem.memory import limit_by_memory
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import place_detector
 from tetlux.fem.outcome.exitance_field import Dark
-from tetlux.fem.scenes import build_scenes
+from tetlux.fem.scenes import Scenes, build_scenes
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.solve_scenes import Report, check_tolerances, no_report
 from tetlux.fem.sources.light import Light
@@ -86,8 +86,10 @@ def share_mesh(
     )
     wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
     checked = build_scenes(surface, None, medium, regions, len(scenes), frequency, outside_index)
+    tolerances = _place(tolerances, detectors, checked)
+    places = tolerances.places_in(0)
     split = [
-        split_lights(lights, body, "fitted", tolerance=wanted, kept=KeptFits(), shift=shift)
+        split_lights(lights, body, "fitted", tolerance=wanted, readings=places, kept=KeptFits(), shift=shift)
         for lights, body, shift in zip(scenes[:pilots], checked.bodies, checked.shifts, strict=False)
     ]
     others = [
@@ -102,8 +104,6 @@ def share_mesh(
         frequencies=checked.frequencies[:pilots],
         shifts=checked.shifts[:pilots],
     )
-    dark = Dark(checked.surface, checked.bodies[0].outer)
-    tolerances = replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
     problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)
     reading = len(detectors) > 0 or tolerances.need_quadratic
     limit = limit_by_memory(MOST_SHARED_TETRAHEDRA, *problem.size, reading=reading).tetrahedra
@@ -119,11 +119,20 @@ def choose_places(
     *,
     regions: Sequence[Region] = (),
     tolerance: float = DEFAULT_TOLERANCE,
+    detectors: Sequence[Detector] = (),
+    detector_tolerance: float | None = None,
 ) -> None:
     """Choose places of charges on a shared mesh as `solve_each` does, for later solves to follow."""
     checked = build_scenes(surface, None, medium, regions, len(scenes))
+    places = _place(Tolerances(tolerance, detector_tolerance), detectors, checked).places_in(0)
     for lights, body in zip(scenes, checked.bodies, strict=True):
-        split_lights(lights, body, "fitted", tolerance=tolerance, kept=start.kept)
+        split_lights(lights, body, "fitted", tolerance=tolerance, readings=places, kept=start.kept)
+
+
+def _place(tolerances: Tolerances, detectors: Sequence[Detector], scenes: Scenes) -> Tolerances:
+    """Tolerances with detectors placed on the body."""
+    dark = Dark(scenes.surface, scenes.bodies[0].outer)
+    return replace(tolerances, placed=tuple(place_detector(detector, dark) for detector in detectors))
 
 
 def _refine_for_most(

@@ -144,12 +144,12 @@ def solve_each(
     with watch.stage("assemble"):
         kept, subtract = _kept_for(mesh, start), replace_fitted(subtract) if isinstance(body, TetMesh) else subtract
         wanted = tolerances.exitance or detector_tolerance or DEFAULT_TOLERANCE
-        split = [
-            split_lights(lights, each, subtract, tolerance=wanted, kept=kept, scene=scene, shift=checked.shifts[scene])
-            for scene, (lights, each) in enumerate(zip(scenes, checked.bodies, strict=True))
-        ]
         by_scene = detectors_by_scene(detectors, len(scenes))
         tolerances = place_all(tolerances, by_scene, Dark(checked.surface, checked.bodies[0].outer))
+        split = [
+            split_lights(lights, each, subtract, wanted, tolerances.places_in(i), kept=kept, scene=i, shift=shift)
+            for i, (lights, each, shift) in enumerate(zip(scenes, checked.bodies, checked.shifts, strict=True))
+        ]
     if tolerances.need_quadratic:
         most_tetrahedra = min(most_tetrahedra, MOST_TETRAHEDRA_TO_READ)
     problem = Problem(checked, split, mass, limit, watch, start)

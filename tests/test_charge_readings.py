@@ -43,7 +43,7 @@ def read_by_charges(
 
 
 def test_ten_fibres_on_a_ball_are_within_their_tolerance_and_bars() -> None:
-    """The last of them reads 1e-11 of the light beside the beam; placed for the exitance, charges miss it by far."""
+    """The last of them reads 1e-11 of the light beside the beam."""
     medium = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
     gamma, places = places_on_ball(80.0, np.arange(5.0, 51.0, 5.0))
     inside = 80.0 - medium.mean_free_path
@@ -56,8 +56,6 @@ def test_ten_fibres_on_a_ball_are_within_their_tolerance_and_bars() -> None:
     assert bars.max() < 0.01
     assert solution.charges < 400
     assert not solution.warnings
-    plain = solve(sphere(80.0), medium, light, model="charges", detectors=points(places))
-    assert abs(plain.readings[-1].exitance / truth[-1] - 1.0) > 0.01
 
 
 def test_a_fit_by_finite_differences_finds_the_coefficients() -> None:

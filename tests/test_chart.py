@@ -25,6 +25,7 @@ from tetlux.cases.chart.meshless import CHARGES, MESHLESS, MONTE_CARLO
 from tetlux.cases.chart.methods import Method, Outcome
 from tetlux.cases.chart.peers import PEERS, Peer, run_peer
 from tetlux.cases.chart.picture import STYLES
+from tetlux.cases.chart.planned import PLANNED
 from tetlux.cases.chart.reference import Reference
 from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure_methods
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
@@ -331,7 +332,7 @@ def test_exponents_by_method() -> None:
 
 
 def test_every_method_has_a_look() -> None:
-    assert {*BY_NAME, *(method.name for peer in PEERS for method in peer.methods)} == set(STYLES)
+    assert {*BY_NAME, PLANNED.name, *(method.name for peer in PEERS for method in peer.methods)} == set(STYLES)
     assert len({(look.color, look.marker) for look in STYLES.values()}) == len(STYLES)
 
 
@@ -428,6 +429,7 @@ ABSENT = (Peer("NGSolve", "no_such_package", ()),)
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
     """A chart of methods that take no time."""
+    monkeypatch.setattr(chart_module, "PLANNED", fake(PLANNED.name, [0.01], [1e-13], comparable=False))
     monkeypatch.setattr(chart_module, "MESHLESS", LITTLE[:1])
     monkeypatch.setattr(chart_module, "FINITE_ELEMENTS", LITTLE[1:])
     monkeypatch.setattr(chart_module, "PEERS", ABSENT)
@@ -451,7 +453,7 @@ def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert [float(row["error"]) for row in rows[:4]] == pytest.approx([0.2, 0.02, 0.005, 0.1])
     assert [row["on_front"] for row in rows[:4]] == ["True", "True", "True", "False"]
     data = json.loads((tmp_path / "out" / "chart.json").read_text())
-    assert len(data["runs"]) == len(rows) == 8
+    assert len(data["runs"]) == len(rows) == 10
     assert data["runs"][2]["error"] == pytest.approx(0.005)
     assert data["cases"]["slab"]["reference"]["kind"] == "closed form"
     assert data["cases"]["slab"]["exponents"][OURS] == {"error": None, "seconds": None}
@@ -459,7 +461,7 @@ def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert {"python", "tetlux", "numpy"} <= set(data["versions"])
     picture = np.asarray(Image.open(tmp_path / "out" / "chart.png").convert("RGB")).astype(int)
     assert picture.shape[1] == 2000
-    for name in (OURS, "P1, graded"):
+    for name in (OURS, "P1, graded", PLANNED.name):
         color = [int(STYLES[name].color[i : i + 2], 16) for i in (1, 3, 5)]
         assert (np.abs(picture - color).max(axis=2) < 8).sum() > 300, name
     said = capsys.readouterr().out
@@ -467,6 +469,15 @@ def test_a_chart_is_three_files(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (
         'Monte Carlo is left out, since numba is not installed; pip install "tetlux[montecarlo]" installs it.' in said
     )
+
+
+def test_the_plan_is_a_line_of_the_chart(ball_benchmark: Benchmark) -> None:
+    """On a ball it takes the series, which is the reference; what it takes contains the planning."""
+    outcome = PLANNED.run(ball_benchmark, 0.02)
+    assert ball_benchmark.error_of(outcome.exitance) < 1e-9
+    assert outcome.unknowns is None
+    assert 0.0 < outcome.seconds < 2.0
+    assert PLANNED in chart_module._methods(lambda _: None, readings=False)
 
 
 @pytest.mark.usefixtures("little")

@@ -40,6 +40,8 @@ def test_a_ball_is_solved_by_its_series(tmp_path: Path) -> None:
     summary, said = summary_of(path, tmp_path / "out")
     assert summary["model"] == summary["plan"]["chosen"] == "closed-form"
     assert "mesh" not in summary
+    assert summary["left_out"]["mesh"] == "model closed-form makes none; write model: full"
+    assert set(summary["left_out"]) == {"mesh", "fluence", "validity"}
     assert [each["model"] for each in summary["plan"]["candidates"]] == ["closed-form", "charges", "truncated", "full"]
     assert summary["plan"]["measured"]["error"] == summary["channels"][0]["error_estimate"] < 1e-9
     assert 0.0 < summary["plan"]["measured"]["seconds"] < summary["seconds"]["total"]
@@ -55,6 +57,7 @@ def test_the_volume_needs_a_mesh(tmp_path: Path) -> None:
     summary, _ = summary_of(path, tmp_path / "out")
     assert summary["model"] == "fem"
     assert summary["plan"]["chosen"] == "full"
+    assert "left_out" not in summary
     assert "volume" in summary["plan"]["candidates"][0]["reason"]
 
 

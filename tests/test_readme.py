@@ -11,6 +11,7 @@ from tests.meshes_made import cube_of_cubes
 from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import CaseSpec
+from tetlux.cases.shipped import case_text
 from tetlux.meshing import TetMesh
 from tetlux.meshing.files.meshes import write_mesh
 
@@ -172,6 +173,36 @@ def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
     names: dict[str, Any] = {}
     exec(blocks("docs/how-to.md", "python")[0], names)
     assert (names["sigma_a"], names["sigma_s_prime"]) == pytest.approx((0.01, 1.0), rel=2e-3)
+
+
+def test_the_cases_of_the_how_to_pages_are_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("hare", "marble"):
+        Path(f"{name}.yaml").write_text(case_text(name))
+    for page, words in (("pictures", {"picture": 3}), ("rendering", {"outputs": 2})):
+        text, *others = blocks(f"docs/{page}.md", "yaml")
+        Path(f"{page}.yaml").write_text(text)
+        (case,) = load_cases(Path(f"{page}.yaml"))
+        assert {key: len(case.spec.model_dump()[key]) for key in words} == words
+        for other in others:
+            Path("other.yaml").write_text(other)
+            assert load_cases(Path("other.yaml"))
+    (text,) = blocks("docs/cluster.md", "yaml")
+    Path("probe.yaml").write_text(text)
+    assert len(load_cases(Path("probe.yaml"))) == 30
+    (text,) = blocks("docs/scan.md", "yaml")
+    Path("scan.yaml").write_text(text.replace("{file: scan.obj, scale: 1000, holes: close}", "{sphere: {radius: 80}}"))
+    (case,) = load_cases(Path("scan.yaml"))
+    assert case.up == (0.0, 1.0, 0.0)
+    for key in ("file: scan.obj", "scale: 1000", "holes: close"):
+        assert key in text
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_pictures_of_pages_exist(page: str) -> None:
+    for words, target in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text_of(page)):
+        assert ((ROOT / page).parent / target).is_file(), target
+        assert len(words) > 15, f"say what {target} shows"
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -117,6 +117,22 @@ def test_a_name_cannot_break_the_page(tmp_path: Path) -> None:
     assert page.count("three.js authors") == 1
 
 
+def test_colours_of_the_phase_reach_its_largest_value(tmp_path: Path) -> None:
+    case = """\
+surface: {sphere: {radius: 10}}
+medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
+modulation: {frequency: 300e6}
+lights: [{point: {position: [0, 0, 6], power: 1.0}}]
+tolerance: 0.3
+outputs: [surface, viewer]
+"""
+    folder = run_with_viewer(tmp_path, case, "modulated")
+    (phase,) = (field for field in data_of(folder / "viewer.html")["fields"] if field["quantity"] == "phase")
+    shown = np.asarray(meshio.read(folder / "surface.ply").point_data["phase"])
+    assert shown.max() > 20
+    assert phase["ends"] == pytest.approx([0, shown.max()])
+
+
 def test_the_script_is_built_from_its_source() -> None:
     # The source is not in the wheel.
     folder = Path(__file__).parents[1] / "cases/viewer/source"

@@ -290,6 +290,26 @@ def test_mouse_and_wheel_turn_and_zoom(wide: Page) -> None:
     assert wide.do("tetlux.picked") is None
 
 
+def test_a_finger_turns_and_a_tap_reads(browser: Any, folder: Path) -> None:
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    page = context.new_page()
+    page.goto((folder / "viewer.html").as_uri())
+    page.wait_for_selector("html[data-ready]")
+    toward = page.evaluate("tetlux.view.toward.toArray()")
+    width, height = page.evaluate("tetlux.size")
+    x, y = (width - 84) / 2, height / 2
+    finger = context.new_cdp_session(page)
+    for kind, step in (("touchStart", 0), ("touchMove", 20), ("touchMove", 50), ("touchMove", 80), ("touchEnd", None)):
+        points = [] if step is None else [{"x": x + step, "y": y}]
+        finger.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    assert np.dot(toward, page.evaluate("tetlux.view.toward.toArray()")) < 0.98
+    assert page.evaluate("tetlux.picked") is None
+    page.touchscreen.tap(x, y)
+    page.wait_for_selector("#reading tr:nth-child(4)")
+    assert "W/mm²" in page.inner_text("#reading")
+    context.close()
+
+
 def test_names_of_detectors_and_regions_are_shown_and_hidden(wide: Page) -> None:
     names = "[...document.querySelectorAll('.mark span')].filter(e => e.offsetParent).map(e => e.textContent)"
     assert {"top", "ball"} <= set(wide.do(names))

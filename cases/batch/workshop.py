@@ -135,4 +135,6 @@ def _choose_places(case: Case, start: SharedMesh) -> None:
         start,
         regions=case.regions,
         tolerance=case.tolerance or case.everywhere_tolerance or case.detector_tolerance or DEFAULT_TOLERANCE,
+        detectors=[entry.detector for entry in case.detectors],
+        detector_tolerance=case.detector_tolerance,
     )

@@ -11,6 +11,7 @@ from tetlux.cases.chart.finite_elements import FINITE_ELEMENTS, READING_METHODS
 from tetlux.cases.chart.meshless import CHARGES_FOR_READINGS, MESHLESS, MONTE_CARLO, has_monte_carlo
 from tetlux.cases.chart.methods import Method
 from tetlux.cases.chart.peers import PEERS
+from tetlux.cases.chart.planned import PLANNED
 from tetlux.cases.chart.runs import MeasuredBenchmark, measure_methods
 from tetlux.cases.write.publish import check_writable
 from tetlux.fem import Medium, PointSource, solve
@@ -89,7 +90,7 @@ def chart(
 
 def _methods(report: Callable[[str], None], *, readings: bool) -> list[Method]:
     """The methods that can run here; report those that cannot."""
-    methods = [CHARGES_FOR_READINGS, *READING_METHODS] if readings else [*MESHLESS, *FINITE_ELEMENTS]
+    methods = [CHARGES_FOR_READINGS, *READING_METHODS] if readings else [*MESHLESS, *FINITE_ELEMENTS, PLANNED]
     for peer in PEERS:
         if peer.is_installed:
             methods += peer.methods

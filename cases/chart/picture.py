@@ -15,6 +15,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from tetlux.cases.chart.benchmark import Benchmark
 from tetlux.cases.chart.finite_elements import OURS
 from tetlux.cases.chart.meshless import MONTE_CARLO
+from tetlux.cases.chart.planned import PLANNED
 from tetlux.cases.chart.runs import MeasuredBenchmark, Measurement, exponents
 
 INK, FAINT, FRONT = "#30343f", "#8a8f99", "#ffd166"
@@ -46,6 +47,14 @@ NOTE_OF_FINER_RUN = (
 )
 
 
+# Smaller errors, as of an exact series that the plan chose, are drawn at this one.
+LEAST_ERROR = 1e-5
+NOTE_OF_PLAN = (
+    f'"{PLANNED.name}": model="auto", planning in its seconds. Where it takes the series that is the reference, its '
+    f"error is rounding, and drawn at {100.0 * LEAST_ERROR:g} %; it is not part of the front."
+)
+
+
 class Style(NamedTuple):
     """How a method is drawn."""
 
@@ -58,6 +67,7 @@ class Style(NamedTuple):
 
 STYLES = {
     OURS: Style("#d1203f", "o", width=3.0, size=9.5),
+    PLANNED.name: Style("#111111", "d", "--", width=2.2, size=8.5),
     "charges": Style("#f06292", "p", width=2.2, size=9.0),
     "half-space subtracted, adaptive": Style("#ef8a2c", "h"),
     "half-space subtracted, uniform": Style("#ef8a2c", "s"),
@@ -109,6 +119,8 @@ def _notes(measured: Sequence[MeasuredBenchmark]) -> list[str]:
     """The lines of the notes below the picture."""
     read = any(entry.benchmark.detectors for entry in measured)
     lines = textwrap.wrap((OF_READINGS if read else OF_EXITANCE) + NOTE, WIDEST)
+    if any(run.method == PLANNED.name for entry in measured for run in entry.runs):
+        lines += textwrap.wrap(NOTE_OF_PLAN, WIDEST)
     if any(run.method == MONTE_CARLO.name for entry in measured for run in entry.runs):
         lines += textwrap.wrap(NOTE_OF_MONTE_CARLO, WIDEST)
     if any(entry.benchmark.reference.error > 0 for entry in measured):
@@ -146,8 +158,8 @@ def _draw_runs(runs: Sequence[Measurement], error: str, left: Axes, middle: Axes
         mine = [run for run in runs if run.method == name]
         sized = [run for run in mine if run.unknowns is not None]
         unknowns = [float(run.unknowns or 0) for run in sized]
-        _plot_line(left, style, [run.seconds for run in mine], [run.error for run in mine])
-        _plot_line(middle, style, unknowns, [run.error for run in sized])
+        _plot_line(left, style, [run.seconds for run in mine], [max(run.error, LEAST_ERROR) for run in mine])
+        _plot_line(middle, style, unknowns, [max(run.error, LEAST_ERROR) for run in sized])
         _plot_line(right, style, unknowns, [run.seconds for run in sized])
     for axes, below, beside in ((left, "seconds", error), (middle, "unknowns", error), (right, "unknowns", "seconds")):
         _format_axes(axes, below, beside)

@@ -189,6 +189,16 @@ def scene_stage(scene: PictureScene) -> Stage:
     )
 
 
+def vertex_colours(scene: PictureScene) -> Image:
+    """The colours of the vertices, sRGB as bytes (n, 3), without the shades of the lamp."""
+    if scene.colours is not None:
+        return scene.colours[0]
+    scale = scene.scale or scale_of(scene.exitance, "exitance", "")
+    shares = scale.shares(scene.exitance if scene.values is None else scene.values)
+    rows = np.clip(shares * len(scale.table), 0, len(scale.table) - 1).astype(np.int64)
+    return np.round(255 * scale.table[rows]).astype(np.uint8)
+
+
 def _fixed(camera: Camera, points: FloatArray) -> Camera:
     """A camera with the same direction, at whose scale the ball around the body fits into the panel."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))

@@ -72,7 +72,7 @@ def scale_of(
     colour_map: str = "inferno",
 ) -> Scale:
     """The scale of values (n,), from their own least to largest where `ends` gives none."""
-    found = exitance_range(values) if logarithmic else _linear_range(values)
+    found = exitance_range(values) if logarithmic else linear_range(values)
     if found is not None:
         low, high = (own if given is None else given for own, given in zip(found, ends, strict=True))
         # One end alone was given, beyond all values.
@@ -98,7 +98,7 @@ def exitance_range(exitance: FloatArray) -> tuple[float, float] | None:
     return min(bottom, top / NARROWEST), top
 
 
-def _linear_range(values: FloatArray) -> tuple[float, float] | None:
+def linear_range(values: FloatArray) -> tuple[float, float] | None:
     """From 0, or the least value below it, to the largest; None if there is none."""
     known = values[np.isfinite(values)]
     if len(known) == 0:

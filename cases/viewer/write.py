@@ -10,7 +10,7 @@ import numpy as np
 
 from tetlux.cases.picture.colour_maps import hexadecimal_map
 from tetlux.cases.picture.draw import PictureScene
-from tetlux.cases.picture.scale import exitance_range
+from tetlux.cases.picture.scale import exitance_range, linear_range
 from tetlux.cases.picture.stage import arrow_ends, choose_camera
 from tetlux.cases.picture.view import PANEL
 from tetlux.cases.plain import finite
@@ -112,9 +112,16 @@ def _field(field: Field) -> dict[str, Any]:
         "channel": field.channel,
         "light": field.light,
         "logarithmic": field.logarithmic,
-        "ends": exitance_range(field.values) if field.logarithmic else (0.0, 1.0),
+        "ends": _ends(field),
         "values": pack_floats(field.values),
     }
+
+
+def _ends(field: Field) -> tuple[float, float] | None:
+    """The ends of the colours at first: of `valid`, a share, from 0 to 1."""
+    if field.logarithmic:
+        return exitance_range(field.values)
+    return (0.0, 1.0) if field.quantity == "valid" else linear_range(field.values)
 
 
 def _colours(scene: PictureScene) -> dict[str, Any]:

@@ -147,7 +147,7 @@ def collect_results(case: Case, solutions: Sequence[AnySolution]) -> Results:
 
 def _shows_surface(case: Case) -> bool:
     """Whether the exitance is written or drawn, or an even preview of it needs vertices everywhere."""
-    return bool({"surface", "picture", "viewer"} & set(case.outputs)) or case.channel_names == RGB
+    return bool(set(case.outputs) - {"volume"}) or case.channel_names == RGB
 
 
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:

@@ -72,7 +72,11 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
         **{name: getattr(case, name) for name in MORE_TOLERANCES if getattr(case, name) is not None},
         "as_ran": describe_run(case),
         **({"plan": describe_plan(plan, results.solutions)} if plan else {}),
-        **({"mesh": _mesh(case, mesh, _meshed_surface(results.mesh_solutions[0]))} if mesh else {}),
+        **(
+            {"mesh": _mesh(case, mesh, _meshed_surface(results.mesh_solutions[0]))}
+            if mesh
+            else {"left_out": _left_out(results.solutions[0].model)}
+        ),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),
@@ -80,6 +84,16 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
         "warnings": warnings,
         "warning_codes": sorted({note.code if isinstance(note, Note) else "other" for note in warnings}),
         "versions": {"python": platform.python_version(), **installed_versions(LIBRARIES)},
+    }
+
+
+def _left_out(model: str) -> dict[str, str]:
+    """Why a run without a mesh lacks what other runs have."""
+    instead = "write model: full"
+    return {
+        "mesh": f"model {model} makes none; {instead}",
+        "fluence": f"it has no largest value at points, whose fluence model {model} does not spread over a mesh",
+        "validity": f"valid and model_error are computed on a mesh; {instead}",
     }
 
 

@@ -13,6 +13,7 @@ not harm the sum.
     fit         strengths by least squares
     check       a bound and an estimate of the error
     adapt       more charges where the residual is large
+    faint       more where the exitance is below zero
     quadrature  integrals over the surface
     regions     homogeneous regions, each with charges of its own
     field       the sum of sources and charges

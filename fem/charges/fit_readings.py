@@ -5,22 +5,19 @@ import numpy as np
 from tetlux.fem.charges.adapt import (
     COUNT_FACTOR,
     FEWEST_CHARGES,
-    SMOOTH_ESTIMATE,
+    LEAST_CHANGE,
+    MOST_CHANGE,
     FittedCharges,
     LightSources,
     error_of_each,
     fit_placed_charges,
+    height_after,
     refine_spacing,
 )
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.placement import EQUATION_REFINEMENT, HEIGHT_ROUGH, HEIGHT_SMOOTH, place_charges
+from tetlux.fem.charges.placement import EQUATION_REFINEMENT, HEIGHT_SMOOTH, place_charges
 from tetlux.fem.charges.readings import ReadingGoal
 from tetlux.meshing.surface.surface import Surface
-
-# Factors between which the spacing changes from fit to fit. Largest error of ten fibres on a ball of radius 80, by 100,
-# 190, 320, 540 charges, without / with them: 25e-3, .33e-3, .39e-3, .30e-3 / 1.3e-3, .31e-3, .30e-3, .30e-3; estimate
-# of the exitance .088, .0017, .0062, .0001 / .017, .0008, .0001, .00003.
-LEAST_CHANGE, MOST_CHANGE = 0.5, 1.4
 
 
 def fit_for_readings(
@@ -60,7 +57,7 @@ def fit_for_readings(
         if excess <= 1.0 or count >= most:
             return best
         count = min(round(COUNT_FACTOR * count), most)
-        height = HEIGHT_SMOOTH if fitted.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
+        height = height_after(fitted)
         checked = fitted.placement.checked
         effects = error_of_each(fitted) * weight(checked.points)
         spacing = refine_spacing(checked, effects, LEAST_CHANGE, MOST_CHANGE)

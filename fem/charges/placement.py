@@ -37,6 +37,12 @@ DISTANCE_EXPONENT = 0.75
 # distance from the source, both up to one factor.
 DEPTH_FACTOR = 0.6
 
+# Where light fades within less than its distance from the source, charges are this many of the lengths 1/k apart, up to
+# one factor.
+SPACING_OF_FADING = 3.0
+# Light that has faded by more than this factor does not weigh more.
+MOST_FADING = 1e6
+
 # The weight of equations at points (n, 3) of the surface, up to a factor, (n,).
 Weight = Callable[[FloatArray], FloatArray]
 
@@ -95,6 +101,26 @@ def distance_from(surface: Surface, sources: FloatArray) -> Spacing:
 def weight_by_distance(distance: Spacing, exponent: float = DISTANCE_EXPONENT) -> Weight:
     """Weights of equations that grow with the distance from the light, so that faint light far away counts too."""
     return lambda points: distance(points) ** exponent
+
+
+def spacing_by_fading(distance: Spacing, fading: float) -> Spacing:
+    """Spacing of charges, up to a factor, that follows faint light too, which fades at that rate, 1/unit."""
+
+    def spacing(points: FloatArray) -> FloatArray:
+        away = distance(points)
+        return np.asarray(away / (1.0 + fading * away / SPACING_OF_FADING))
+
+    return spacing
+
+
+def weight_by_fading(distance: Spacing, fading: float) -> Weight:
+    """Weights of equations that grow as light fades with the distance d, as ``e^{k d}``."""
+
+    def weight(points: FloatArray) -> FloatArray:
+        exponents = fading * distance(points)
+        return np.asarray(np.exp(np.minimum(exponents - exponents.min(), np.log(MOST_FADING))))
+
+    return weight
 
 
 def place_charges(

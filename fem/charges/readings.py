@@ -15,12 +15,11 @@ the tolerance of .01, 98 % lie within twice the bar, and 94 % of those that are 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.placement import Weight, distance_from, weight_by_distance
+from tetlux.fem.charges.placement import Weight, distance_from, spacing_by_fading, weight_by_distance
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
@@ -30,9 +29,6 @@ from tetlux.meshing.surface.surface import Surface
 AVERAGED = 12
 # Effects are smoothed over this share of the spacing of charges that the distance of the detector from the light gives.
 SMOOTHED_SHARE = 0.25
-# Where the light fades within less than its distance from the source, charges are this many of the lengths 1/k apart,
-# up to one factor.
-SPACING_OF_FADING = 3.0
 # The spacing is divided by the root of the importance, of at least this. Estimate of the exitance, and largest error of
 # ten fibres on a ball of radius 80, by 300 charges, for .03 / .1: .073, .0064 / .0062, .0004.
 LEAST_IMPORTANCE = 0.05
@@ -80,16 +76,11 @@ class ReadingGoal:
 
     def exitance_of_each(self, points: FloatArray) -> FloatArray:
         """Exitance at the detectors by a source on the surface at each point (n, 3), as if flat, (d, n), 1/unit²."""
-        length = SMOOTHED_SHARE * self._coarsest_spacing(self.detectors)[:, None]
+        length = SMOOTHED_SHARE * spacing_by_fading(self.distance, self.fading)(self.detectors)[:, None]
         distance = np.hypot(cdist(self.detectors, points), length)
         path = self.fading * distance
         zb = 2.0 * self.equation.boundary_factor * self.equation.diffusion
         return np.asarray(zb / (2.0 * np.pi) * (1.0 + path) * np.exp(-path) / distance**3)
-
-    def _coarsest_spacing(self, points: FloatArray) -> FloatArray:
-        """Spacing of charges at points (n, 3) that matter as much as any, up to a factor, (n,)."""
-        away = self.distance(points)
-        return np.asarray(away / (1.0 + self.fading * away / SPACING_OF_FADING))
 
     def weight(self) -> Weight:
         """Weights of equations, up to a factor: the largest relative effect on a reading.
@@ -112,10 +103,11 @@ class ReadingGoal:
         """Spacing of charges of the first fit, up to a factor."""
         if len(self.sources) == 0:
             return self.distance
+        coarsest = spacing_by_fading(self.distance, self.fading)
 
         def spacing(points: FloatArray) -> FloatArray:
             importance = np.maximum(self._importance(points), LEAST_IMPORTANCE)
-            return np.asarray(self._coarsest_spacing(points) / np.sqrt(importance))
+            return np.asarray(coarsest(points) / np.sqrt(importance))
 
         return spacing
 
@@ -163,7 +155,7 @@ def ripple_errors(
 ) -> FloatArray:
     """Errors of the exitance at points (d, 3) by ripples of the residual around them, (d,), W/unit²."""
     squares = np.abs(exitance_error(equation, residual, spacing)) ** 2
-    near = cKDTree(samples.points).query(points, k=min(AVERAGED, len(samples)))[1]
+    near = samples.tree.query(points, k=min(AVERAGED, len(samples)))[1]
     return np.asarray(np.sqrt(squares[near.reshape(len(points), -1)].mean(axis=1)))
 
 

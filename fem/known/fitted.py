@@ -16,12 +16,21 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from tetlux.fem.charges.adapt import LightSources, fit_for_remainder, fit_strengths
+from tetlux.fem.charges.adapt import (
+    LARGEST_USEFUL_ESTIMATE,
+    MOST_CHARGES_WITH_FEM,
+    FittedCharges,
+    LightSources,
+    fit_for_remainder,
+    fit_strengths,
+)
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.field import ChargeField
+from tetlux.fem.charges.fit_readings import fit_for_readings
 from tetlux.fem.charges.kernel import Equation, equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import group_size, quadrature
+from tetlux.fem.charges.readings import reading_goal
 from tetlux.fem.charges.samples import Samples, Spacing
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
@@ -134,6 +143,7 @@ def fit_light(
     medium: Medium,
     *,
     tolerance: float,
+    readings: tuple[FloatArray, float] | None = None,
     like: FittedLight | None = None,
     shift: complex = 0.0,
 ) -> FittedLight | None:
@@ -146,6 +156,8 @@ def fit_light(
     medium : Medium
     tolerance : float
         Relative L2 error of the exitance, of charges and finite elements together.
+    readings : (d, 3) ndarray and float, optional
+        Points of the surface that are read, and wanted relative error of each reading.
     like : FittedLight, optional
         The same light in other coefficients: charges are put where its are, and are accurate where its are.
     shift : complex
@@ -165,7 +177,11 @@ def fit_light(
     placement, field = None if like is None else like.placement, None
     if placement is None:
         real = replace(equation, wave_number=equation.wave_number.real)
-        found = fit_for_remainder(surface, real, lights, tolerance=tolerance)
+        found = None
+        if readings is not None:
+            found = _fit_for_readings(surface, real, lights, *readings, tolerance)
+        if found is None:
+            found = fit_for_remainder(surface, real, lights, tolerance=tolerance)
         if found is None:
             return None
         placement, field = found.placement, found.field
@@ -175,6 +191,20 @@ def fit_light(
     if like is not None and like.surface is surface:
         return FittedLight(charges, like.points, placement, surface, like)
     return FittedLight(charges, _residual_points(placement, surface), placement, surface, like)
+
+
+def _fit_for_readings(
+    surface: Surface,
+    equation: Equation,
+    lights: LightSources,
+    points: FloatArray,
+    reading_tolerance: float,
+    tolerance: float,
+) -> FittedCharges | None:
+    """Charges of which finite elements solve for the remainder, small where it changes readings; None if too large."""
+    goal = reading_goal(surface, equation, lights.points, lights.powers[:, 0], 0.0, points, reading_tolerance)
+    fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=MOST_CHARGES_WITH_FEM)
+    return fitted if fitted.errors.estimate <= LARGEST_USEFUL_ESTIMATE else None
 
 
 def _accurate(residual: BoundaryResidual, equation: Equation) -> BoolArray:

@@ -75,8 +75,9 @@ def split_lights(
     lights: Sequence[Light],
     body: Body,
     subtract: Subtract,
-    *,
     tolerance: float = DEFAULT_TOLERANCE,
+    readings: tuple[FloatArray, float] | None = None,
+    *,
     kept: KeptFits | None = None,
     scene: int = 0,
     shift: complex = 0.0,
@@ -91,6 +92,8 @@ def split_lights(
         "fitted" is for a body whose surface is the true one; what cannot be fitted has "half-space".
     tolerance : float
         Relative L2 error of the exitance, of what is fitted and the mesh together.
+    readings : (d, 3) ndarray and float, optional
+        Points of the surface that are read, and wanted relative error of each reading.
     kept : KeptFits, optional
         Fits of earlier solutions, which are followed; new ones are added.
     scene : int
@@ -118,7 +121,7 @@ def split_lights(
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
         if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
-            found_fit = _fit(light, deposit, body, tolerance, kept, shift)
+            found_fit = _fit(light, deposit, body, tolerance, readings, kept, shift)
             if found_fit is not None:
                 fitted[number] = found_fit
                 deposits.append(deposit)
@@ -139,18 +142,24 @@ def split_lights(
 
 
 def _fit(
-    light: Light, deposit: Deposit, body: Body, tolerance: float, kept: KeptFits | None, shift: complex
+    light: Light,
+    deposit: Deposit,
+    body: Body,
+    tolerance: float,
+    readings: tuple[FloatArray, float] | None,
+    kept: KeptFits | None,
+    shift: complex,
 ) -> FittedLight | None:
     """Fit charges to a light, placed as in its kept fit if there is one; None if charges would not do."""
     medium = body.only_medium
     if medium is None or len(deposit.terms.points) == 0:
         return None
     if kept is None:
-        return fit_light(deposit, body.surface, medium, tolerance=tolerance, shift=shift)
+        return fit_light(deposit, body.surface, medium, tolerance=tolerance, readings=readings, shift=shift)
     chosen, like = kept.find(repr(light), deposit.hints.resolution)
     if chosen and like is None:
         return None
-    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, like=like, shift=shift)
+    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, readings=readings, shift=shift, like=like)
     if not chosen:
         kept.keep(repr(light), deposit.hints.resolution, found)
     return found

@@ -15,6 +15,7 @@ from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.shown import Shown
 from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -48,6 +49,8 @@ class ClosedFormSolution(Shown):
         Of the detectors that were given to `tetlux.fem.solve`, in their order.
     plan : Plan, optional
         Why this model was chosen, if it was.
+    validity : SurfaceValidity, optional
+        Expected errors of diffusion, of all lights together.
     """
 
     surface: Surface
@@ -58,6 +61,7 @@ class ClosedFormSolution(Shown):
     warnings: list[str] = field(default_factory=list)
     readings: tuple[Reading, ...] = ()
     plan: Plan | None = None
+    validity: SurfaceValidity | None = None
 
     mesh = None
     model = "closed-form"
@@ -137,9 +141,9 @@ class ClosedFormSolution(Shown):
         if len(self.deposits) == 1:
             return ()
         shape, medium = self.surface.shape, self.medium
+        alone = replace(self, warnings=[], readings=(), validity=None)
         return tuple(
-            replace(self, exact=exact_field(shape, medium, [each]), deposits=(each,), warnings=[], readings=())
-            for each in self.deposits
+            replace(alone, exact=exact_field(shape, medium, [each]), deposits=(each,)) for each in self.deposits
         )
 
     @cached_property
@@ -187,7 +191,10 @@ def solution_of(
                 value=exact.error,
             )
         )
-    return ClosedFormSolution(surface, medium, exact, tuple(deposits), warnings=list(dict.fromkeys(warnings)))
+    validity = SurfaceValidity(surface, medium, deposits)
+    return ClosedFormSolution(
+        surface, medium, exact, tuple(deposits), warnings=list(dict.fromkeys(warnings)), validity=validity
+    )
 
 
 def homogeneous(body: Body) -> Medium:

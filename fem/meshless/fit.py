@@ -1,10 +1,12 @@
-"""`charge_solution`: fit charges to point sources and diffuse light in a body of homogeneous regions."""
+"""`charge_solution`: fit charges to a body, without or with regions."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources, fit_charges
+from tetlux.fem.charges.adapt import MOST_CHARGES, LightSources
+from tetlux.fem.charges.faint import fit_with_faint
 from tetlux.fem.charges.fit_readings import fit_for_readings
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.readings import reading_goal
@@ -17,6 +19,10 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.nesting import nesting
 from tetlux.meshing.tets.regions import region_at
+
+# With regions charges are fitted again where their ledger lacks too much power, at most so often, each time aiming this
+# factor below what would suffice.
+MOST_FITS, AIM_BELOW = 4, 0.7
 
 
 def charge_solution(
@@ -70,18 +76,50 @@ def charge_solution(
             fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)
         else:
             assert tolerance is not None
-            fitted = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
+            fitted = fit_with_faint(surface, equation, lights, tolerance=tolerance, most=most)
         samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         return ChargeSolution(surface, medium, *given, goal=goal)
     assert tolerance is not None
+    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, most)
+
+
+def _in_regions(
+    surface: Surface,
+    medium: Medium,
+    points: FloatArray,
+    powers: FloatArray,
+    ledgers: Sequence[LightLedger],
+    inner: Sequence[tuple[Surface, Medium]],
+    tolerance: float,
+    most: int,
+) -> ChargeSolution:
+    """Fit charges in a body with regions, again and aiming lower while the ledger lacks too much power."""
     surfaces = [each for each, _ in inner]
     parents = nesting(surface, surfaces).parents
     interfaces = [Interface(surface, 0, None)]
     interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
     light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
-    fit = fit_regions(interfaces, equations, light, tolerance=tolerance, most=most)
-    samples_of_all = tuple(each.placement.fitted for each in fit.placements)
-    solved = tuple(interfaces), fit.fields, samples_of_all, sources, tuple(ledgers), fit.errors
-    return ChargeSolution(surface, medium, *solved)
+    aim = tolerance
+    for _ in range(MOST_FITS):
+        fit = fit_regions(interfaces, equations, light, tolerance=aim, most=most)
+        samples_of_all = tuple(each.placement.fitted for each in fit.placements)
+        solved = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
+        solution = _with_imbalance(ChargeSolution(surface, medium, *solved))
+        if solution.error_estimate <= tolerance or solution.charges >= most:
+            break
+        aim *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
+    return solution
+
+
+def _with_imbalance(solution: ChargeSolution) -> ChargeSolution:
+    """The solution with an estimate that is not below the power that its ledger lacks, relative to what exits.
+
+    What charges violate of the conditions between regions adds or takes power. Ten random bodies with a dark ball below
+    the light: residuals alone said 1.3 to 4.6 times less than the true error, what is lacking 1.0 to 1.5 times more.
+    """
+    power = solution.power
+    lacking = abs(power.balance_error * power.incident / power.exited) if power.exited else 0.0
+    errors = replace(solution.errors, estimate=max(solution.errors.estimate, float(lacking)))
+    return replace(solution, errors=errors)

@@ -22,6 +22,7 @@ from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.outcome.power import Power
 from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.outcome.shown import Shown
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.meshing.arrays import FloatArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -75,6 +76,8 @@ class ChargeSolution(Shown):
         Why this model was chosen, if it was.
     goal : ReadingGoal, optional
         What the charges were fitted for, if it was readings of all lights together.
+    validity : SurfaceValidity, optional
+        Expected errors of diffusion in a body of one medium, of all lights together.
     frequency : float
         Of modulated light, Hz: exitance, fluence, power and readings then are complex amplitudes. 0 for steady light.
     """
@@ -92,6 +95,7 @@ class ChargeSolution(Shown):
     readings: tuple[Reading, ...] = ()
     plan: Plan | None = None
     goal: ReadingGoal | None = None
+    validity: SurfaceValidity | None = None
     frequency: float = 0.0
 
     mesh, model = None, "charges"
@@ -180,6 +184,7 @@ class ChargeSolution(Shown):
             errors=ErrorEstimates(np.nan, np.nan),
             warnings=[],
             goal=None,
+            validity=None,
         )
 
     @cached_property

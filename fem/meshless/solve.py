@@ -27,6 +27,7 @@ from tetlux.fem.solve_scenes import check_tolerances
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.stopwatch import Stopwatch
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.fem.validity.notes import check_media
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import InputError
@@ -128,6 +129,8 @@ def solve_with_charges(
             most=most,
             shift=shift,
         )
+        if not inner:
+            solution = replace(solution, validity=SurfaceValidity(surface, body, deposits))
         solution = replace(solution, frequency=frequency)
         solution = replace(solution, readings=read_all(detectors, solution))
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]

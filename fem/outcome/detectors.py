@@ -70,8 +70,8 @@ def _read(placed: "PlacedDetector", solution: ExitanceField, error: float | None
         exitance, error = found.value, found.relative
     else:
         exitance = (placed.measurement.weights @ solution.exitance_on(placed.measurement.points)).item()
-    if isinstance(solution, Solution) and solution.validity is not None:
-        model = float(placed.measurement.weights @ (1.0 - solution.valid_on(placed.measurement.points)))
+    if isinstance(solution, Solution | FieldWithErrors) and solution.validity is not None:
+        model = float(placed.measurement.weights @ (1.0 - solution.validity.at(placed.measurement.points)))
     power = None if placed.area is None else placed.share * exitance * placed.area
     return Reading(placed.position, placed.normal, exitance, placed.area, power, error, model)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.boundary import boundary_condition_of
+from tetlux.fem.validity.meshless import SurfaceValidity
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -47,6 +48,11 @@ class ResolvedField(ExitanceField, Protocol):
 @runtime_checkable
 class FieldWithErrors(Protocol):
     """An exitance that knows its own errors at single points without a mesh."""
+
+    @property
+    def validity(self) -> SurfaceValidity | None:
+        """Expected errors of diffusion; None where they are not known."""
+        ...
 
     def errors_on(self, queries: FloatArray) -> FloatArray:
         """Estimated relative errors (q,) of the exitance at points (q, 3) that lie on the surface."""

@@ -80,7 +80,10 @@ def solve_channels(
         )
         elements = FiniteElements(
             lambda: solve_each(body, channels, scenes, **options),
-            lambda part, media, inside: solve_each(part, media, scenes, **options | {"regions": inside}),
+            lambda part, media, inside, start: solve_each(
+                part, media, scenes, start=start, **options | {"regions": inside}
+            ),
+            options["cache"],
         )
         if model == "closed-form":
             solutions = solve_closed_forms(request)

@@ -28,7 +28,7 @@ ERROR_OF_REGION = 4.0
 # the exitance is nowhere below zero.
 OF_FADING, FADING_LENGTHS = 200, 4.0
 # Seconds that any fit takes, and those of 300 charges, with the smaller fits before it, and how they grow.
-SECONDS_OF_ANY, SECONDS_OF_300, RATE_OF_SECONDS = 0.05, 0.22, 1.5
+SECONDS_OF_ANY, SECONDS_OF_300, RATE_OF_SECONDS = 0.07, 0.25, 1.5
 BYTES_OF_300 = 20e6
 
 

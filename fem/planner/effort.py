@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.planner.request import Request
 from tetlux.fem.sources.deposit import Deposit
@@ -28,7 +29,7 @@ OF_SPOT, RATE_OF_SPOT = 110_000.0, 1.35
 # is refined.
 OF_ENTRY, TOLERANCE_OF_ENTRY = 110.0, 0.015
 # Those of the layer below uniform light for each square of the length over which light fades, at a tolerance of .02.
-OF_LAYER = 75.0
+OF_LAYER = 330.0
 # Points of a light to which charges are fitted, at most.
 MOST_FITTED_POINTS = 30
 TOLERANCE = 0.02
@@ -64,8 +65,7 @@ def seconds_of_elements(request: Request, tetrahedra: float) -> float:
 
 def largest_rate(request: Request) -> float:
     """The largest rate at which light fades in one of the media, 1/unit."""
-    media = [medium for body in request.bodies for medium in body.by_label.values()]
-    return max((medium.sigma_tr for medium in media if isinstance(medium, Medium)), default=0.0)
+    return _largest_rate([medium for body in request.bodies for medium in body.by_label.values()])
 
 
 def kind_of_light(request: Request) -> str:
@@ -85,7 +85,8 @@ def tetrahedra_of(request: Request, deposit: Deposit) -> float:
     if kind == "beam":
         return _squares_of_entry(deposit) * OF_ENTRY * max(1.0, TOLERANCE_OF_ENTRY / TOLERANCE * ratio)
     if kind == "layer":
-        return OF_LAYER * request.surface.area * largest_rate(request) ** 2 * ratio
+        outer = [body.outer for body in request.bodies]
+        return OF_LAYER * request.surface.area * _largest_rate(outer) ** 2 * ratio
     return 0.0
 
 
@@ -107,6 +108,10 @@ def _squares_of_entry(deposit: Deposit) -> int:
     if len(places) == 0 or not 0.0 < size < np.inf:
         return 0
     return len(np.unique(np.floor(places / size), axis=0))
+
+
+def _largest_rate(media: Sequence[AnyMedium]) -> float:
+    return max((medium.sigma_tr for medium in media if isinstance(medium, Medium)), default=0.0)
 
 
 def _shape(surface: Surface) -> str:

@@ -34,11 +34,14 @@ class FiniteElements:
     whole : callable
         On the whole body, or the mesh that is given.
     part : callable
-        On the surface of a part, given the medium of each scene and the regions in it.
+        On the surface of a part, given the medium of each scene, the regions in it, and the mesh to begin with.
+    cache : bool
+        Whether meshes are looked up and kept in the user's cache directory.
     """
 
     whole: Callable[[], Sequence[Solution]]
     part: SolveOnPart
+    cache: bool = True
 
 
 Report = Callable[[str], None]
@@ -159,6 +162,7 @@ def solve_on_part(request: Request, elements: FiniteElements, report: Report) ->
         elements.part,
         tolerance=request.exitance_tolerance,
         report=report,
+        cache=elements.cache,
     )
 
 

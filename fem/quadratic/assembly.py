@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.sparse import coo_array, csr_array
 
-from tetlux.fem.media.coefficients import Coefficients, at_cells
+from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.elements import (
     TRIANGLE_EDGES,
@@ -15,7 +15,7 @@ from tetlux.fem.quadratic.elements import (
     shape_functions,
 )
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
 # Number of curved tetrahedra that are integrated at once.
@@ -42,26 +42,58 @@ def _assemble(dofs: IntArray, values: NumberArray, size: int) -> csr_array:
     return csr_array(coo_array((values.ravel(), (rows, columns)), shape=(size, size)))
 
 
-def element_matrices(space: QuadraticSpace, coefficients: Coefficients) -> NumberArray:
-    """Matrices of the tetrahedra of a mesh, without boundary terms, (m, 10, 10); complex if the shift is."""
-    mesh, curved = space.mesh, space.curved
-    every = np.arange(len(mesh.tetrahedra))
-    diffusion, sigma = (at_cells(value, every) for value in (coefficients.diffusion, coefficients.sigma))
-    hats, volumes = mesh.hat_gradients, mesh.volumes
-    products = (diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
-    values = products @ reference_stiffness() + (sigma * volumes)[:, None] * reference_mass()
+def element_matrices(
+    space: QuadraticSpace, diffusion: Number | NumberArray, sigma: Number | NumberArray, cells: IntArray | None = None
+) -> NumberArray:
+    """Matrices of tetrahedra without boundary terms.
+
+    Parameters
+    ----------
+    space : QuadraticSpace
+    diffusion, sigma : number or (c,) ndarray
+        D, unit, and the coefficient of the fluence, 1/unit, of each; complex matrices if they are.
+    cells : (c,) ndarray, optional
+        Numbers of the tetrahedra, ascending; all if not given.
+
+    Returns
+    -------
+    (c, 10, 10) ndarray
+    """
+    mesh = space.mesh
+    every = np.arange(len(mesh.tetrahedra)) if cells is None else cells
+    each_diffusion, each_sigma = (np.broadcast_to(value, len(every)) for value in (diffusion, sigma))
+    hats, volumes = (
+        (mesh.hat_gradients, mesh.volumes) if cells is None else (mesh.hat_gradients[cells], mesh.volumes[cells])
+    )
+    products = (each_diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
+    values = products @ reference_stiffness() + (each_sigma * volumes)[:, None] * reference_mass()
     values = values.reshape(-1, 10, 10)
+    places = space.places_of_curved[every]
+    curved = np.flatnonzero(places >= 0)
+    stiffness, mass = _curved_elements(space)
+    own = each_diffusion[curved, None, None] * stiffness[places[curved]]
+    values[curved] = own + each_sigma[curved, None, None] * mass[places[curved]]
+    return np.asarray(values)
+
+
+def _curved_elements(space: QuadraticSpace) -> FloatArray:
+    """Stiffness and mass matrices of curved tetrahedra for coefficients of 1, (2, c, 10, 10); made once for a mesh."""
+    return space.mesh.cache.get(("curved elements", space), lambda: _integrate_curved(space))
+
+
+def _integrate_curved(space: QuadraticSpace) -> FloatArray:
+    curved = space.curved
+    values = np.empty((2, len(curved), 10, 10))
+    shape_values = shape_functions(cell_rule().points)
+    pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 100)
 
     def integrate(block: slice) -> None:
-        some = curved[block]
-        slopes, weights = gradients(space, some, cell_rule().points, cell_rule().weights)
-        own = np.einsum("cq,cqai,cqbi->cab", diffusion[some, None] * weights, slopes, slopes, optimize=True)
-        shape_values = shape_functions(cell_rule().points)
-        pairs = (shape_values[:, :, None] * shape_values[:, None, :]).reshape(-1, 100)
-        values[some] = own + ((sigma[some, None] * weights) @ pairs).reshape(-1, 10, 10)
+        slopes, weights = gradients(space, curved[block], cell_rule().points, cell_rule().weights)
+        values[0, block] = np.einsum("cq,cqai,cqbi->cab", weights, slopes, slopes, optimize=True)
+        values[1, block] = (weights @ pairs).reshape(-1, 10, 10)
 
     run_in_blocks(integrate, len(curved), BLOCK)
-    return np.asarray(values)
+    return values
 
 
 def gradients(

@@ -9,7 +9,7 @@ from tetlux.fem.ballistic.extinction import cells_of, optical_depths
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
-from tetlux.fem.media.coefficients import Coefficients, at_cells, coefficients_of
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.quadratic.assembly import face_matrices, face_normals, gradients, surface_load, volume_load
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
@@ -129,10 +129,14 @@ class QuadraticPatch:
 
     @cached_property
     def interpolant(self) -> NumberArray:
-        """The quadratic interpolant of its charges' fluence, (size,)."""
+        """The quadratic interpolant of its charges' fluence, (size,); linear on edges outside of it."""
         if not self.patch.cells.any():
             return np.zeros(self.space.size)
-        return self.space.interpolate(self.patch.at_nodes, self.patch.charges.fluence(self.space.middles))
+        mesh, at_nodes = self.space.mesh, self.patch.at_nodes
+        edges = np.unique(mesh.tetrahedron_edges[self.patch.cells])
+        at_middles = at_nodes[mesh.edges].mean(axis=1)
+        at_middles[edges] = self.patch.charges.fluence(self.space.middles[edges])
+        return self.space.interpolate(at_nodes, at_middles)
 
     @property
     def is_fitted(self) -> bool:
@@ -141,33 +145,47 @@ class QuadraticPatch:
 
 
 def quadratic_patch(operator: QuadraticOperator, patch: Patch) -> QuadraticPatch:
-    """A patch with its load, as in `tetlux.fem.known.patch_terms` for linear elements.
+    """A patch with its load, by the matrices of an operator; one that is the whole body needs none of them."""
+    if patch.cells.all() and operator.coefficients.uniform:
+        _, leaving, _ = _boundary_terms(operator.space, patch)
+        return QuadraticPatch(patch, operator.space, -leaving, is_whole=True)
+    return patch_by_elements(operator.space, patch, operator.elements[patch.cells])
+
+
+def patch_by_elements(
+    space: QuadraticSpace, patch: Patch, elements: NumberArray, inner: "InnerFaces | None" = None
+) -> QuadraticPatch:
+    """A patch with its load, as in `tetlux.fem.known.patch_terms`, by the matrices (c, 10, 10) of its tetrahedra.
 
     Across inner faces of the patch the fluence jumps by the interpolation error G - I G. The jump changes a reading by
-    ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change.
+    ``∮ (G - I G) D dz/dn``, with z its dual solution; adding this term to the load cancels the change. The
+    `inner_faces` need not be given.
     """
-    space, coefficients = operator.space, coefficients_of(patch.charges.medium)
-    mesh, charges = patch.mesh, patch.charges
+    charges = patch.charges
     if not patch.cells.any():
         count = charges.sources
         load = _point_load(space, charges.positions[:count], charges.strengths[:count].real)
         return QuadraticPatch(patch, space, load)
-    cell, face, on_boundary = patch.outer
-    corners = mesh.tetrahedra[cell[:, None], FACES[face]]
-    faces, leaving_faces = space.faces(corners), space.faces(corners[on_boundary])
-    robin = boundary_condition_of(coefficients.outer).robin
-    value, flux = _integrals(space, faces, charges)
-    leaving = sum_by_index(faces, flux + (robin * on_boundary)[:, None] * value, space.size)
-    if patch.cells.all() and operator.coefficients.uniform:
-        return QuadraticPatch(patch, space, -leaving, is_whole=True)
+    leaving_faces, leaving, has_inner = _boundary_terms(space, patch)
     found = QuadraticPatch(patch, space, -leaving)
-    inside, interpolant = np.flatnonzero(patch.cells), found.interpolant
-    load = _product(operator.elements[inside], space.cells[inside], interpolant) - leaving
-    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, interpolant)
-    within = ~on_boundary
-    if within.any():
-        load += _jump_load(space, charges, interpolant, cell[within], face[within])
+    load = _product(elements, space.cells[patch.cells], found.interpolant) - leaving
+    robin = boundary_condition_of(charges.medium).robin
+    load += _product(robin * face_matrices(space, leaving_faces), leaving_faces, found.interpolant)
+    if has_inner:
+        load += _jump_load(charges, found.interpolant, inner or inner_faces(space, patch))
     return replace(found, load=load)
+
+
+def _boundary_terms(space: QuadraticSpace, patch: Patch) -> tuple[IntArray, NumberArray, bool]:
+    """DOF numbers of a patch's facets of the boundary, (f, 6), what leaves it, (size,), and whether it ends inside."""
+    charges = patch.charges
+    cell, face, on_boundary = patch.outer
+    corners = space.mesh.tetrahedra[cell[:, None], FACES[face]]
+    faces = space.faces(corners)
+    value, flux = _integrals(space, faces, charges)
+    robin = boundary_condition_of(charges.medium).robin
+    leaving = sum_by_index(faces, flux + (robin * on_boundary)[:, None] * value, space.size)
+    return faces[on_boundary], leaving, not bool(on_boundary.all())
 
 
 def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> NumberArray:
@@ -176,25 +194,52 @@ def _product(matrices: NumberArray, dofs: IntArray, function: NumberArray) -> Nu
     return sum_by_index(dofs, values, len(function))
 
 
-def _jump_load(
-    space: QuadraticSpace, charges: Charges, interpolant: NumberArray, cells: IntArray, local: IntArray
-) -> NumberArray:
-    """``∮ (G - I G) D dv/dn``, (size,), over faces of tetrahedra (f,) given by their opposite corners (f,)."""
+@dataclass(frozen=True, eq=False)
+class InnerFaces:
+    """The outer faces of a patch that lie inside the body, with their quadrature points.
+
+    Attributes
+    ----------
+    faces, cells : (f, 6), (f, 10) ndarray
+        DOF numbers of the faces, and of the tetrahedra of the patch.
+    points, shape_values : (f, q, 3), (q, 6) ndarray
+        Quadrature points, and shape functions there.
+    slopes : (f, q, 10) ndarray
+        Derivatives of shape functions along the normal times area, unit.
+    """
+
+    faces: IntArray
+    cells: IntArray
+    points: FloatArray
+    shape_values: FloatArray
+    slopes: FloatArray
+
+    __repr__ = one_line
+
+
+def inner_faces(space: QuadraticSpace, patch: Patch) -> InnerFaces:
+    """The faces at which a patch ends inside the body; they do not depend on its charges."""
+    owners, opposite, on_boundary = patch.outer
+    cells, local = owners[~on_boundary], opposite[~on_boundary]
     rule = triangle_rule(FACE_DEGREES[-1][1])
     on_face, weights = rule.points, rule.weights
-    corners = space.mesh.tetrahedra[cells[:, None], FACES[local]]
-    faces = space.faces(corners)
+    faces = space.faces(space.mesh.tetrahedra[cells[:, None], FACES[local]])
     shape_values = shape_functions(on_face, TRIANGLE_EDGES)
-    points = shape_values @ space.corners_and_bends(faces)
-    fluence = charges.fluence(points.reshape(-1, 3)).reshape(len(cells), -1)
-    jumps = fluence - interpolant[faces] @ shape_values.T
     normals = weights[:, None] * face_normals(space, faces, on_face)
     barycentric = np.zeros((len(cells), len(weights), 4))
     for corner in range(3):
         np.put_along_axis(barycentric, FACES[local, corner][:, None, None], on_face[None, :, corner, None], axis=2)
     slopes, _ = gradients(space, cells, barycentric, weights)
-    values = charges.medium.diffusion * np.einsum("fq,fqai,fqi->fa", jumps, slopes, normals)
-    return sum_by_index(space.cells[cells], values, space.size)
+    along = np.einsum("fqai,fqi->fqa", slopes, normals)
+    return InnerFaces(faces, space.cells[cells], shape_values @ space.corners_and_bends(faces), shape_values, along)
+
+
+def _jump_load(charges: Charges, interpolant: NumberArray, inner: InnerFaces) -> NumberArray:
+    """``∮ (G - I G) D dv/dn`` over inner faces, (size,)."""
+    fluence = charges.fluence(inner.points.reshape(-1, 3)).reshape(inner.points.shape[:2])
+    jumps = fluence - interpolant[inner.faces] @ inner.shape_values.T
+    values = charges.medium.diffusion * np.einsum("fq,fqa->fa", jumps, inner.slopes)
+    return sum_by_index(inner.cells, values, len(interpolant))
 
 
 def _integrals(space: QuadraticSpace, faces: IntArray, charges: Charges) -> tuple[NumberArray, NumberArray]:

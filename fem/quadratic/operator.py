@@ -79,12 +79,12 @@ class QuadraticOperator:
         """The matrices of tetrahedra, (m, 10, 10)."""
         if self.steady is not None:
             return self.steady.elements + self.coefficients.shift * self.steady.mass_elements
-        return element_matrices(self.space, self.coefficients)
+        return element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
 
     @cached_property
     def mass_elements(self) -> NumberArray:
         """Integrals of products of shape functions over tetrahedra, (m, 10, 10)."""
-        return element_matrices(self.space, replace(self.coefficients, sigma_a=1.0, sigma_t_prime=np.inf))
+        return element_matrices(self.space, 0.0, 1.0)
 
     @cached_property
     def mass(self) -> csr_array:

@@ -56,6 +56,13 @@ class QuadraticSpace:
         return np.flatnonzero(self.bent[self.mesh.tetrahedron_edges].any(axis=1))
 
     @cached_property
+    def places_of_curved(self) -> IntArray:
+        """The place of each tetrahedron in `curved`, (m,); -1 of straight ones."""
+        places = np.full(len(self.mesh.tetrahedra), -1)
+        places[self.curved] = np.arange(len(self.curved))
+        return places
+
+    @cached_property
     def bent(self) -> BoolArray:
         """Whether each edge is bent, (e,)."""
         return np.asarray(self.bends.any(axis=1))

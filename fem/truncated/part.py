@@ -25,7 +25,7 @@ DARK = 1e-7
 DARK_INSIDE, OF_TOLERANCE = 1e-5, 0.02
 # Vertices of the surface at which the exitance is estimated, at most; a surface with fewer around the light than
 # FEWEST_VERTICES is taken to be as bright everywhere as a half-space is straight below the light.
-MOST_VERTICES, FEWEST_VERTICES = 600, 100
+MOST_VERTICES, FEWEST_VERTICES = 300, 100
 # What is bright is kept, and a border of this share of the distance of the cut around it.
 BORDER = 0.05
 # A distance of more than this share of the body's diagonal cuts off too little.
@@ -124,8 +124,10 @@ def dark_box(bodies: Sequence[Body], deposits: Sequence[Sequence[Deposit]], tole
     spread = float(np.linalg.norm(lit - lit.mean(axis=0), axis=1).max())
     share = DARK / max(1.0, (spread / max(depths)) ** 2)
     share_inside = share * DARK_INSIDE / DARK * min(1.0, tolerance / OF_TOLERANCE)
-    far = max(_reach(medium, z, share) for medium, z in zip(media, depths, strict=True))
-    near = max(_reach(medium, z, share_inside) for medium, z in zip(media, depths, strict=True))
+    reaches = np.array([_reaches(medium, z, (share, share_inside)) for medium, z in zip(media, depths, strict=True)])
+    far, near = reaches.max(axis=0).tolist()
+    # What follows can only enlarge the box.
+    _check_dark(near, surface)
     low, high = lit.min(axis=0), lit.max(axis=0)
     around = surface.points[((surface.points > low - far) & (surface.points < high + far)).all(axis=1)]
     if len(around) < FEWEST_VERTICES:
@@ -142,9 +144,14 @@ def dark_box(bodies: Sequence[Body], deposits: Sequence[Sequence[Deposit]], tole
             np.maximum(bright.max(axis=0) + border, high + near),
             near,
         )
-    if not box.distance < LARGEST_SHARE * surface.diagonal:
-        raise InputError("light reaches most of the body")
+    _check_dark(box.distance, surface)
     return box
+
+
+def _check_dark(distance: float, surface: Surface) -> None:
+    """Refuse a box whose faces are so far from the light that little of the body is beyond them."""
+    if not distance < LARGEST_SHARE * surface.diagonal:
+        raise InputError("light reaches most of the body")
 
 
 def _lit_places(deposits: Sequence[Deposit]) -> FloatArray:
@@ -175,11 +182,12 @@ def _largest_depth(body: Body, deposits: Sequence[Deposit]) -> float:
     return float(body.surface.distances(points).max()) if len(points) else 0.0
 
 
-def _reach(medium: Medium, depth: float, share: float) -> float:
-    """Distance straight below a source at which light is below a share of the brightest exitance, unit; or inf."""
+def _reaches(medium: Medium, depth: float, shares: Sequence[float]) -> list[float]:
+    """Distances straight below a source at which light is below shares of the brightest exitance, unit; or inf."""
     below = depth + medium.mean_free_path * np.geomspace(NEAREST, FARTHEST, STEPS)
-    dark = _relative(medium, depth, np.zeros(STEPS), below) < share
-    return float(below[dark.argmax()]) if dark.any() else np.inf
+    light = _relative(medium, depth, np.zeros(STEPS), below)
+    dark = [light < share for share in shares]
+    return [float(below[each.argmax()]) if each.any() else np.inf for each in dark]
 
 
 def _brightness(medium: Medium, depth: float, surface: Surface, lit: FloatArray, points: FloatArray) -> FloatArray:

@@ -1,5 +1,6 @@
 """`Entry`: where one light enters a body, and the expected errors of diffusion near there."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,21 +88,30 @@ def entry_of(deposit: Deposit, mesh: TetMesh, coefficients: Coefficients, below:
     -------
     Entry
     """
+
+    def media_at(places: FloatArray, is_beam: bool) -> LocalMedia:
+        _, facets, _ = mesh.closest_boundary(places)
+        if is_beam:
+            return below[facets]
+        cells, _ = mesh.locate(places)
+        return media_in(coefficients, np.where(cells >= 0, cells, mesh.boundary_cells[facets]))
+
+    return entry_in(deposit, media_at)
+
+
+def entry_in(deposit: Deposit, media_at: Callable[[FloatArray, bool], LocalMedia]) -> Entry:
+    """Find where a light enters a body of which `media_at` tells the media at places (p, 3), of beams or sources."""
     footprint = deposit.footprint
     is_beam = len(footprint.entries) > 0
     places = footprint.entries if is_beam else deposit.terms.points
     if len(places) == 0:
-        return Entry(None, below[np.zeros(0, dtype=np.int64)], np.inf, np.zeros((0, 6)))
-    _, facets, _ = mesh.closest_boundary(places)
+        return Entry(None, media_at(np.zeros((0, 3)), True), np.inf, np.zeros((0, 6)))
+    media = media_at(places, is_beam)
+    cosine = None
     if is_beam:
-        media = below[facets]
         # A thin beam as one point is itself wrong where scattering is isotropic; with forward scattering a point and a
         # line are equally good, and a line is as good as that whatever the scattering.
         cosine = media.cosine if footprint.beams_as_points else np.ones(len(places))
-    else:
-        cells, _ = mesh.locate(places)
-        media = media_in(coefficients, np.where(cells >= 0, cells, mesh.boundary_cells[facets]))
-        cosine = None
     radius = footprint.radius
     if radius is None:
         radius = float(np.sqrt(2.0 * ((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))

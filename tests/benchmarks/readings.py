@@ -9,7 +9,8 @@ regions `tolerance` is the exitance's: they take no detector tolerance); `--even
 
 `--fibres` reads ten points 5 to 50 mm from a beam on a ball of radius 80 mm to 1 %. `--cube` is the fluence in the
 middle of a dark ball in a cube. `--fits` fits absorption and scattering to ten noiseless readings of a ball. The first
-and the last take `--charges` too.
+and the last take `--charges` too. `--all` prints everything: these for finite elements and for charges, then random
+scenes of both.
 
 Seconds are of the processor, of all threads, from surface to readings; nothing is remembered.
 """
@@ -17,7 +18,7 @@ Seconds are of the processor, of all threads, from surface to readings; nothing 
 import argparse
 import itertools
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,6 +32,8 @@ from tetlux.meshing.arrays import FloatArray
 TOLERANCE = 0.01
 # A truth that is no series, and less certain than this, is left out.
 LEAST_CERTAIN = 0.003
+# How meshes of fits are made.
+FITS = ("kept mesh", "meshes made anew", "charges")
 
 
 def measure(scene: Scene, tolerance: float, *, charges: bool = False) -> tuple[FloatArray, FloatArray, float, str]:
@@ -177,12 +180,14 @@ def print_cube() -> None:
     inside = Region(sphere(10.0), Medium(sigma_a=0.05, sigma_s_prime=0.5, eta=1.37))
     body, medium = box((60.0, 60.0, 60.0)), Medium(sigma_a=0.002, sigma_s_prime=0.99, eta=1.37)
     beam = PencilBeam((0.0, 0.0, 50.0), (0.0, 0.0, -1.0))
-    for tolerance in (0.02, 0.005):
+    wanted: tuple[dict[str, float | None], ...]
+    wanted = ({"tolerance": 0.02}, {"tolerance": 0.005}, {"tolerance": None, "volume_tolerance": 0.03})
+    for tolerances in wanted:
         started = time.process_time()
-        solution = solve(body, medium, [beam], regions=[inside], tolerance=tolerance)
+        solution = solve(body, medium, [beam], regions=[inside], **tolerances)
         value, error = solution.fluence_with_error([[0.0, 0.0, 0.0]])
         print(
-            f"tolerance {tolerance}: {value[0]:.5g} ± {error[0]:.2%} (linear elements "
+            f"{tolerances}: {value[0]:.5g} ± {error[0]:.2%} (linear elements "
             f"{solution.fluence_at(np.zeros((1, 3)))[0]:.5g}), {time.process_time() - started:.1f} s"
         )
 
@@ -198,20 +203,39 @@ def main() -> None:
     parser.add_argument("--fits", action="store_true")
     parser.add_argument("--charges", action="store_true")
     parser.add_argument("--even", action="store_true")
+    parser.add_argument("--all", action="store_true")
     parser.add_argument("--each", action="store_true")
     given = parser.parse_args()
-    if given.fibres:
+    if given.all:
+        for charges in (False, True):
+            print_fibres(charges=charges)
+        print_cube()
+        print_all_fits(FITS)
+        _print_scenes(given, charges=False)
+        _print_scenes(given, charges=True)
+    elif given.fibres:
         print_fibres(charges=given.charges)
     elif given.cube:
         print_cube()
     elif given.fits:
-        for how in ("charges",) if given.charges else ("kept mesh", "meshes made anew"):
-            print_fits(how)
+        print_all_fits(FITS[-1:] if given.charges else FITS[:-1])
     else:
-        # Two of six kinds have regions.
-        numbers = (number for number in itertools.count(given.first) if not (given.even and number % 6 > 3))
-        scenes = itertools.islice(numbers, given.scenes)
-        print_scenes(scenes, given.tolerance, charges=given.charges, each=given.each)
+        _print_scenes(given, charges=given.charges)
+
+
+def _print_scenes(given: argparse.Namespace, *, charges: bool) -> None:
+    print(f"random scenes by {'charges' if charges else 'finite elements'}")
+    # Two of six kinds have regions, for which charges take no detector tolerance.
+    even = given.even or (charges and given.all)
+    numbers = (number for number in itertools.count(given.first) if not (even and number % 6 > 3))
+    scenes = itertools.islice(numbers, given.scenes)
+    print_scenes(scenes, given.tolerance, charges=charges, each=given.each)
+
+
+def print_all_fits(ways: Sequence[str]) -> None:
+    """Fits, one after another."""
+    for how in ways:
+        print_fits(how)
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer", "film"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba", "film"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")

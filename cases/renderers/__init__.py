@@ -1,0 +1,1 @@
+"""The files of a run that 3D programs and renderers read."""

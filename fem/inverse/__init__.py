@@ -1,0 +1,5 @@
+"""Coefficients from readings, by least squares with derivatives by adjoint solutions.
+
+`unknowns` says what is fitted, and which media follow from its values; `problem` has residuals of readings and their
+derivatives on a fixed mesh; `fit` is least squares, with the mesh adapted again after long ways.
+"""

@@ -1,0 +1,129 @@
+"""Fits of coefficients to readings: values, covariance, what is not determined, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tetlux.fem import FitProblem, Medium, PencilBeam, PointDetector, Region, fit, solve, tissue
+from tetlux.fem.inverse.unknowns import unknowns_of
+from tetlux.fem.sensitivity.sensitivity import sensitivity
+from tetlux.fem.system import System
+from tetlux.meshing import InputError, Surface, TetMesh, sphere, torus
+from tetlux.meshing.arrays import FloatArray
+
+START = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+BEAM = PencilBeam((0.0, 0.0, 20.0), (0.0, 0.0, -1.0))
+ANGLES = np.radians([20.0, 45.0, 70.0, 100.0, 140.0])
+DETECTORS = [PointDetector((10.0 * float(np.sin(a)), 0.0, 10.0 * float(np.cos(a)))) for a in ANGLES]
+COEFFICIENTS = ["sigma_a", "sigma_s_prime"]
+NOISE = 0.01
+
+
+def problem_on(mesh: TetMesh, surface: Surface, readings: FloatArray, names: list[str]) -> FitProblem:
+    measured = readings.reshape(1, 1, -1)
+    unknowns = unknowns_of(names, START, ())
+    return FitProblem(surface, mesh, [BEAM], DETECTORS, (), unknowns, measured, np.full(measured.shape, NOISE))
+
+
+def test_coefficients_of_a_torus_are_found_again() -> None:
+    """By ten detectors from a start a factor of 3 off, of readings that are not those of the mesh."""
+    truth = Medium(sigma_a=0.02, sigma_s_prime=1.1, eta=1.4)
+    body, beam = torus(20.0, 8.0), PencilBeam((20.0, 0.0, 20.0), (0.0, 0.0, -1.0))
+    angles = np.radians(np.linspace(8.0, 50.0, 10))
+    there = [PointDetector((20.0 * float(np.cos(a)), 20.0 * float(np.sin(a)), 8.0)) for a in angles]
+    read = solve(body, truth, [beam], model="charges", detectors=there, detector_tolerance=0.002).readings
+    start = replace(truth, sigma_a=0.06, sigma_s_prime=0.37)
+    found = fit(body, [beam], there, read, COEFFICIENTS, start, noise=NOISE)
+    assert found.values["sigma_a"] == pytest.approx(truth.sigma_a, rel=0.005)
+    assert found.values["sigma_s_prime"] == pytest.approx(truth.reduced_scattering, rel=0.005)
+    assert found.undetermined == ()
+    assert found.evaluations < 16
+
+
+def test_gradient_is_that_of_the_value(ball: Surface, ball_mesh: TetMesh) -> None:
+    problem = problem_on(ball_mesh, ball, np.geomspace(1e-2, 1e-4, 5), [*COEFFICIENTS, "gain"])
+    place, step = np.log([0.012, 0.9, 1.2]), 1e-4
+    _, gradient = problem.value_and_gradient(place)
+    for number in range(3):
+        way = step * np.eye(3)[number]
+        sides = [problem.value_and_gradient(place + side * way)[0] for side in (1.0, -1.0)]
+        assert gradient[number] == pytest.approx((sides[0] - sides[1]) / (2.0 * step), rel=1e-5)
+
+
+def test_covariance_is_that_of_repeated_fits(ball: Surface) -> None:
+    """Of 300 draws of noise, each fitted by one step from the result: 68 % lie within one standard deviation."""
+    readings = solve(ball, START, [BEAM], tolerance=None, detectors=DETECTORS, detector_tolerance=0.02).readings
+    start = replace(START, sigma_a=0.011)
+    found = fit(ball, [BEAM], DETECTORS, readings, COEFFICIENTS, start, noise=NOISE, detector_tolerance=0.02)
+    values = np.array(list(found.values.values()))
+    exact = np.array([reading.exitance for reading in readings])
+    problem = problem_on(found.mesh, ball, exact, COEFFICIENTS)
+    jacobian = problem.jacobian(np.log(values))
+    draws = np.random.default_rng(3).standard_normal((300, 5))
+    spread = values * (np.linalg.pinv(jacobian) @ draws.T).T
+    share = (np.abs(spread) < np.array(list(found.errors.values()))).mean(axis=0)
+    assert ((share > 0.60) & (share < 0.75)).all()
+    correlations = np.asarray(np.corrcoef(spread.T))
+    assert correlations[0, 1] == pytest.approx(found.covariance[0, 1] / np.prod(list(found.errors.values())), abs=0.1)
+
+
+def test_a_region_is_fitted(ball: Surface) -> None:
+    medium = Medium(sigma_a=0.03, sigma_s_prime=1.3, eta=1.4)
+    inner = Region(sphere(5.0, center=(0.0, 1.0, 0.0)), medium)
+    lights = [BEAM, PencilBeam((0.0, 0.0, -20.0), (0.0, 0.0, 1.0))]
+    solution = solve(ball, START, lights, regions=[inner], tolerance=None, detectors=DETECTORS, detector_tolerance=0.02)
+    found = sensitivity(System(solution.mesh, START, ball, regions=(inner,)), lights, DETECTORS, per="region")
+    start = replace(inner, medium=replace(medium, sigma_a=0.015))
+    names = ["1.sigma_a", "sigma_a"]
+    result = fit(
+        ball, lights, DETECTORS, found.readings, names, START, regions=[start], noise=NOISE, detector_tolerance=0.02
+    )
+    assert result.values["1.sigma_a"] == pytest.approx(0.03, rel=0.1)
+    assert result.values["sigma_a"] == pytest.approx(0.01, rel=0.03)
+
+
+def test_oxygen_is_found_at_two_wavelengths_with_modulated_light(ball: Surface) -> None:
+    given = {"wavelengths": [690.0, 830.0], "hbo2": 60e-6, "hhb": 40e-6, "water": 0.7, "a": 1.2, "b": 1.3, "eta": 1.4}
+    media = tissue(**given)  # type: ignore[arg-type]
+    options = {"tolerance": None, "detectors": DETECTORS, "detector_tolerance": 0.02, "frequency": 100e6}
+    solutions = solve(ball, media, [BEAM], **options)  # type: ignore[call-overload]
+    readings = [[reading.exitance for reading in solution.readings] for solution in solutions]
+    start = {**given, "hbo2": 40e-6, "hhb": 55e-6, "a": 1.5}
+    found = fit(
+        ball, [BEAM], DETECTORS, readings, ["hbo2", "hhb", "a"], start, frequency=100e6, detector_tolerance=0.02
+    )
+    assert found.values["hbo2"] == pytest.approx(60e-6, rel=0.05)
+    assert found.values["hhb"] == pytest.approx(40e-6, rel=0.05)
+    assert found.values["a"] == pytest.approx(1.2, rel=0.02)
+
+
+def test_what_readings_do_not_tell_is_said(ball: Surface, ball_mesh: TetMesh) -> None:
+    """At one wavelength ``a`` and ``b`` have one effect."""
+    given = {"wavelengths": [690.0], "hbo2": 60e-6, "hhb": 40e-6, "a": 1.2, "b": 1.3, "eta": 1.4}
+    system = System(ball_mesh, tissue(**given)[0], ball)  # type: ignore[arg-type]
+    readings = sensitivity(system, [BEAM], DETECTORS, per="region").readings
+    found = fit(ball, [BEAM], DETECTORS, readings, ["a", "b"], given, noise=NOISE, detector_tolerance=0.05)
+    assert found.undetermined == ("the readings do not tell a and b apart: a product of their powers is free.",)
+
+
+def test_what_cannot_be_fitted_is_refused(ball: Surface) -> None:
+    readings = [1e-2, 1e-3, 1e-3, 1e-4, 1e-4]
+
+    def refused(match: str, **changes: object) -> None:
+        arguments = {"readings": readings, "unknowns": COEFFICIENTS, "start": START, **changes}
+        with pytest.raises(InputError, match=match):
+            fit(ball, [BEAM], DETECTORS, **arguments)  # type: ignore[arg-type]
+
+    refused(
+        "there are 3 unknowns and 2 readings", readings=[1e-2, 1e-3, *[np.nan] * 3], unknowns=[*COEFFICIENTS, "gain"]
+    )
+    refused('"sigma_s" is no unknown of this fit; give some of sigma_a, sigma_s_prime, gain', unknowns=["sigma_s"])
+    refused('"hbo2" is no unknown', unknowns=["hbo2"])
+    refused('the unknown "gain" is given twice', unknowns=["gain", "gain"])
+    refused("unknowns are given in a list of names, and there is none", unknowns=[])
+    refused("that detector is in the dark", readings=[1e-2, 1e-3, 1e-3, 1e-4, -1e-9])
+    refused(r"readings have shape \(2,\); give 1 x 1 x 5 numbers", readings=[1e-2, 1e-3])
+    refused("noise is a relative standard deviation", noise=0.0)
+    refused(r"noise has shape \(2,\)", noise=[0.1, 0.1])
+    refused("sigma_a begins at 0; begin with a value greater than 0", start=replace(START, sigma_a=0.0))
