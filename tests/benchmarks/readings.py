@@ -19,6 +19,7 @@ import argparse
 import itertools
 import time
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -180,11 +181,11 @@ def print_cube() -> None:
     inside = Region(sphere(10.0), Medium(sigma_a=0.05, sigma_s_prime=0.5, eta=1.37))
     body, medium = box((60.0, 60.0, 60.0)), Medium(sigma_a=0.002, sigma_s_prime=0.99, eta=1.37)
     beam = PencilBeam((0.0, 0.0, 50.0), (0.0, 0.0, -1.0))
-    wanted: tuple[dict[str, float | None], ...]
+    wanted: tuple[dict[str, Any], ...]
     wanted = ({"tolerance": 0.02}, {"tolerance": 0.005}, {"tolerance": None, "volume_tolerance": 0.03})
     for tolerances in wanted:
         started = time.process_time()
-        solution = solve(body, medium, [beam], regions=[inside], **tolerances)
+        solution: Solution = solve(body, medium, [beam], regions=[inside], **tolerances)
         value, error = solution.fluence_with_error([[0.0, 0.0, 0.0]])
         print(
             f"{tolerances}: {value[0]:.5g} ± {error[0]:.2%} (linear elements "
