@@ -153,6 +153,11 @@ def test_pictures_show_what_is_emitted(tmp_path: Path) -> None:
         ("regions: {tumour: {sigma_a", "regions: {body: {sigma_a", ("give it as fluorescence.emission",)),
         ("sigma_s_prime: 0.9, eta: 1.4}\n  regions", "sigma_s_prime: 0.9, eta: 1.3}\n  regions", ("emission", "ind")),
         ("tolerance: 0.2", "model: truncated", ("fluorescence", "dyes are solved for by model full")),
+        (
+            "tolerance: 0.2",
+            "pulse: {times: [1.0e-10]}",
+            ("a pulse does not go with fluorescence; leave one of the two out.",),
+        ),
         ("tolerance: 0.2", "compare: [series]", ("leave compare or fluorescence out",)),
         ("quantum_yield: 0.5", "quantum_efficiency: 0.5", ("unknown key", 'did you mean "quantum_yield"')),
     ],

@@ -45,7 +45,7 @@ def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
         first = failure.errors()[0]
         key: Key = tuple(part for part in first["loc"] if not str(part).startswith(TAG))
         context = first.get("ctx", {})
-        if first["type"] in ("unknown_key", "no_mesh"):
+        if first["type"] in ("unknown_key", "no_mesh", "pulse"):
             key = (*key, context["key"])
         if first["type"] == "body":
             key = () if "name" in context else ("mesh",)
@@ -68,7 +68,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep", "picture"):
+    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep", "picture", "pulse"):
         return f"{text}."
     hint = ""
     if kind == "literal_error" and isinstance(given, str):

@@ -93,7 +93,7 @@ def _left_out(model: str) -> dict[str, str]:
     return {
         "mesh": f"model {model} makes none; {instead}",
         "fluence": f"it has no largest value at points, whose fluence model {model} does not spread over a mesh",
-        "validity": f"valid and model_error are computed on a mesh; {instead}",
+        "validity": f"it is computed on a mesh; {instead}",
     }
 
 

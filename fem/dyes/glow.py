@@ -62,16 +62,17 @@ class Excitation:
         """What each light makes the dyes emit."""
         return tuple(Glow(self, light) for light in range(len(self.of_lights)))
 
-    def local_residual(self, lights: Sequence[int], dual: NumberArray) -> NumberArray:
+    def local_residual(self, lights: Sequence[int], dual: NumberArray, *, keep: bool) -> NumberArray:
         """See `tetlux.fem.sources.volume.SourceField`."""
         solution = self._quadratic(tuple(lights))
-        if id(dual) not in self._duals:
-            load = weighted_product(solution.operator.space, self.weights, dual)
-            found = solution.operator.solve(load[:, None], STOP_RESIDUAL_OF_DUALS)[:, 0]
-            if len(self._duals) < solution.operator.most_duals:
-                self._duals[id(dual)] = dual, found
-            return local_residual(solution, found)
-        return local_residual(solution, self._duals[id(dual)][1])
+        if id(dual) in self._duals:
+            return local_residual(solution, self._duals[id(dual)][1], keep=True)
+        load = weighted_product(solution.operator.space, self.weights, dual)
+        found = solution.operator.solve(load[:, None], STOP_RESIDUAL_OF_DUALS)[:, 0]
+        keep = keep and len(self._duals) < solution.operator.most_duals
+        if keep:
+            self._duals[id(dual)] = dual, found
+        return local_residual(solution, found, keep=keep)
 
     def _quadratic(self, lights: tuple[int, ...]) -> QuadraticSolution:
         some = self.whole if len(lights) == len(self.of_lights) else self.of_lights[lights[0]]

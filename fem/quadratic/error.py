@@ -41,24 +41,29 @@ BEAM_RELATIVE_ERROR = 0.35
 RIPPLE_WEIGHT = 0.35
 
 
-def local_residual(solution: QuadraticSolution, dual: NumberArray) -> NumberArray:
-    """Contributions eta_K to the error of a linear function of the fluence, by its dual solution (size,), (m,)."""
+def local_residual(solution: QuadraticSolution, dual: NumberArray, *, keep: bool) -> NumberArray:
+    """Contributions eta_K to the error of a linear function of the fluence, by its dual solution (size,), (m,).
+
+    `keep` says that the dual will come again, for other scenes, so that what is computed of it is kept.
+    """
     operator = solution.operator
-    steps = recovered_gradient_difference(operator.space, dual)
+    steps = operator.gradient_steps(dual) if keep else recovered_gradient_difference(operator.space, dual)
     local = np.einsum("mij,mij->m", solution.gradient_difference, steps) / 4.0
     local *= operator.coefficients.diffusion * operator.mesh.volumes
     return np.asarray(local)
 
 
-def weigh_residual(solution: QuadraticSolution, dual: NumberArray, value: Number) -> ReadingError:
+def weigh_residual(
+    solution: QuadraticSolution, dual: NumberArray, value: Number, *, keep: bool = False
+) -> ReadingError:
     """The error of a linear function of the fluence by its dual solution (size,); `value` is that of the function.
 
-    That of the light that volume sources are made by contributes too.
+    That of the light that volume sources are made by contributes too. `keep` is as for `local_residual`.
     """
-    local = local_residual(solution, dual)
+    local = local_residual(solution, dual, keep=keep)
     sources = solution.volume_sources
     if sources:
-        local = local + sources[0].field.local_residual([source.light for source in sources], dual)
+        local = local + sources[0].field.local_residual([source.light for source in sources], dual, keep=keep)
     rays = BEAM_RELATIVE_ERROR * abs(solution.broad_beams @ dual)
     squares = (RANDOM_SCALE * np.abs(local)) ** 2
     return ReadingError(value, squares, RANDOM_SCALE * CORRELATED_WEIGHT * local.sum().item(), float(rays))
@@ -71,7 +76,7 @@ def read_with_error(solution: QuadraticSolution, measurement: Measurement) -> Re
     operator = solution.operator
     dual, discrete = operator.duals([measurement])[0], operator.discretise(measurement)
     value = solution.read(discrete, dual)
-    found = weigh_residual(solution, dual, value)
+    found = weigh_residual(solution, dual, value, keep=True)
     if not measurement.inside:
         # Along the normal the relative change of the fluence over the extrapolation length is 1.
         robin = boundary_condition_of(operator.coefficients.outer).robin

@@ -16,6 +16,7 @@ from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
 from tetlux.fem.quadratic.assembly import assemble, element_matrices, matrix_of
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
+from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.space import QuadraticSpace, quadratic_space
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
@@ -33,6 +34,7 @@ COLUMNS_PER_GROUP = 4
 EXPECTED_RIGHT_HAND_SIDES = 10
 # Memory for dual solutions that are kept for measurements that come again; the oldest are dropped.
 BYTES_OF_KEPT_DUALS = 2**28
+BYTES_OF_KEPT_STEPS = 2**28
 # Names of what solves.
 SOLVING = ("_product", "_precondition")
 
@@ -59,10 +61,27 @@ class QuadraticOperator:
     coefficients: Coefficients
     steady: "QuadraticOperator | None" = None
     _duals: dict[Measurement, NumberArray] = field(default_factory=dict)
+    # By the identity of a dual: this dual, and what `gradient_steps` gives of it.
+    _steps: dict[int, tuple[NumberArray, NumberArray]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:
         """What solves cannot be pickled, and is made anew when it is needed."""
-        return {name: value for name, value in vars(self).items() if name not in SOLVING}
+        return {name: value for name, value in vars(self).items() if name not in SOLVING} | {"_steps": {}}
+
+    def gradient_steps(self, dual: NumberArray) -> NumberArray:
+        """`recovered_gradient_difference` of a dual solution (size,), (m, 4, 3), in single precision.
+
+        Those that were used last are kept: the scenes of one system are read by the same detectors.
+        """
+        kept = self._steps.pop(id(dual), None)
+        if kept is None:
+            steps = recovered_gradient_difference(self.space, dual)
+            kept = dual, steps.astype(np.complex64 if np.iscomplexobj(steps) else np.float32)
+        self._steps[id(dual)] = kept
+        most = max(1, BYTES_OF_KEPT_STEPS // kept[1].nbytes)
+        for oldest in list(self._steps)[: max(len(self._steps) - most, 0)]:
+            self._steps.pop(oldest, None)
+        return kept[1]
 
     def release(self) -> None:
         """Drop the matrices, which are made anew when they are needed."""

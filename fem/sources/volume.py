@@ -9,7 +9,7 @@ from tetlux.meshing.arrays import FloatArray, NumberArray
 class SourceField(Protocol):
     """The light that several volume sources on one mesh are made by."""
 
-    def local_residual(self, lights: Sequence[int], dual: NumberArray) -> NumberArray:
+    def local_residual(self, lights: Sequence[int], dual: NumberArray, *, keep: bool) -> NumberArray:
         """What errors of that light contribute to an integral of the emitted light.
 
         Parameters
@@ -18,6 +18,8 @@ class SourceField(Protocol):
             The lights of the sources, `VolumeSource.light`.
         dual : (size,) ndarray
             The dual solution of the integral, in quadratic elements.
+        keep : bool
+            Whether it will come again, so that what is solved for it is kept.
 
         Returns
         -------

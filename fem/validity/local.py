@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,9 @@ from tetlux.fem.validity.tables import far_error, thin_error, wide_error
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
+
+# What is below the facets, by the coefficients of a mesh.
+_UNDER_FACETS: WeakKeyDictionary[Coefficients, tuple[LocalMedia, FloatArray]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +104,12 @@ class Validity:
 
     @cached_property
     def _under_facets(self) -> tuple[LocalMedia, FloatArray]:
-        return media_under_facets(self.mesh, self.coefficients)
+        if self.coefficients.uniform:
+            return media_under_facets(self.mesh, self.coefficients)
+        # Scenes of one system share its coefficients, which are arrays of its mesh.
+        if self.coefficients not in _UNDER_FACETS:
+            _UNDER_FACETS[self.coefficients] = media_under_facets(self.mesh, self.coefficients)
+        return _UNDER_FACETS[self.coefficients]
 
     @property
     def below(self) -> LocalMedia:

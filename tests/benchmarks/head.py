@@ -4,6 +4,11 @@ An ellipsoid of five shells (scalp, skull, a clear layer, grey and white matter)
 pad, at two wavelengths. Every detector within 40 mm of a source reads it to 2 %, so that each of the 48 scenes has
 detectors of its own. From surfaces to readings, the mesher included; nothing is remembered. `--truth` solves once more
 with a tolerance of .005, and compares.
+
+The mesher is what takes longest: more than 110 s of CPU, for the clear layer of 2 mm. With twice the deviation, half of
+the thickness of a layer (`DEVIATION_OF_THICKNESS`), it took 56 s, for 8,100 nodes; on that mesh two of the sources at
+both wavelengths took 22 s of CPU on a busy machine, with 9,400 nodes and bars of .5 % at most for 30 readings 14 to
+36 mm away (all pairs within 40 mm are 214 a wavelength).
 """
 
 import argparse

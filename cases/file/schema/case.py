@@ -276,7 +276,9 @@ class CaseSpec(Section):
                 self.model, {"modulation": self.modulation, "fluorescence": self.fluorescence, **fields}
             )
         elif "film" in self.outputs:
-            raise PydanticCustomError("pulse", "a film shows a pulse; add pulse, or leave film out of outputs")
+            raise PydanticCustomError(
+                "pulse", "a film shows a pulse; add pulse, or leave film out of outputs", {"key": "outputs"}
+            )
         return self
 
     @model_validator(mode="after")
