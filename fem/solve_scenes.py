@@ -208,7 +208,7 @@ def detectors_by_scene(
     InputError
         If there are lists of them, and not one for each scene.
     """
-    if not detectors or not isinstance(detectors[0], Sequence):
+    if not detectors or isinstance(detectors[0], str) or not isinstance(detectors[0], Sequence):
         return [detectors] * scenes  # type: ignore[list-item]
     if len(detectors) != scenes or not all(isinstance(some, Sequence) for some in detectors):
         raise InputError(
