@@ -126,9 +126,7 @@ def unknowns_of(names: Sequence[str], start: Medium | Mapping[str, Any], regions
             )
     for name, value in zip(found.names, found.start.tolist(), strict=True):
         if not value > 0:
-            raise InputError(
-                f"{name} begins at {value:g}; unknowns are greater than 0, and so is their start.", field="start"
-            )
+            raise InputError(f"{name} begins at {value:g}; begin with a value greater than 0.", field="start")
     return found
 
 
