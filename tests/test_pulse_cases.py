@@ -41,8 +41,9 @@ def test_readings_over_time_are_those_of_the_series(finished: Path) -> None:
     for (name, time), exitance in expected.items():
         for channel, power in (("1", 1.0), ("2", 2.0)):
             row = rows[name, channel, time]
-            assert float(row["exitance [W/mm² per J]"]) == pytest.approx(power * exitance, rel=0.01)
-            assert float(row["relative_error"]) < 0.02
+            bar = float(row["relative_error"])
+            assert float(row["exitance [W/mm² per J]"]) == pytest.approx(power * exitance, rel=min(0.01, 2.0 * bar))
+            assert bar < 0.05
             if name == "side":
                 assert row["power [W per J]"] == ""
             else:
