@@ -116,7 +116,7 @@ def _in_regions(
 def _with_imbalance(solution: ChargeSolution) -> ChargeSolution:
     """The solution with an estimate that is not below the power that its ledger lacks, relative to what exits.
 
-    What charges violate of the conditions between regions adds or takes power. Ten random bodies with a dark ball below
+    What charges violate of the conditions between regions adds or takes power. Eight random bodies with a dark ball below
     the light: residuals alone said 1.3 to 4.6 times less than the true error, what is lacking 1.0 to 1.5 times more.
     """
     power = solution.power
