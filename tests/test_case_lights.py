@@ -200,7 +200,7 @@ WRONG = [
     (
         "emission: {density: 1, region: sgone}",
         REGION,
-        r'line 5: lights\[0\]: there is no region "sgone"; the regions here are body, core',
+        r'line 5: lights\[0\]\.emission\.region: there is no region "sgone"; the regions here are body, core',
     ),
     ("environment: {file: slide.png, brightest: 0}", "", r"lights\[0\]\.environment\.brightest: brightest is 0"),
     ("emission: {density: -1}", "", r"lights\[0\]\.emission\.density: density is -1"),

@@ -163,4 +163,4 @@ def test_what_does_not_go_with_a_mesh(path: Path, text: str, words: str) -> None
 
 def test_regions_of_emission_are_labels(path: Path) -> None:
     text = LABELLED + "lights: [{emission: {density: 1, region: brain}}]\n"
-    refused(path, text, r'lights\[0\]: there is no region "brain"; the regions here are .*skin')
+    refused(path, text, r'lights\[0\]\.emission\.region: there is no region "brain"; the regions here are .*skin')

@@ -73,7 +73,7 @@ def test_every_alias_can_be_met() -> None:
         ("surface", "geometry", 'geometry: unknown key; did you mean "surface"?'),
         ("lights", "sources", 'sources: unknown key; did you mean "lights"?'),
         ("surface:", "outputs: [png]\nsurface:", "outputs[0]: did you mean \"picture\"? expected 'surface', "
-         "'volume', 'picture', 'viewer' or 'film', but found 'png'."),
+         "'volume', 'picture', 'viewer', 'figures', 'glb', 'mitsuba' or 'film', but found 'png'."),
         ("surface:", "unit: inches\nsurface:", "unit: did you mean \"in\"? expected"),
         ("surface:", "unit: leagues\nsurface:", "but found 'leagues'."),
         ("{sphere: {radius: 10}}", "bunny.stl", "but found 'bunny.stl'; write surface: {file: bunny.stl}."),

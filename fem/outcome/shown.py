@@ -170,8 +170,8 @@ def _surface_of(solution: _Any) -> _Any:
     exitance = solution.exitance_on(surface.points)
     block = pyvista.PolyData.from_regular_faces(surface.points, np.asarray(surface.faces, dtype=int))
     block.point_data["exitance"] = modulus(exitance)
-    if getattr(solution, "validity", None) is not None:
-        block.point_data["valid"] = solution.valid_on(surface.points)
+    if (validity := getattr(solution, "validity", None)) is not None:
+        block.point_data["valid"] = validity.at(surface.points)
     if np.iscomplexobj(exitance):
         block.point_data["phase"] = lag(exitance)
     block.set_active_scalars("exitance")
