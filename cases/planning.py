@@ -4,7 +4,6 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
-from tetlux.fem.assessment import Tolerances
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.request import MODULATED, Request, make_request
@@ -61,12 +60,7 @@ def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
         [channel.media for channel in case.channels],
         [list(channel.lights.values()) for channel in case.channels],
         regions=case.regions,
-        tolerances=Tolerances(
-            case.tolerance,
-            case.detector_tolerance,
-            everywhere=case.everywhere_tolerance,
-            volume=case.volume_tolerance,
-        ),
+        tolerances=case.tolerances,
         detectors=[entry.detector for entry in case.detectors],
         need_of_mesh=need,
         runs=runs,

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from tetlux.cases.file.case import Case
 from tetlux.cases.planning import AUTO, request_of
-from tetlux.fem.assessment import Tolerances
 from tetlux.fem.dyes.solve import solve_pairs
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
@@ -117,12 +116,7 @@ def _solve_dyes(case: Case, report: Report, *, cache: bool) -> list[Solution]:
         [list(channel.lights.values()) for channel in case.excitations],
         case.fluorophores,
         regions=case.regions,
-        tolerances=Tolerances(
-            case.tolerance,
-            case.detector_tolerance,
-            everywhere=case.everywhere_tolerance,
-            volume=case.volume_tolerance,
-        ),
+        tolerances=case.tolerances,
         detectors=[entry.detector for entry in case.detectors],
         mesh=case.mesh,
         frequency=[channel.frequency for channel in case.excitations],

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from tetlux.cases.file.detectors import NamedDetector
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.picture.view import UPRIGHT
+from tetlux.fem.assessment import Tolerances
 from tetlux.fem.lights import Light
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.media.fluorophore import Fluorophore
@@ -123,6 +124,16 @@ class Case:
     mesh: TetMesh | None = None
     plan: Plan | None = None
     fluorophores: tuple[Fluorophore, ...] = ()
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """All tolerances, as what a mesh is refined for."""
+        return Tolerances(
+            self.tolerance,
+            self.detector_tolerance,
+            everywhere=self.everywhere_tolerance,
+            volume=self.volume_tolerance,
+        )
 
     @property
     def excitations(self) -> tuple[Channel, ...]:

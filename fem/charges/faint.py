@@ -52,13 +52,11 @@ def fit_with_faint(
     Returns
     -------
     FittedCharges
-        Of those within the tolerance, the fit that is below zero on the least share of the surface.
+        Of those within the tolerance, the fit that is below zero on the least share of the surface. Modulated light has
+        either sign: no share of it counts as below zero.
     """
     best = fit_charges(surface, equation, lights, tolerance=tolerance, most=most)
     if best.errors.estimate > tolerance or len(lights.points) == 0 or np.any(lights.boundary_source):
-        return best
-    if np.imag(equation.wave_number) != 0.0:
-        # Modulated light has either sign.
         return best
     distance = distance_from(surface, lights.points)
     fading = float(np.real(equation.wave_number))
