@@ -85,7 +85,7 @@ class QuadraticOperator:
 
     def release(self) -> None:
         """Drop the matrices, which are made anew when they are needed."""
-        for name in ("elements", "matrix", *SOLVING):
+        for name in ("matrix", *SOLVING):
             vars(self).pop(name, None)
 
     @cached_property
@@ -94,28 +94,17 @@ class QuadraticOperator:
         return quadratic_space(self.mesh, self.surface, self.inner)
 
     @cached_property
-    def elements(self) -> NumberArray:
-        """The matrices of tetrahedra, (m, 10, 10)."""
-        if self.steady is not None:
-            return self.steady.elements + self.coefficients.shift * self.steady.mass_elements
-        return element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
-
-    @cached_property
-    def mass_elements(self) -> NumberArray:
-        """Integrals of products of shape functions over tetrahedra, (m, 10, 10)."""
-        return element_matrices(self.space, 0.0, 1.0)
-
-    @cached_property
     def mass(self) -> csr_array:
         """The mass matrix, (size, size)."""
-        return assemble(self.space, self.mass_elements)
+        return assemble(self.space, element_matrices(self.space, 0.0, 1.0))
 
     @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size); complex for modulated light."""
         if self.steady is not None:
             return csr_array(self.steady.matrix + self.coefficients.shift * self.steady.mass)
-        return matrix_of(self.space, self.coefficients, self.elements)
+        elements = element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
+        return matrix_of(self.space, self.coefficients, elements)
 
     @cached_property
     def _product(self) -> Product:
