@@ -11,8 +11,7 @@ import numpy as np
 
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.known.patch import Patch
-from tetlux.fem.media.coefficients import at_cells
-from tetlux.fem.quadratic.assembly import element_matrices, face_matrices
+from tetlux.fem.quadratic.assembly import face_matrices
 from tetlux.fem.quadratic.loads import point_load
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.patch_faces import Field, InnerFaces, integrate_over_faces
@@ -136,11 +135,9 @@ def _product(operator: QuadraticOperator, patch: Patch, function: NumberArray) -
     around = np.flatnonzero(_touch(within, space.cells) & ~cells)
     faces = space.boundary_faces[~cells[space.mesh.boundary_cells]]
     faces = faces[_touch(within, faces)]
-    coefficients = operator.coefficients
-    diffusion, sigma = (at_cells(value, around) for value in (coefficients.diffusion, coefficients.sigma))
     product = operator.matrix @ values
     for matrices, dofs in (
-        (element_matrices(space, diffusion, sigma, around), space.cells[around]),
+        (operator.elements_of(around), space.cells[around]),
         (operator.robin * face_matrices(space, faces), faces),
     ):
         product -= sum_by_index(dofs, np.einsum("cab,cb->ca", matrices, values[dofs]), space.size)

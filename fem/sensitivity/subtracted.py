@@ -6,7 +6,7 @@ and strengths of charges are differentiated by central differences, their fields
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -21,16 +21,16 @@ from tetlux.fem.known.split import SplitLights, Subtract, split_lights
 from tetlux.fem.media.coefficients import AnyMedium, at_cells, by_label
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.quadratic.assembly import element_matrices
 from tetlux.fem.quadratic.loads import line_load, point_load, quadratic_load
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
 from tetlux.fem.quadratic.patches import QuadraticPatch, field_load, interpolant_of
 from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.quadratic.solution import QuadraticSolution
+from tetlux.fem.sensitivity.products import multiply_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
-from tetlux.meshing.arrays import Number, NumberArray, sum_by_index
+from tetlux.meshing.arrays import Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 
@@ -41,6 +41,8 @@ STEP = 2e-3
 SHORTER, SHORTENINGS = 0.1, 3
 # Weights of the values one and two steps to each side (Fornberg 1988).
 WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
+# Changes of strengths that differ by less than this share of the largest one are the same.
+SAME = 1e-9
 
 
 def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
@@ -97,6 +99,8 @@ class Readout:
     scene: QuadraticScene
     measurements: Sequence[DiscreteMeasurement]
     duals: NumberArray
+    # Of each label, see `_multiply`.
+    _products: dict[int, dict[QuadraticPatch, tuple[NumberArray, NumberArray]]] = field(default_factory=dict)
 
     def readings(self) -> NumberArray:
         """What each detector reads of each light, (l, d), W/unit²."""
@@ -120,12 +124,18 @@ class Readout:
             # Where nothing is absorbed a charge has no derivative, while readings do: that of the mesh is left.
             return found
         nearby = self._nearby(label, coefficient, step)
+        if label not in self._products:
+            self._products[label] = self._multiply(label)
+        of_matrix = self._products[label]
 
         def work(light: int) -> None:
             found[light] = self._of_load(nearby, light)
             for number, known in enumerate(self.scene.patches[light]):
                 charges = [_charges_of(each.split, light)[number] for each in nearby]
                 found[light] += self._of_charges(known, nearby, charges, label, coefficient)
+                if known in of_matrix:
+                    mass, stiffness = of_matrix[known]
+                    found[light] += mass - stiffness if coefficient == "sigma_a" else -stiffness
 
         map_in_threads(work, range(len(self.lights)))
         return found
@@ -189,38 +199,46 @@ class Readout:
             points = [(each.positions[: each.sources], each.strengths[: each.sources].real) for each in charges]
             loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
             return np.asarray(np.sum(loads, axis=0) @ self.duals)
-        inside = patch.charges.region is None or patch.charges.region == label
-        field = _differentiate(patch.charges, charges, weights, coefficient if inside else None)
-        value = np.zeros(len(self.measurements), self.scene.fluence.dtype)
-        if inside:
-            value = value + self._of_matrix(known, coefficient)
-        if field is None:
-            return value
+        own = coefficient if _is_in(patch, label) else None
+        derived = _differentiate(patch.charges, charges, weights, own)
+        change = 0.0 if derived is None else _power_change(derived)
+        if own is None and change is not None:
+            value = known.load @ self.duals
+            value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
+            return np.asarray(change * value)
         nodes = np.unique(self.system.mesh.tetrahedra[patch.cells])
-        at_nodes = np.zeros(len(self.system.mesh.points), value.dtype)
-        at_nodes[nodes] = field.fluence(self.system.mesh.points[nodes])
-        interpolant = interpolant_of(operator.space, patch, field, at_nodes)
+        at_nodes = np.zeros(len(self.system.mesh.points), patch.charges.equation.dtype)
+        at_nodes[nodes] = derived.fluence(self.system.mesh.points[nodes])
+        interpolant = interpolant_of(operator.space, patch, derived, at_nodes)
         diffusion = patch.charges.equation.diffusion
-        of_potential = diffusion * interpolant + field.diffusion * known.interpolant
-        load = field_load(operator, patch, field, interpolant, of_potential, self.scene.inner_faces)
-        missing = [_read_missing(patch, field, interpolant, each) for each in self.measurements]
-        return np.asarray(value + missing + load @ self.duals)
+        of_potential = diffusion * interpolant + derived.diffusion * known.interpolant
+        load = field_load(operator, patch, derived, interpolant, of_potential, self.scene.inner_faces)
+        missing = [_read_missing(patch, derived, interpolant, each) for each in self.measurements]
+        return np.asarray(missing + load @ self.duals)
 
-    def _of_matrix(self, known: QuadraticPatch, coefficient: Coefficient) -> NumberArray:
-        """Derivative of ``z.A I G`` by the matrix of the tetrahedra of a patch, (d,)."""
-        space, inside = self.scene.operator.space, np.flatnonzero(known.patch.cells)
-        # The derivative of D to sigma_t'.
-        diffusion = -3.0 * np.square(at_cells(self.scene.operator.coefficients.diffusion, inside))
-        sigma = 1.0 if coefficient == "sigma_a" else 0.0
-        dofs = space.cells[inside]
-        values = element_matrices(space, diffusion, sigma, inside) @ known.interpolant[dofs][..., None]
-        return np.asarray(sum_by_index(dofs, values[..., 0], space.size) @ self.duals)
+    def _multiply(self, label: int) -> dict[QuadraticPatch, tuple[NumberArray, NumberArray]]:
+        """Products of the interpolants of charges in a medium with the duals on their patches, two (d,) for each."""
+        patches = [each for own in self.scene.patches for each in own if _is_in(each.patch, label)]
+        patches = [each for each in patches if each.patch.cells.any()]
+        if not patches:
+            return {}
+        operator = self.scene.operator
+        functions = np.column_stack([each.interpolant for each in patches])
+        within = np.column_stack([each.patch.cells for each in patches])
+        factors = np.broadcast_to(3.0 * np.square(operator.coefficients.diffusion), len(within))
+        products = multiply_on(operator.space, functions, within, self.duals, factors)
+        return dict(zip(patches, zip(*products, strict=True), strict=True))
 
     __repr__ = one_line
 
 
+def _is_in(patch: Patch, label: int) -> bool:
+    """Whether the charges of a patch are those of a medium."""
+    return patch.charges.region is None or patch.charges.region == label
+
+
 def _read_missing(
-    patch: Patch, field: ChargeDerivative, interpolant: NumberArray, discrete: DiscreteMeasurement
+    patch: Patch, field: Charges | ChargeDerivative, interpolant: NumberArray, discrete: DiscreteMeasurement
 ) -> Number:
     """What a detector reads of a field on a patch less its interpolant (size,)."""
     inside = np.flatnonzero(patch.cells[discrete.cells])
@@ -259,6 +277,14 @@ def _differentiate(
     if coefficient == "sigma_a":
         of_wave_number += 0.5 / (k * diffusion)
     return ChargeDerivative(known, positions, strengths, of_wave_number, of_diffusion, closest)
+
+
+def _power_change(derivative: ChargeDerivative) -> float | None:
+    """The relative change of power where nothing else of charges changes; None if anything does."""
+    known, strengths = derivative.charges.strengths, derivative.strengths
+    change = float((strengths[0] / known[0]).real)
+    same = np.allclose(strengths, change * known, rtol=0.0, atol=SAME * abs(change * known).max())
+    return change if same and not derivative.positions.any() else None
 
 
 def _are_same(one: Charges, other: Charges) -> bool:
