@@ -41,8 +41,8 @@ STEP = 2e-3
 SHORTER, SHORTENINGS = 0.1, 3
 # Weights of the values one and two steps to each side (Fornberg 1988).
 WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
-# Changes of strengths that differ by less than this share of the largest one are the same.
-SAME = 1e-9
+# Positions and strengths that differ by less than this share are the same.
+SAME = 1e-13
 
 
 def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
@@ -200,12 +200,11 @@ class Readout:
             loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
             return np.asarray(np.sum(loads, axis=0) @ self.duals)
         own = coefficient if _is_in(patch, label) else None
-        derived = _differentiate(patch.charges, charges, weights, own)
-        change = 0.0 if derived is None else _power_change(derived)
-        if own is None and change is not None:
+        if own is None and (change := _power_change(patch.charges, charges, weights)) is not None:
             value = known.load @ self.duals
             value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
             return np.asarray(change * value)
+        derived = _differentiate(patch.charges, charges, weights, own)
         nodes = np.unique(self.system.mesh.tetrahedra[patch.cells])
         at_nodes = np.zeros(len(self.system.mesh.points), patch.charges.equation.dtype)
         at_nodes[nodes] = derived.fluence(self.system.mesh.points[nodes])
@@ -260,10 +259,8 @@ def _every_charges(split: SplitLights) -> list[Charges]:
 
 def _differentiate(
     known: Charges, nearby: Sequence[Charges], weights: Sequence[float], coefficient: Coefficient | None
-) -> ChargeDerivative | None:
-    """The derivative of charges to a coefficient of their medium, or to another if it is None; None if it is 0."""
-    if coefficient is None and all(_are_same(nearby[0], each) for each in nearby):
-        return None
+) -> ChargeDerivative:
+    """The derivative of charges to a coefficient of their medium, or to one of another medium if it is None."""
     positions, strengths, closest = (
         sum(weight * getattr(each, name) for weight, each in zip(weights, nearby, strict=True))
         for name in ("positions", "strengths", "closest")
@@ -279,13 +276,15 @@ def _differentiate(
     return ChargeDerivative(known, positions, strengths, of_wave_number, of_diffusion, closest)
 
 
-def _power_change(derivative: ChargeDerivative) -> float | None:
-    """The relative change of power where nothing else of charges changes; None if anything does."""
-    known, strengths = derivative.charges.strengths, derivative.strengths
-    change = float((strengths[0] / known[0]).real)
-    same = np.allclose(strengths, change * known, rtol=0.0, atol=SAME * abs(change * known).max())
-    return change if same and not derivative.positions.any() else None
-
-
-def _are_same(one: Charges, other: Charges) -> bool:
-    return np.array_equal(one.positions, other.positions) and np.array_equal(one.strengths, other.strengths)
+def _power_change(known: Charges, nearby: Sequence[Charges], weights: Sequence[float]) -> float | None:
+    """The relative derivative of power where nothing else of charges changes; None if anything does."""
+    change = 0.0
+    for weight, each in zip(weights, nearby, strict=True):
+        power = (each.strengths[0] / known.strengths[0]).item()
+        change += weight * power
+        if not (
+            np.allclose(each.positions, known.positions, rtol=SAME, atol=0.0)
+            and np.allclose(each.strengths, power * known.strengths, rtol=SAME, atol=0.0)
+        ):
+            return None
+    return change
