@@ -189,6 +189,7 @@ def _add_helpers(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that help to write cases and to report trouble."""
     new = commands.add_parser("new", help="write a commented case file to start from")
     new.add_argument("name", metavar="NAME", help="name of the case: NAME.yaml is written")
+    new.add_argument("surface", nargs="?", metavar="SURFACE", help="a surface file, which becomes the body")
     new.set_defaults(command=does.new)
 
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")

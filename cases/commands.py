@@ -136,7 +136,7 @@ def new(options: argparse.Namespace) -> int:
     """Write a commented case file."""
     from tetlux.cases.new import write_new_case  # noqa: PLC0415
 
-    path = write_new_case(options.name)
+    path = write_new_case(options.name, options.surface)
     print(f"wrote {path}; change it, then: tetlux run {path}")
     return 0
 
