@@ -158,7 +158,8 @@ def canvas_of(scene: PictureScene, *, turning: bool = False) -> Canvas:
         stage = replace(stage, camera=_fixed(stage.camera, scene.points))
     scale = scene.scale or scale_of(scene.exitance, "exitance", f"W/{scene.unit}²")
     extent = np.ptp(scene.points, axis=0)
-    marks = project_marks(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
+    diagonal = float(np.linalg.norm(extent))
+    marks = project_marks(stage.camera, stage.corners, scene.regions, scene.detectors, scene.lights, diagonal)
     return draw_frame(
         draw_stage(stage),
         stage.camera,
