@@ -184,6 +184,14 @@ def _add_inspections(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     compare.set_defaults(command=does.compare)
 
+    film = commands.add_parser("film", help="show finished runs one after the other, such as those of a sweep")
+    film.add_argument("results", nargs="+", type=Path, metavar="RESULT", help="the folder of a run, or that of a sweep")
+    film.add_argument("--field", default="exitance", help="an array of surface.ply; default: exitance")
+    film.add_argument(
+        "--out", type=Path, default=Path("film.gif"), metavar="FILE", help="a .gif or .webp; default: film.gif"
+    )
+    film.set_defaults(command=does.film)
+
 
 def _add_helpers(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that help to write cases and to report trouble."""

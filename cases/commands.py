@@ -132,6 +132,15 @@ def compare(options: argparse.Namespace) -> int:
     return 0
 
 
+def film(options: argparse.Namespace) -> int:
+    """Show finished runs one after the other."""
+    from tetlux.cases.results.film import film_results  # noqa: PLC0415
+
+    count = film_results(options.results, options.out, options.field)
+    print(f"{count} runs, written to {options.out}")
+    return 0
+
+
 def new(options: argparse.Namespace) -> int:
     """Write a commented case file."""
     from tetlux.cases.new import write_new_case  # noqa: PLC0415
