@@ -44,7 +44,8 @@ MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
-FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
+FIGURES = ("figures.svg", "figures.pdf", "figures.png")
+MITSUBA = ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
