@@ -172,7 +172,7 @@ def _write(
     if "volume" in case.outputs:
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
     readings = read_detectors(case.detectors, results.by_channel_and_light())
-    _draw(results, readings, folder)
+    _draw(results, readings, folder, pulse)
     if pulse is not None:
         pulse.write(readings, folder)
     if readings:
@@ -241,7 +241,7 @@ def _write_surface(results: Results, folder: Path, more: dict[str, FloatArray]) 
     write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
 
 
-def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+def _draw(results: Results, readings: list[dict[str, Any]], folder: Path, pulse: PulseResults | None) -> None:
     """Draw pictures and figures, and write the viewer and what renderers read."""
     outputs = set(results.case.outputs)
     if "figures" in outputs:
@@ -258,7 +258,7 @@ def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> Non
     if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
-        write_viewer(results, readings, scene, folder / FILES["viewer"])
+        write_viewer(results, readings, scene, folder / FILES["viewer"], pulse)
     if outputs & {"glb", "mitsuba"}:
         from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
 
