@@ -333,9 +333,9 @@ def test_a_slider_goes_through_light_in_time(browser: Any, folder: Path, tmp_pat
         for time, each in zip((5e-11, 1.2e-9), values, strict=True)
     ]
     text = json.dumps({**data, "inTime": moments}).replace("<", "\\u003c")
-    before, _, rest = html.partition('<script type="application/json" id="data">')
+    before, opening, rest = html.partition('<script type="application/json" id="data">')
     path = tmp_path / "pulse.html"
-    path.write_text(f'{before}<script type="application/json" id="data">{text}</script>{rest.partition("</script>")[2]}')
+    path.write_text(f"{before}{opening}{text}</script>{rest.partition('</script>')[2]}")
     shown = Page(browser, path, SMALL)
     assert not shown.page.is_visible("#moment")
     early = shown.change("quantity: 'pulse', lights: false, detectors: false, regions: false")
