@@ -134,8 +134,7 @@ def _in_time(pulse: PulseResults | None, unit: str) -> dict[str, Any]:
         return {}
     some = pulse.some(max(2, MOST_IN_TIME // pulse.exitance.shape[1]))
     fields = [
-        {**_field(Field("pulse", values, f"W/{unit}²/J")), "ends": pulse.ends(), "time": time}
-        for time, values in some
+        {**_field(Field("pulse", values, f"W/{unit}²/J")), "ends": pulse.ends(), "time": time} for time, values in some
     ]
     return {"inTime": fields}
 
