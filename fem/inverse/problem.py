@@ -116,7 +116,7 @@ class FitProblem:
 
     def _system(self, media: Sequence[Medium]) -> System:
         regions = tuple(replace(region, medium=medium) for region, medium in zip(self.regions, media[1:], strict=True))
-        shift = 0.0
+        shift: complex = 0.0
         if self.frequency:
             shift = shift_of_frequency(self.frequency, media[0], self.surface.unit, self.outside_index)
         return System(self.mesh, media[0], self.surface, regions=regions, shift=shift)

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.fem.inverse.unknowns import FRACTIONS, GAIN, Start, TissueUnknowns, Unknowns, split_name, unknowns_of
+from tetlux.fem.inverse.unknowns import FRACTIONS, HAEMOGLOBIN, Start, TissueUnknowns, Unknowns, unknowns_of
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
+from tetlux.fem.media.tissue import MOST_HAEMOGLOBIN
 from tetlux.fem.outcome.reading import Reading
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
@@ -17,7 +18,7 @@ from tetlux.meshing.errors import InputError
 
 # Unknowns end within this factor of their start.
 WIDEST = 1e3
-# Fractions of the volume may fill so much of it, so that steps of differences stay below 1.
+# Amounts reach this share of the most that `tissue` takes, so that steps of differences stay below it.
 FULL = 0.999
 
 Readings = npt.ArrayLike | Sequence[Reading] | Sequence[Sequence[Reading]]
@@ -63,6 +64,7 @@ def make_request(
     noise: npt.ArrayLike | None = None,
     bounds: Bounds | None = None,
     frequency: float = 0.0,
+    region_names: Sequence[str] = (),
 ) -> FitRequest:
     """Check what `tetlux.fem.fit` is given, of a body in a unit of length and a number of lights and detectors.
 
@@ -71,7 +73,7 @@ def make_request(
     InputError
         If an argument is not sensible, or there are more unknowns than readings.
     """
-    wanted = unknowns_of(unknowns, _with_unit(start, unit), regions)
+    wanted = unknowns_of(unknowns, _with_unit(start, unit), regions, region_names)
     measured = _measured(readings, len(wanted.media(wanted.start)), lights, detectors)
     if np.iscomplexobj(measured) != bool(frequency):
         kind = "complex readings, with their phases" if frequency else "real readings, or a frequency"
@@ -122,22 +124,21 @@ def _bounds(unknowns: Unknowns, given: Bounds) -> FloatArray:
                 field="bounds",
             )
         bounds[number] = low, high
-    _limit_fractions(unknowns, bounds)
+    _limit_amounts(unknowns, bounds)
     return bounds
 
 
-def _limit_fractions(unknowns: Unknowns, bounds: FloatArray) -> None:
-    """Limit fractions of the volume in place, so that those of a part never add up to more than 1."""
+def _limit_amounts(unknowns: Unknowns, bounds: FloatArray) -> None:
+    """Limit amounts in place to those that `tissue` takes: fractions of a part never add up to more than 1."""
     if not isinstance(unknowns, TissueUnknowns):
         return
     for number, part in enumerate(unknowns.parts):
         if isinstance(part, tuple):
             continue
-        rows = [
-            row
-            for row, name in enumerate(unknowns.names)
-            if name != GAIN and split_name(name)[0] == number and split_name(name)[1] in FRACTIONS
-        ]
+        places = list(enumerate(unknowns.places))
+        rows = [row for row, (owner, quantity) in places if owner == number and quantity in FRACTIONS]
+        for row in [row for row, (_, quantity) in places if quantity in HAEMOGLOBIN]:
+            bounds[row, 1] = min(bounds[row, 1], FULL * MOST_HAEMOGLOBIN)
         room = FULL - _filled(part)
         for row in rows:
             bounds[row, 1] = min(bounds[row, 1], unknowns.start[row] + max(room, 0.0) / len(rows))

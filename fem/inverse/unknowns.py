@@ -15,6 +15,7 @@ from tetlux.meshing.errors import InputError
 
 COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 OF_TISSUE = ("hbo2", "hhb", "water", "fat", "a", "b")
+HAEMOGLOBIN = ("hbo2", "hhb")
 # Those that are shares of the volume.
 FRACTIONS = ("water", "fat")
 # The unknown factor of all readings.
@@ -45,31 +46,36 @@ class Unknowns(Protocol):
         ...
 
 
+# The number of the part that an unknown is of, 0 for the body, and its quantity.
+Place = tuple[int, str]
+
+
 @dataclass(frozen=True, eq=False)
 class CoefficientUnknowns:
     """Coefficients of the body and of regions, in one channel."""
 
     names: tuple[str, ...]
+    places: tuple[Place, ...]
     given: tuple[Medium, ...]
 
     @property
     def start(self) -> FloatArray:
         """See `Unknowns`."""
-        return np.array([1.0 if name == GAIN else self._at(name) for name in self.names])
+        return np.array([self._at(*place) for place in self.places])
 
     def media(self, values: FloatArray) -> list[list[Medium]]:
         """See `Unknowns`."""
         media = list(self.given)
-        for name, value in zip(self.names, values.tolist(), strict=True):
-            if name != GAIN:
-                number, coefficient = split_name(name)
-                media[number] = _with_coefficient(media[number], coefficient, value)
+        for (number, quantity), value in zip(self.places, values.tolist(), strict=True):
+            if quantity != GAIN:
+                media[number] = _with_coefficient(media[number], quantity, value)
         return [media]
 
-    def _at(self, name: str) -> float:
-        number, coefficient = split_name(name)
+    def _at(self, number: int, quantity: str) -> float:
+        if quantity == GAIN:
+            return 1.0
         medium = self.given[number]
-        return medium.sigma_a if coefficient == "sigma_a" else medium.reduced_scattering
+        return medium.sigma_a if quantity == "sigma_a" else medium.reduced_scattering
 
     __repr__ = one_line
 
@@ -81,24 +87,25 @@ class TissueUnknowns:
     Attributes
     ----------
     names : tuple of str
+    places : tuple of (int, str)
     parts : tuple of mapping or of tuple of Medium
         Of the body and of each region: arguments of `tissue`, or the media at all wavelengths, which are known.
     """
 
     names: tuple[str, ...]
+    places: tuple[Place, ...]
     parts: tuple[Mapping[str, Any] | tuple[Medium, ...], ...]
 
     @property
     def start(self) -> FloatArray:
         """See `Unknowns`."""
-        return np.array([1.0 if name == GAIN else self._at(name) for name in self.names])
+        return np.array([self._at(*place) for place in self.places])
 
     def media(self, values: FloatArray) -> list[list[Medium]]:
         """See `Unknowns`."""
         fitted: list[dict[str, float]] = [{} for _ in self.parts]
-        for name, value in zip(self.names, values.tolist(), strict=True):
-            if name != GAIN:
-                number, quantity = split_name(name)
+        for (number, quantity), value in zip(self.places, values.tolist(), strict=True):
+            if quantity != GAIN:
                 fitted[number][quantity] = value
         by_part = [
             part if isinstance(part, tuple) else tissue(**{**part, **own})
@@ -106,17 +113,18 @@ class TissueUnknowns:
         ]
         return [list(media) for media in zip(*by_part, strict=True)]
 
-    def _at(self, name: str) -> float:
-        number, quantity = split_name(name)
+    def _at(self, number: int, quantity: str) -> float:
         part = self.parts[number]
-        assert not isinstance(part, tuple)
-        return float(part.get(quantity, 0.0))
+        return 1.0 if quantity == GAIN or isinstance(part, tuple) else float(part.get(quantity, 0.0))
 
     __repr__ = one_line
 
 
 def unknowns_of(
-    names: Sequence[str], start: Start | Sequence[Start | Sequence[Medium]], regions: Sequence[Region]
+    names: Sequence[str],
+    start: Start | Sequence[Start | Sequence[Medium]],
+    regions: Sequence[Region],
+    region_names: Sequence[str] = (),
 ) -> Unknowns:
     """The unknowns that names stand for.
 
@@ -126,6 +134,8 @@ def unknowns_of(
     start : Medium, mapping, or sequence of these
         See `tetlux.fem.fit`.
     regions : sequence of Region
+    region_names : sequence of str
+        What stands before the dot in names of unknowns of regions; by default their numbers from 1.
 
     Raises
     ------
@@ -141,23 +151,25 @@ def unknowns_of(
         raise InputError(f'the unknown "{repeated}" is given twice; give each once.', field="unknowns")
     parts = _parts(start, regions)
     of_tissue = [part for part in parts if isinstance(part, Mapping)]
-    known = [
-        f"{number}.{name}" if number else name
+    prefixes = ["", *(f"{name}." for name in region_names or range(1, len(parts)))]
+    known: dict[str, Place] = {
+        f"{prefixes[number]}{quantity}": (number, quantity)
         for number, part in enumerate(parts)
-        for name in _names_of(part, of_tissue=bool(of_tissue))
-    ]
+        for quantity in _quantities_of(part, of_tissue=bool(of_tissue))
+    }
+    known[GAIN] = 0, GAIN
     for name in names:
-        if name not in (*known, GAIN):
-            raise InputError(
-                f'"{name}" is no unknown of this fit; give some of {", ".join([*known, GAIN])}.', field="unknowns"
-            )
+        if name not in known:
+            raise InputError(f'"{name}" is no unknown of this fit; give some of {", ".join(known)}.', field="unknowns")
+    places = tuple(known[name] for name in names)
     found: Unknowns
     if of_tissue:
         channels = _channels(of_tissue)
         each = (part if isinstance(part, Mapping) else _of_channels(part, channels, n) for n, part in enumerate(parts))
-        found = TissueUnknowns(tuple(names), tuple(each))
+        found = TissueUnknowns(tuple(names), places, tuple(each))
     else:
-        found = CoefficientUnknowns(tuple(names), tuple(_only(part, number) for number, part in enumerate(parts)))
+        given = tuple(_only(part, number) for number, part in enumerate(parts))
+        found = CoefficientUnknowns(tuple(names), places, given)
     for name, value in zip(found.names, found.start.tolist(), strict=True):
         if not value > 0:
             raise InputError(f"{name} begins at {value:g}; begin with a value greater than 0.", field="start")
@@ -177,7 +189,7 @@ def _parts(start: Start | Sequence[Start | Sequence[Medium]], regions: Sequence[
     return list(start)
 
 
-def _names_of(part: object, *, of_tissue: bool) -> tuple[str, ...]:
+def _quantities_of(part: object, *, of_tissue: bool) -> tuple[str, ...]:
     if isinstance(part, Mapping):
         return OF_TISSUE
     return () if of_tissue else COEFFICIENTS
@@ -210,12 +222,6 @@ def _coefficients(media: list[list[Medium]]) -> FloatArray:
     return np.array([[[medium.sigma_a, medium.reduced_scattering] for medium in channel] for channel in media])
 
 
-def split_name(name: str) -> tuple[int, str]:
-    """The number of the region that a name is of, 0 for the body, and the quantity."""
-    number, _, quantity = name.rpartition(".")
-    return int(number or 0), quantity
-
-
 def _with_coefficient(medium: Medium, coefficient: str, value: float) -> Medium:
     if coefficient == "sigma_a":
         return replace(medium, sigma_a=value)
@@ -227,7 +233,7 @@ def _with_coefficient(medium: Medium, coefficient: str, value: float) -> Medium:
 def _only(medium: object, number: int) -> Medium:
     if not isinstance(medium, Medium):
         raise InputError(
-            f"{_where(number)} has no single even medium, which a fit begins with; give one Medium.", field="start"
+            f"{_where(number)} has no single even medium, which a fit begins with; give it one.", field="start"
         )
     return medium
 
@@ -236,7 +242,7 @@ def _of_channels(medium: object, channels: int, number: int) -> tuple[Medium, ..
     each = [medium] * channels if isinstance(medium, Medium) else medium
     if not (isinstance(each, Sequence) and len(each) == channels and all(isinstance(one, Medium) for one in each)):
         raise InputError(
-            f"{_where(number)} needs one Medium, or one for each of the {channels} wavelengths.", field="start"
+            f"{_where(number)} needs one even medium, or one for each of the {channels} wavelengths.", field="start"
         )
     return tuple(each)
 
