@@ -66,7 +66,7 @@ def end_of(fibre: FibreDetector) -> FloatArray:
         np.cos(angle)[:, None] * sideways + np.sin(angle)[:, None] * np.array([0.0, 0.0, 1.0])
     )
     points[:, :2] *= (np.hypot(*center[:2]) / np.hypot(points[:, 0], points[:, 1]))[:, None]
-    return points
+    return np.asarray(points)
 
 
 def main() -> None:
