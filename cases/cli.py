@@ -3,6 +3,7 @@
 
 import argparse
 import contextlib
+import functools
 import os
 import re
 import signal
@@ -115,6 +116,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+@functools.cache
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="tetlux", description="Solve light diffusion through bodies of any shape, by tetrahedral finite elements."
