@@ -53,6 +53,8 @@ def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
         need = "compare is of finite elements"
     elif case.fluorophores:
         need = "what dyes emit is solved for on a mesh"
+    elif case.fit is not None:
+        need = "a fit has meshes"
     elif any(case.frequencies):
         need = MODULATED
     return make_request(

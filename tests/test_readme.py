@@ -135,6 +135,8 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("CutSpec", ["picture.cut."]),
         ("FluorescenceSpec", ["fluorescence."]),
         ("DyeSpec", ["fluorescence.dyes[]."]),
+        ("FitSpec", ["fit."]),
+        ("FitReadingsSpec", ["fit.readings."]),
     ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
             for prefix in prefixes:
