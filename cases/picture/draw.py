@@ -24,6 +24,8 @@ __all__ = ["PictureScene", "Ray", "RegionOutline", "draw_picture"]
 # Of a picture, pixels, unless the case gives one; seconds of a turn and of a film.
 SIZE = (PANEL[0] + AROUND[0], PANEL[1] + AROUND[1])
 SECONDS, FILM_SECONDS = 4, 6
+# Pictures smaller than this along one side are drawn twice as large and shrunk, or letters would leave no room.
+SMALL = 640
 # Of one picture of a film, milliseconds, at most.
 SLOWEST = 800
 
@@ -160,6 +162,9 @@ def _write_frames(images: Sequence[PillowImage], durations: list[int], path: Pat
 
 def canvas_of(scene: PictureScene, *, turning: bool = False) -> Canvas:
     """Draw a scene; `turning`: at a scale in which any side of the body fits into the panel."""
+    if min(scene.size) < SMALL:
+        width, height = scene.size
+        return canvas_of(replace(scene, size=(2 * width, 2 * height)), turning=turning).halved()
     stage = scene_stage(scene)
     if turning:
         stage = replace(stage, camera=_fixed(stage.camera, scene.points))
