@@ -27,8 +27,8 @@ def draw_stage(stage: Stage) -> Image:
     body = visible_triangles(placed, samples_of(stage.camera), closed=True)
     owner = _by_pixel(body.owner)
     paint = _paint_of_body(stage, placed)
-    image = np.empty((owner.shape[1], 3))
-    image[:] = stage.background
+    image = np.empty((owner.shape[1], 3), dtype=np.uint8)
+    image[:] = _bytes(np.asarray(stage.background))
     lit: BoolArray = np.zeros(len(image), dtype=bool)
     if len(arrows):
         lit_pixels, arrow = _visible_arrows(arrows, body, (width, height))
@@ -37,16 +37,21 @@ def draw_stage(stage: Stage) -> Image:
     pixels = np.flatnonzero(plain & (owner[0] >= 0))
     row, column = np.divmod(pixels, width)
     middle = 0.5 * OVERSAMPLING
-    image[pixels] = paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle)
+    image[pixels] = _bytes(paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle))
     mixed = np.flatnonzero(~plain & ~lit)
-    image[mixed] = _paint_mixed(stage, paint, owner[:, mixed], mixed)
+    image[mixed] = _bytes(_paint_mixed(stage, paint, owner[:, mixed], mixed))
     if lit.any():
         own = owner[:, lit_pixels]
         under = _paint_samples(paint, own, lit_pixels, _ground(stage, len(lit_pixels)), width)
         over = _paint_samples(_paint_of_arrows(stage, arrows), arrow, lit_pixels, under, width)
         share = np.where(own >= 0, ARROW_OPACITY, 1.0)[:, :, None]
-        image[lit_pixels] = (under + share * (over - under)).mean(axis=0)
-    return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(height, width, 3)
+        image[lit_pixels] = _bytes((under + share * (over - under)).mean(axis=0))
+    return image.reshape(height, width, 3)
+
+
+def _bytes(colours: FloatArray) -> Image:
+    """Colours from 0 to 1 as bytes."""
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
 
 
 def _visible_arrows(arrows: FloatArray, body: Visible, panel: tuple[int, int]) -> tuple[IntArray, IntArray]:
