@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.cases.picture.scale import Scale, scale_of
 from tetlux.cases.picture.view import PANEL, UPRIGHT, Camera, Ray, camera_at, choose_view, unit
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes, sum_by_index
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
@@ -138,15 +138,14 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     The normal at a corner is the mean, weighted by area, over those triangles at its vertex whose normals are within
     40 degrees of that of its own triangle.
     """
-    from scipy.sparse import csr_array  # noqa: PLC0415
-
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat, vertex = unit(weighted), triangles.ravel()
     owner = np.repeat(np.arange(len(triangles)), 3)
-    summed = np.column_stack([np.bincount(vertex, np.repeat(axis, 3)) for axis in weighted.T])[vertex]
+    count = int(vertex.max()) + 1
+    summed = np.column_stack([sum_by_index(vertex, np.repeat(axis, 3), count) for axis in weighted.T])[vertex]
     # Triangles within half the angle of their mean are within the angle of each other; others are compared in pairs.
     bent = np.einsum("ij,ij->i", flat[owner], unit(summed)) < HALF_SHARP
-    apart = np.bincount(vertex, bent)[vertex] > 0
+    apart = sum_by_index(vertex, bent, count)[vertex] > 0
     summed[apart] = _sums_of_like(flat, weighted, owner[apart], vertex[apart])
     normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
     return np.asarray(unit(normals).reshape(-1, 3, 3))

@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.models.modulation import modulus
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, freeze, perpendicular_axes
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
@@ -56,7 +56,7 @@ def extreme_places(solution: Solution) -> FloatArray:
 def _vertices_of(surface: Surface) -> FloatArray:
     """The vertices of a surface, (n, 3), as one array that cannot be written to."""
     if surface not in _VERTICES:
-        _VERTICES[surface] = _frozen(surface.points)
+        _VERTICES[surface] = freeze(surface.points.copy())
     return _VERTICES[surface]
 
 
@@ -65,17 +65,10 @@ def _kept(surface: Surface, key: bytes, make: Callable[[], FloatArray]) -> Float
     kept = _KEPT.setdefault(surface, {})
     # The last that was used is the last that is forgotten.
     points = kept.pop(key, None)
-    kept[key] = points = _frozen(make()) if points is None else points
+    kept[key] = points = freeze(make()) if points is None else points
     while len(kept) > MOST_KEPT:
         del kept[next(iter(kept))]
     return points
-
-
-def _frozen(array: FloatArray) -> FloatArray:
-    """A copy that cannot be written to, and is no view of another."""
-    array = array.copy()
-    array.setflags(write=False)
-    return array
 
 
 def _peaks(solution: Solution) -> IntArray:
@@ -122,9 +115,7 @@ def _around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArr
 def _points_around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:
     """`_around`, without what is remembered."""
     middles, normals = surface.project(places)
-    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    second = np.cross(normals, first)
+    first, second = perpendicular_axes(normals)
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     ways = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
     # (p, lengths, directions, 3)
