@@ -43,7 +43,8 @@ MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
-FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
+FIGURES = ("figures.svg", "figures.pdf", "figures.png")
+MITSUBA = ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
@@ -185,7 +186,7 @@ def _write(
         write_surface(results, folder, {} if pulse is None else pulse.arrays())
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     _write_on_mesh(results, readings, folder)
-    _draw(results, readings, folder)
+    _draw(results, readings, folder, pulse)
     if pulse is not None:
         pulse.write(readings, folder)
     if readings:
@@ -261,7 +262,7 @@ def _places_lit(case: Case) -> FloatArray:
     return np.vstack([np.zeros((0, 3)), *places])
 
 
-def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+def _draw(results: Results, readings: list[dict[str, Any]], folder: Path, pulse: PulseResults | None) -> None:
     """Draw pictures and figures, and write the viewer and what renderers read."""
     outputs = set(results.case.outputs)
     if "figures" in outputs:
@@ -278,7 +279,7 @@ def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> Non
     if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
-        write_viewer(results, readings, scene, folder / FILES["viewer"])
+        write_viewer(results, readings, scene, folder / FILES["viewer"], pulse)
     if outputs & {"glb", "mitsuba"}:
         from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
 
