@@ -2,9 +2,20 @@
 
 from dataclasses import replace
 
-from tetlux.cases.stress import modes, point_scenarios, scenarios
+from tetlux.cases.stress import modes, plan_scenarios, point_scenarios, scenarios
 from tetlux.cases.stress.bodies import BODIES
-from tetlux.cases.stress.panels import CHARGES, DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, SIGN_VARIANTS, Axis, Panel
+from tetlux.cases.stress.panels import (
+    CHARGES,
+    DEFAULT,
+    FREE_SPACE,
+    NOT_REFINED,
+    NOTHING,
+    PLANNED,
+    SIGN_VARIANTS,
+    TRUNCATED,
+    Axis,
+    Panel,
+)
 
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
 ALBEDO_BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
@@ -181,5 +192,21 @@ PANELS = (
         Axis("", tuple(modes.PLACES), ("near", "behind")),
         modes.sensitivity_by_albedo_and_place,
         (DEFAULT,),
+    ),
+    Panel(
+        "truncation",
+        "a point source 1 mean free path deep in a body of which most is dark; compared within 12 of the source",
+        Axis("", tuple(plan_scenarios.TRUNCATED_BODIES), plan_scenarios.FEW_TRUNCATED_BODIES),
+        replace(ALBEDO, values=(0.5, 0.9, 0.99, 0.999), few=(0.5, 0.99)),
+        plan_scenarios.part_by_body_and_albedo,
+        (TRUNCATED,),
+    ),
+    Panel(
+        "plan",
+        "scenes that several models can solve, lengths in mean free paths; the regret is in the report",
+        Axis("", tuple(plan_scenarios.PLANNED), plan_scenarios.FEW_PLANNED),
+        replace(ALBEDO, values=(0.5, 0.9, 0.99, 0.9999), few=(0.5, 0.9999)),
+        plan_scenarios.plan_by_scene_and_albedo,
+        (PLANNED, CHARGES, DEFAULT),
     ),
 )

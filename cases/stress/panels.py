@@ -32,6 +32,8 @@ class Variant:
 
 CHARGES = Variant("charges", {"model": "charges"}, counts=True)
 DEFAULT = Variant("default", counts=True)
+PLANNED = Variant("chosen by the plan", {"model": "auto"}, counts=True)
+TRUNCATED = Variant("truncated", {"model": "truncated"}, counts=True)
 NOT_REFINED = Variant("default, not refined", adaptive=False, counts=True)
 NO_LIMITER = Variant("no limiter", {"limit": False})
 CONSISTENT = Variant("consistent mass, no limiter", {"mass": "consistent", "limit": False})
