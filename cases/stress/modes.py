@@ -4,11 +4,12 @@ Each has a function that finds values with error bars, which are held against cl
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from tetlux.cases.stress.scenarios import TOLERANCE, Read, Readout, Scenario, medium_of_albedo, mesh_of_unit_edges
+from tetlux.cases.stress.scenarios import TOLERANCE, Readout, Scenario, medium_of_albedo, mesh_of_unit_edges
 from tetlux.fem import Medium, PointDetector, PointSource, Solution, System, sensitivity, solve
 from tetlux.fem.exact.modulated.sphere import point_exitance, pulse_exitance
 from tetlux.fem.models.modulation import seconds_per_length
@@ -125,7 +126,12 @@ def _modulated(medium: Medium, radius: float, depth: float, shift: float, angles
 
 
 def _scenario(
-    medium: Medium, radius: float, depth: float, angles: tuple[float, ...], truth: NumberArray, read: Read
+    medium: Medium,
+    radius: float,
+    depth: float,
+    angles: tuple[float, ...],
+    truth: NumberArray,
+    read: Callable[[Scenario], Readout],
 ) -> Scenario:
     places = radius * np.column_stack([np.sin(angles), np.zeros(len(angles)), np.cos(angles)])
     light = PointSource((0.0, 0.0, radius - depth))

@@ -40,9 +40,6 @@ class Readout:
     warnings: tuple[str, ...]
 
 
-Read = Callable[["Scenario"], Readout]
-
-
 @dataclass(frozen=True, eq=False)
 class Scenario:
     """A problem, and what is known of its solution.
@@ -79,7 +76,7 @@ class Scenario:
     may_be_negative: bool = False
     unit_scale: "Scenario | None" = None
     readings: tuple[FloatArray, NumberArray] | None = None
-    read: Read | None = None
+    read: "Callable[[Scenario], Readout] | None" = None
 
 
 def medium_of_albedo(albedo: float, eta: float = INDEX, free_path: float = 1.0) -> Medium:
