@@ -166,7 +166,9 @@ def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
         blocks("docs/start.md", "yaml")[0].replace("{file: mine.stl}", "{sphere: {radius: 20}}")
     )
     assert load_cases(tmp_path / "mine.yaml")[0].channel_names == ("red", "green", "blue")
-    fibres, tissue = blocks("docs/how-to.md", "yaml")
+    fibres, fitted, tissue = blocks("docs/how-to.md", "yaml")
+    (tmp_path / "fitted.yaml").write_text(fitted)
+    assert load_cases(tmp_path / "fitted.yaml")[0].fit is not None
     (tmp_path / "fibres.yaml").write_text(fibres)
     assert load_cases(tmp_path / "fibres.yaml")[0].detector_tolerance == 0.01
     ball = "surface: {sphere: {radius: 20}}\nlights: [{diffuse: {irradiance: 1}}]\n"

@@ -15,17 +15,12 @@ from PIL import Image
 
 from tetlux.cases.cli import main
 from tetlux.cases.stress import command as stress_module
-from tetlux.cases.stress import plan_scenarios, point_scenarios, scenarios
-from tetlux.cases.stress.command import stress
-from tetlux.cases.stress.files import COLUMNS, FILES
+from tetlux.cases.stress import modes, plan_scenarios, point_scenarios, scenarios
+from tetlux.cases.stress.command import COLUMNS, FILES, stress
 from tetlux.cases.stress.grid import PANELS
 from tetlux.cases.stress.measure import Diagnostics, measure
 from tetlux.cases.stress.meshes import degrade, layered_ball
-from tetlux.cases.stress.panels import Axis, Panel, Value
-from tetlux.cases.stress.report import as_markdown
-from tetlux.cases.stress.rules import broken_rules, violations
-from tetlux.cases.stress.trials import Trial
-from tetlux.cases.stress.variants import (
+from tetlux.cases.stress.panels import (
     CHARGES,
     CONSISTENT,
     DEFAULT,
@@ -33,8 +28,15 @@ from tetlux.cases.stress.variants import (
     NOTHING,
     PLANNED,
     TRUNCATED,
+    Axis,
+    Panel,
+    Value,
     Variant,
 )
+from tetlux.cases.stress.report import as_markdown
+from tetlux.cases.stress.rules import broken_rules, violations
+from tetlux.cases.stress.scenarios import Scenario
+from tetlux.cases.stress.trials import Trial
 from tetlux.fem.linear import direct, krylov
 from tetlux.fem.linear import solver as linear
 from tetlux.meshing.arrays import FloatArray
@@ -255,6 +257,27 @@ def test_readings_are_measured_and_a_miss_is_found() -> None:
     other = measure(replace(scenario, readings=(places, truth * np.array([1.0, 1.0, 1.2, 1.0]))), DEFAULT)
     assert other.error == pytest.approx(1.0 - 1.0 / 1.2, abs=0.03)
     assert list(violations(run_of(other))) == ["silent error"]
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        modes.modulated_by_frequency_and_place(0.1, "near"),
+        modes.modulated_by_wave_number_and_ratio(0.3, 10.0),
+        modes.sensitivity_by_albedo_and_place(0.99, "near"),
+    ],
+)
+def test_modes_are_measured_and_a_miss_is_found(scenario: Scenario) -> None:
+    found = measure(scenario, DEFAULT)
+    assert found.of_readings
+    assert found.finite
+    assert found.error is not None
+    assert found.error < 0.01
+    assert scenario.readings is not None
+    places, truth = scenario.readings
+    missed = measure(replace(scenario, readings=(places, truth * 1.2)), DEFAULT)
+    (rule,) = broken_rules(Trial(PANELS[0], 0.1, 0.1, DEFAULT, "ran", "", missed))
+    assert rule == "silent error"
 
 
 @pytest.mark.parametrize("kind", scenarios.LENGTH_KINDS[:4])

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from tetlux.cases.stress import plan_scenarios, point_scenarios, scenarios
+from tetlux.cases.stress import modes, plan_scenarios, point_scenarios, scenarios
 from tetlux.cases.stress.bodies import BODIES
-from tetlux.cases.stress.panels import Axis, Panel
-from tetlux.cases.stress.variants import (
+from tetlux.cases.stress.panels import (
     CHARGES,
     DEFAULT,
     FREE_SPACE,
@@ -14,6 +13,8 @@ from tetlux.cases.stress.variants import (
     PLANNED,
     SIGN_VARIANTS,
     TRUNCATED,
+    Axis,
+    Panel,
 )
 
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
@@ -159,6 +160,38 @@ PANELS = (
         Axis("", point_scenarios.PLACES, point_scenarios.FEW_PLACES),
         point_scenarios.readings_by_body_and_place,
         (CHARGES, DEFAULT),
+    ),
+    Panel(
+        "frequency and mesh",
+        "modulated light of a point in a ball, on a given mesh of edges h; the colour is that of the worst reading",
+        Axis("|k| h", (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 3.0)),
+        Axis("ω/(v σ_a)", (0.1, 1.0, 10.0), (10.0,)),
+        modes.modulated_by_wave_number_and_ratio,
+        (DEFAULT,),
+    ),
+    Panel(
+        "frequency and place",
+        "modulated light of a point in a ball of radius 10; the colour is that of the worst reading",
+        Axis("ω/(v σ_t')", (0.001, 0.01, 0.1, 0.3), (0.1,)),
+        Axis("", tuple(modes.PLACES), ("near", "behind")),
+        modes.modulated_by_frequency_and_place,
+        (DEFAULT,),
+    ),
+    Panel(
+        "time",
+        "light of a point in a ball after a pulse, at three times; the colour is that of the worst reading",
+        Axis("radius (mean free paths)", (5.0, 10.0, 30.0), (10.0,)),
+        Axis("", tuple(modes.TIMES)),
+        modes.pulse_by_radius_and_time,
+        (DEFAULT,),
+    ),
+    Panel(
+        "sensitivities",
+        "derivatives of readings to both coefficients of a ball of radius 10; the colour is that of the worst",
+        Axis("reduced albedo", (0.5, 0.9, 0.99, 0.9999), (0.5, 0.9999)),
+        Axis("", tuple(modes.PLACES), ("near", "behind")),
+        modes.sensitivity_by_albedo_and_place,
+        (DEFAULT,),
     ),
     Panel(
         "truncation",
