@@ -167,7 +167,9 @@ def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
     trimesh.creation.box((20.0, 30.0, 25.0)).export(tmp_path / "scan.stl")
     (tmp_path / "mine.yaml").write_text(blocks("docs/start.md", "yaml")[0])
     assert load_cases(tmp_path / "mine.yaml")[0].surface.volume == pytest.approx(15_000)
-    fibres, tissue = blocks("docs/how-to.md", "yaml")
+    fibres, fitted, tissue = blocks("docs/how-to.md", "yaml")
+    (tmp_path / "fitted.yaml").write_text(fitted)
+    assert load_cases(tmp_path / "fitted.yaml")[0].fit is not None
     (tmp_path / "fibres.yaml").write_text(fibres)
     assert load_cases(tmp_path / "fibres.yaml")[0].detector_tolerance == 0.01
     ball = "surface: {sphere: {radius: 20}}\nlights: [{diffuse: {irradiance: 1}}]\n"
@@ -225,7 +227,7 @@ BLOCKS = {
     "README.md": {"python": 1, "yaml": 1},
     "docs/case-files.md": {"python": 1, "yaml": 4},
     "docs/cluster.md": {"yaml": 1},
-    "docs/how-to.md": {"python": 1, "yaml": 2},
+    "docs/how-to.md": {"python": 1, "yaml": 3},
     "docs/layers.md": {"yaml": 2},
     "docs/pictures.md": {"python": 1, "yaml": 3},
     "docs/python.md": {"python": 3},
