@@ -72,7 +72,9 @@ class QuadraticScene:
     def patches(self) -> tuple[tuple[QuadraticPatch, ...], ...]:
         """The patches of each light in quadratic elements."""
         every = [patch for own in self._chosen for patch in own]
-        made = iter(map_in_threads(lambda patch: quadratic_patch(self.operator, patch, self.inner_faces), every))
+        # What threads share is made before.
+        operator, inner, _ = self.operator, self.inner_faces, self.operator.matrix
+        made = iter(map_in_threads(lambda patch: quadratic_patch(operator, patch, inner), every))
         return tuple(tuple(next(made) for _ in own) for own in self._chosen)
 
     @cached_property
