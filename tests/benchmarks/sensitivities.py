@@ -4,7 +4,8 @@ Sensitivities: a ball of three layers with 16 beams and 16 detectors, all 256 ro
 a mesh that is halved so often everywhere (0: 6,000 nodes, 1: 22,000, 2: 69,000; targets of 60,000 nodes: 12 s, 2 GB).
 Fits: ten fibres on a ball, read by charges, from starts a factor of 3 off (targets .5 % in 15 times a solve), and
 `TRIALS` fits to readings with 1 % of noise (60 to 75 % within one standard deviation). Processor seconds on two busy
-cores: MEASURED; fits +.03 % and -.02 % in 12 solves.
+cores: 13.4 with 6,000 nodes (.46 GB), 38 with 22,000 (1.0 GB), of which solves take 12 and charges 9; with 61,000 it
+had not ended after 105, with 2.2 GB. Fits +.03 % and -.02 % in 12 solves.
 """
 
 import resource
