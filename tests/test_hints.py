@@ -74,7 +74,7 @@ def test_every_alias_can_be_met() -> None:
         ("surface", "geometry", 'geometry: unknown key; did you mean "surface"?'),
         ("lights", "sources", 'sources: unknown key; did you mean "lights"?'),
         ("surface:", "outputs: [png]\nsurface:", "outputs[0]: did you mean \"picture\"? expected 'surface', "
-         "'volume', 'picture', 'viewer', 'figures', 'glb', 'mitsuba' or 'film', but found 'png'."),
+         "'volume', 'picture', 'viewer', 'figures', 'glb', 'mitsuba', 'film' or 'sensitivity', but found 'png'."),
         ("surface:", "unit: inches\nsurface:", "unit: did you mean \"in\"? expected"),
         ("surface:", "unit: milimeter\nsurface:", 'unit: did you mean "mm"? expected'),
         ("surface:", "picture: {colormap: grey}\nsurface:", 'picture.colormap: unknown key; did you mean "map" (the'),
