@@ -28,9 +28,10 @@ from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.meshing.arrays import FloatArray, Number, NumberArray
 from tetlux.meshing.surface.triangles import longest_sides
 
-# Factor of all contributions of gradients. Of 1,000 random readings (`tests.benchmarks.readings`), and of 210 in a ball
-# with a core, for .48 / .55 / .6: share within twice the bar .968, .975, .980 and .967, .981, .986; bar over error in the
-# median 1.75, 1.92, 2.05 and 1.58, 1.82, 1.98. Of 140 readings with the half-space subtracted .936 for .48.
+# Factor of all contributions of gradients. Of 1,000 random readings (`tests.benchmarks.readings`), and of 210 in a
+# ball with a core, for .48 / .55 / .6: share within twice the bar .968, .975, .980 and .967, .981, .986; bar over
+# error in the median 1.75, 1.92, 2.05 and 1.58, 1.82, 1.98. Of 140 readings with the half-space subtracted .936 for
+# .48.
 RANDOM_SCALE = 0.55
 # Weight of the sum of contributions, which do not cancel entirely, beside the root of their squares.
 CORRELATED_WEIGHT = 0.4

@@ -8,9 +8,10 @@ import numpy as np
 from tetlux.meshing.arrays import FloatArray, Number
 from tetlux.meshing.describe import one_line
 
-# Relative error that is always added, for what rounding, iterations and fits leave of readings that are nearly exact. Of
-# 1,000 random readings (`tests.benchmarks.readings`) for 0 / 2e-6 / 5e-6 / 1e-5 / 2e-5: share within twice the bar .935,
-# .944, .957, .968, .979; bar over error in the median 1.4, 1.5, 1.6, 1.75, 2.0; largest error over bar 125, 20, 8, 4, 3.
+# Relative error that is always added, for what rounding, iterations and fits leave of readings that are nearly exact.
+# Of 1,000 random readings (`tests.benchmarks.readings`) for 0 / 2e-6 / 5e-6 / 1e-5 / 2e-5: share within twice the bar
+# .935, .944, .957, .968, .979; bar over error in the median 1.4, 1.5, 1.6, 1.75, 2.0; largest error over bar 125, 20,
+# 8, 4, 3.
 LEAST_RELATIVE_ERROR = 1e-5
 
 
