@@ -4,6 +4,8 @@ from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
 
 from tetlux.cases.file.case import Case
+from tetlux.fem.media.coefficients import AnyMedium
+from tetlux.fem.media.region import Region
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.planner.choose import plan_of
 from tetlux.fem.planner.request import MODULATED, Request, make_request
@@ -45,18 +47,6 @@ def plan_case(case: Case, runs: int = 1) -> Plan:
 
 def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
     """What a case asks for; without `cache` past runs are neither looked at nor learned from."""
-    need = ""
-    # By default other models than "full" do without this output.
-    if "volume" in case.outputs and (case.spec.model == AUTO or "outputs" in case.spec.model_fields_set):
-        need = "the output volume is the fluence on a mesh"
-    elif case.comparison is not None:
-        need = "compare is of finite elements"
-    elif case.fluorophores:
-        need = "what dyes emit is solved for on a mesh"
-    elif case.fit is not None:
-        need = "a fit has meshes"
-    elif any(case.frequencies):
-        need = MODULATED
     return make_request(
         case.mesh or case.surface,
         [channel.media for channel in case.channels],
@@ -64,10 +54,24 @@ def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
         regions=case.regions,
         tolerances=case.tolerances,
         detectors=[entry.detector for entry in case.detectors],
-        need_of_mesh=need,
+        need_of_mesh=_need_of_mesh(case),
         runs=runs,
         cache=cache,
     )
+
+
+def _need_of_mesh(case: Case) -> str:
+    """Why a case cannot do without a mesh; empty if it can."""
+    # By default other models than "full" do without this output.
+    if "volume" in case.outputs and (case.spec.model == AUTO or "outputs" in case.spec.model_fields_set):
+        return "the output volume is the fluence on a mesh"
+    if case.comparison is not None:
+        return "compare is of finite elements"
+    if case.fluorophores:
+        return "what dyes emit is solved for on a mesh"
+    if case.fit is not None:
+        return "a fit has meshes"
+    return MODULATED if any(case.frequencies) else ""
 
 
 def _groups(numbers: Sequence[int], cases: Sequence[Case]) -> list[list[int]]:
@@ -82,6 +86,12 @@ def _key(case: Case) -> Hashable:
     """What decides the model of a run, but for the values of its coefficients and places."""
     surfaces = (case.surface, case.mesh, *(region.surface for region in case.regions))
     kinds = tuple((type(channel.medium), *map(type, channel.lights.values())) for channel in case.channels)
+    kinds_of_regions = tuple(type(medium) for region in case.regions for medium in _media_of(region))
     tolerances = (case.tolerance, case.detector_tolerance, case.everywhere_tolerance, case.volume_tolerance)
-    outputs = ("volume" in case.outputs, case.comparison is not None, len(case.detectors), any(case.frequencies))
-    return case.spec.model, tuple(map(id, surfaces)), kinds, tolerances, outputs
+    needs = (_need_of_mesh(case), len(case.detectors))
+    return case.spec.model, tuple(map(id, surfaces)), kinds, kinds_of_regions, tolerances, needs
+
+
+def _media_of(region: Region) -> Sequence[AnyMedium]:
+    """The media of a region, one for each channel or one for all."""
+    return [region.medium] if isinstance(region.medium, AnyMedium) else region.medium

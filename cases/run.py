@@ -16,7 +16,7 @@ from tetlux.cases.fitting.record import FIT_FILES, FitRecord
 from tetlux.cases.fitting.solve import fit_case, with_fitted_media
 from tetlux.cases.solve import solve_case, solve_pulse
 from tetlux.cases.viewer import PAGE
-from tetlux.cases.write.content import content_of
+from tetlux.cases.write.content import content_of_scene
 from tetlux.cases.write.fields import volume_values
 from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.pulse import PULSE_FILES, PulseResults
@@ -43,7 +43,8 @@ MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
-FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
+FIGURES = ("figures.svg", "figures.pdf", "figures.png")
+MITSUBA = ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
@@ -185,7 +186,7 @@ def _write(
         write_surface(results, folder, {} if pulse is None else pulse.arrays())
     readings = read_detectors(case.detectors, results.by_channel_and_light())
     _write_on_mesh(results, readings, folder)
-    _draw(results, readings, folder)
+    _draw(results, readings, folder, pulse)
     if pulse is not None:
         pulse.write(readings, folder)
     if readings:
@@ -204,12 +205,12 @@ def _write(
         data, image = (folder / name for name in COMPARISON)
         data.write_text(json.dumps(as_data(compared), allow_nan=False) + "\n", encoding="utf-8")
         draw_comparison(compared, case.name, unit, image)
-    figures = summarize(results, readings, warnings) | {"content": content_of(case)}
+    figures = summarize(results, readings, warnings)
+    figures["content"] = content_of_scene(figures["as_ran"]["scene"])
     if compared is not None:
         figures["compare"] = compared.differences
     figures["seconds"] = _seconds(results, started, writing)
-    summary = json.dumps(figures, indent=2, allow_nan=False)
-    (folder / SUMMARY).write_text(summary + "\n", encoding="utf-8")
+    (folder / SUMMARY).write_text(_a_key_a_line(figures), encoding="utf-8")
     return figures, warnings, readings
 
 
@@ -225,6 +226,12 @@ def _write_on_mesh(results: Results, readings: list[dict[str, Any]], folder: Pat
         fields = found.fields()
     if "volume" in outputs:
         write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results) | fields)
+
+
+def _a_key_a_line(figures: dict[str, Any]) -> str:
+    """JSON with a line for each key of the first level; `indent` would take twenty times as long."""
+    lines = (f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in figures.items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _more_pictures(*folders: Path) -> set[str]:
@@ -255,7 +262,7 @@ def _places_lit(case: Case) -> FloatArray:
     return np.vstack([np.zeros((0, 3)), *places])
 
 
-def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+def _draw(results: Results, readings: list[dict[str, Any]], folder: Path, pulse: PulseResults | None) -> None:
     """Draw pictures and figures, and write the viewer and what renderers read."""
     outputs = set(results.case.outputs)
     if "figures" in outputs:
@@ -272,7 +279,7 @@ def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> Non
     if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
-        write_viewer(results, readings, scene, folder / FILES["viewer"])
+        write_viewer(results, readings, scene, folder / FILES["viewer"], pulse)
     if outputs & {"glb", "mitsuba"}:
         from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
 

@@ -9,7 +9,6 @@ from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
 from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
-from tetlux.fem.quadratic.scene import solve_together
 from tetlux.fem.quadratic.solution import Where
 from tetlux.fem.system import MeshSolution
 from tetlux.meshing.arrays import FloatArray, IntArray
@@ -75,8 +74,6 @@ class Tolerances:
         if self.exitance is not None:
             largest_ratio = error / self.exitance
             splits += cells_to_split((step.estimate for step in steps), self.exitance)
-        if self.need_quadratic:
-            solve_together(step.solution.quadratic.scene for step in steps if step.solution.quadratic is not None)
         if self.readings is not None:
             readings = [reading for scene, step in by_scene.items() for reading in self._read(scene, step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)

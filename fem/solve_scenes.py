@@ -19,11 +19,10 @@ from tetlux.fem.memory import MeshLimit, check_memory, gigabytes, limit_by_memor
 from tetlux.fem.notes import notes_on, notes_on_fields, notes_on_readings
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, is_quadratic, place_detector, read_all
+from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector, read_all
 from tetlux.fem.outcome.exitance_field import Dark
 from tetlux.fem.outcome.fields import error_of_field, use_quadratic_elements
 from tetlux.fem.outcome.solution import Solution
-from tetlux.fem.quadratic.scene import solve_together
 from tetlux.fem.scenes import build_scenes
 from tetlux.fem.shared import SharedMesh
 from tetlux.fem.sources.light import Light
@@ -181,9 +180,6 @@ def solve_problem(
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions, scenes = [], problem.scenes
-    with problem.watch.stage("solve"):
-        to_read = [step.solution for step, own in zip(steps, detectors, strict=True) if own]
-        solve_together(each.quadratic.scene for each in to_read if each.quadratic is not None and is_quadratic(each))
     for number, step in enumerate(steps):
         with problem.watch.stage("solve"):
             solution = _with_fields(

@@ -1,4 +1,4 @@
-"""Array types of all signatures, sums by index, quotients, evenly spaced indices, and perpendicular axes."""
+"""Array types of all signatures, sums by index, frozen arrays, quotients, evenly spaced indices, perpendicular axes."""
 
 from typing import Any
 
@@ -21,6 +21,13 @@ def sum_by_index(indices: npt.NDArray[np.integer], values: NumberArray, count: i
     if np.iscomplexobj(values):
         return sum_by_index(indices, values.real, count) + 1j * sum_by_index(indices, values.imag, count)
     return np.asarray(np.bincount(indices.reshape(-1), values.reshape(-1), count), dtype=np.float64)
+
+
+def freeze(array: FloatArray) -> FloatArray:
+    """The array, or a copy if it is a view of another, that cannot be written to: what is found for it can be kept."""
+    frozen = array if array.base is None else array.copy()
+    frozen.setflags(write=False)
+    return frozen
 
 
 def divide_or_zero(a: NumberArray, b: NumberArray, smallest: float = 0.0) -> NumberArray:

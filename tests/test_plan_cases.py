@@ -9,7 +9,8 @@ import pytest
 from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
-from tetlux.cases.planning import plan_models
+from tetlux.cases.file.reader import FilesRead
+from tetlux.cases.planning import plan_groups, plan_models
 from tetlux.cases.run import run_case
 
 BALL = "surface: {sphere: {radius: 10}}"
@@ -119,6 +120,19 @@ def test_runs_of_a_group_share_one_plan(tmp_path: Path) -> None:
     assert [(plan.chosen, plan.runs) for plan in plans.values() if plan] == [("full", 8), ("closed-form", 8)]
     # Runs that are planned to be meshed share a mesh, the others make none.
     assert sorted((mesh.runs, bool(mesh.pilots)) for mesh in make_plan(cases).meshes) == [(1, False)] * 8 + [(8, True)]
+
+
+def test_runs_with_and_without_dyes_have_plans_of_their_own(tmp_path: Path) -> None:
+    """Both have two channels, with media and lights of the same kinds, on one surface."""
+    lamp = "lights: [{point: {position: [0, 0, 8]}}]"
+    two = write(tmp_path, BALL, "medium: {sigma_a: [0.02, 0.03], sigma_s_prime: 1.0, eta: 1.4}", lamp, name="two")
+    dye = "dyes: [{absorption: 0.001, quantum_yield: 0.5}]"
+    emission = f"fluorescence: {{emission: {{sigma_a: 0.02, sigma_s_prime: 0.9, eta: 1.4}}, {dye}}}"
+    dyed = write(tmp_path, BALL, MEDIUM, lamp, emission, name="dyed")
+    files = FilesRead()
+    cases = [case for path in (two, dyed) for case in load_cases(path, files)]
+    assert cases[0].surface is cases[1].surface
+    assert [(case.name, plan.chosen) for case, plan in plan_groups(cases)] == [("two", "closed-form"), ("dyed", "full")]
 
 
 def test_a_run_that_the_plan_of_its_group_does_not_suit_goes_on(tmp_path: Path) -> None:

@@ -15,11 +15,9 @@ from PIL import Image
 
 from tetlux.cases.cli import main
 from tetlux.cases.stress import command as stress_module
-from tetlux.cases.stress import modes, plan_scenarios, point_scenarios, scenarios
 from tetlux.cases.stress.command import COLUMNS, FILES, stress
 from tetlux.cases.stress.grid import PANELS
 from tetlux.cases.stress.measure import Diagnostics, measure
-from tetlux.cases.stress.meshes import degrade, layered_ball
 from tetlux.cases.stress.panels import (
     CHARGES,
     CONSISTENT,
@@ -35,7 +33,9 @@ from tetlux.cases.stress.panels import (
 )
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
-from tetlux.cases.stress.scenarios import Scenario
+from tetlux.cases.stress.scenes import of_modes, of_plans, of_points, scenarios
+from tetlux.cases.stress.scenes.meshes import degrade, layered_ball
+from tetlux.cases.stress.scenes.scenarios import Scenario
 from tetlux.cases.stress.trials import Trial
 from tetlux.fem.linear import direct, krylov
 from tetlux.fem.linear import solver as linear
@@ -205,7 +205,7 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_charges_are_measured_against_the_closed_form() -> None:
-    scenario = point_scenarios.charges_by_body_and_light("box, by an edge", "1 deep")
+    scenario = of_points.charges_by_body_and_light("box, by an edge", "1 deep")
     found = measure(scenario, CHARGES)
     assert found.error is not None
     assert found.bound is not None
@@ -218,7 +218,7 @@ def test_charges_are_measured_against_the_closed_form() -> None:
 
 
 def test_a_part_is_measured_where_the_light_is() -> None:
-    scenario = plan_scenarios.part_by_body_and_albedo("ball of 300", 0.9)
+    scenario = of_plans.part_by_body_and_albedo("ball of 300", 0.9)
     found = measure(scenario, TRUNCATED)
     assert found.error is not None
     # Measured .0013, estimate .0012; the whole ball would take a hundred times as many nodes.
@@ -228,7 +228,7 @@ def test_a_part_is_measured_where_the_light_is() -> None:
 
 
 def test_the_plan_solves_a_plate_by_its_closed_form() -> None:
-    found = measure(plan_scenarios.plan_by_scene_and_albedo("plate, point", 0.99), PLANNED)
+    found = measure(of_plans.plan_by_scene_and_albedo("plate, point", 0.99), PLANNED)
     assert (found.nodes, found.ledger, found.lowest) == (0, None, None)
     assert found.error is not None
     assert found.error < 1e-12
@@ -245,7 +245,7 @@ def test_the_report_says_the_regret_of_the_plan() -> None:
 
 
 def test_readings_are_measured_and_a_miss_is_found() -> None:
-    scenario = point_scenarios.readings_by_body_and_place("ball", "behind")
+    scenario = of_points.readings_by_body_and_place("ball", "behind")
     found = measure(scenario, DEFAULT)
     assert found.error is not None
     # Measured .0005, bar .0006.
@@ -262,9 +262,9 @@ def test_readings_are_measured_and_a_miss_is_found() -> None:
 @pytest.mark.parametrize(
     "scenario",
     [
-        modes.modulated_by_frequency_and_place(0.1, "near"),
-        modes.modulated_by_wave_number_and_ratio(0.3, 10.0),
-        modes.sensitivity_by_albedo_and_place(0.99, "near"),
+        of_modes.modulated_by_frequency_and_place(0.1, "near"),
+        of_modes.modulated_by_wave_number_and_ratio(0.3, 10.0),
+        of_modes.sensitivity_by_albedo_and_place(0.99, "near"),
     ],
 )
 def test_modes_are_measured_and_a_miss_is_found(scenario: Scenario) -> None:

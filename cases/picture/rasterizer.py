@@ -1,14 +1,14 @@
 """A rasterizer with a depth buffer: which triangle is visible at each sample of a picture.
 
-It is in double precision, and takes 0.2 s of CPU for 10,000 triangles and 0.7 s for 80,000 on a busy machine, where VTK
-takes some 3 s in a process of its own.
+It is in double precision. A whole picture takes 0.4 s of CPU for 20,000 triangles and 0.7 s for 150,000 on a busy
+machine, where VTK takes some 3 s in a process of its own.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray
 
 # Pairs of sample and triangle that are processed at a time, which bounds the memory to about 100 MB.
 BATCH = 1_000_000
@@ -28,7 +28,7 @@ class Visible:
         How near it is to the eye, samples; -inf if there is none.
     """
 
-    owner: IntArray
+    owner: IndexArray
     nearness: FloatArray
 
 
@@ -53,7 +53,7 @@ def visible_triangles(
     Visible
     """
     width, height = size
-    owner = np.full(width * height, -1, dtype=np.int64)
+    owner = np.full(width * height, -1, dtype=np.int32)
     nearness = np.full(owner.shape, -np.inf) if before is None else before.ravel().copy()
     area, slope_x, slope_y = _planes(placed)
     # Rows count downwards, so that front faces run clockwise.

@@ -7,7 +7,7 @@ import numpy as np
 from tetlux.cases.picture.rasterizer import Visible, gradients, visible_triangles
 from tetlux.cases.picture.stage import ARROW_OPACITY, FULL, LIGHT, OVERSAMPLING, SHADED, Image, Stage
 from tetlux.cases.picture.view import Camera, caster_of
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
 
 # Triangles whose means differ by less have one colour: of the map's positions, or of red, green and blue.
 ONE_COLOUR = 0.02
@@ -27,8 +27,8 @@ def draw_stage(stage: Stage) -> Image:
     body = visible_triangles(placed, samples_of(stage.camera), closed=True)
     owner = _by_pixel(body.owner)
     paint = _paint_of_body(stage, placed)
-    image = np.empty((owner.shape[1], 3))
-    image[:] = stage.background
+    image = np.empty((owner.shape[1], 3), dtype=np.uint8)
+    image[:] = _bytes(np.asarray(stage.background))
     lit: BoolArray = np.zeros(len(image), dtype=bool)
     if len(arrows):
         lit_pixels, arrow = _visible_arrows(arrows, body, (width, height))
@@ -37,19 +37,24 @@ def draw_stage(stage: Stage) -> Image:
     pixels = np.flatnonzero(plain & (owner[0] >= 0))
     row, column = np.divmod(pixels, width)
     middle = 0.5 * OVERSAMPLING
-    image[pixels] = paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle)
+    image[pixels] = _bytes(paint(owner[0, pixels], OVERSAMPLING * column + middle, OVERSAMPLING * row + middle))
     mixed = np.flatnonzero(~plain & ~lit)
-    image[mixed] = _paint_mixed(stage, paint, owner[:, mixed], mixed)
+    image[mixed] = _bytes(_paint_mixed(stage, paint, owner[:, mixed], mixed))
     if lit.any():
         own = owner[:, lit_pixels]
         under = _paint_samples(paint, own, lit_pixels, _ground(stage, len(lit_pixels)), width)
         over = _paint_samples(_paint_of_arrows(stage, arrows), arrow, lit_pixels, under, width)
         share = np.where(own >= 0, ARROW_OPACITY, 1.0)[:, :, None]
-        image[lit_pixels] = (under + share * (over - under)).mean(axis=0)
-    return np.asarray(np.round(255.0 * image), dtype=np.uint8).reshape(height, width, 3)
+        image[lit_pixels] = _bytes((under + share * (over - under)).mean(axis=0))
+    return image.reshape(height, width, 3)
 
 
-def _visible_arrows(arrows: FloatArray, body: Visible, panel: tuple[int, int]) -> tuple[IntArray, IntArray]:
+def _bytes(colours: FloatArray) -> Image:
+    """Colours from 0 to 1 as bytes."""
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
+
+
+def _visible_arrows(arrows: FloatArray, body: Visible, panel: tuple[int, int]) -> tuple[IntArray, IndexArray]:
     """The pixels (n,) in which arrows (m, 3, 3) are visible, and the triangles at their samples, (samples, n)."""
     corners = arrows[:, :, :2].reshape(-1, 2)
     last = np.array(panel) - 1
@@ -69,7 +74,7 @@ def _ground(stage: Stage, pixels: int) -> FloatArray:
     return np.tile(stage.background, (OVERSAMPLING**2, pixels, 1))
 
 
-def _paint_mixed(stage: Stage, paint: "_Paint", owner: IntArray, pixels: IntArray) -> FloatArray:
+def _paint_mixed(stage: Stage, paint: "_Paint", owner: IndexArray, pixels: IntArray) -> FloatArray:
     """Colours (n, 3) of pixels (n,) that show several triangles, or the body and the background."""
     colours = _paint_samples(paint, owner, pixels, _ground(stage, len(pixels)), stage.camera.panel[0])
     mean: FloatArray = colours.mean(axis=0)
@@ -104,10 +109,11 @@ def samples_of(camera: Camera) -> tuple[int, int]:
     return OVERSAMPLING * camera.panel[0], OVERSAMPLING * camera.panel[1]
 
 
-def _by_pixel(samples: IntArray) -> IntArray:
+def _by_pixel(samples: IndexArray) -> IndexArray:
     """The samples (h, w) of each pixel of the panel, (samples of a pixel, pixels)."""
-    n = OVERSAMPLING
-    return np.stack([samples[i::n, j::n].ravel() for i in range(n) for j in range(n)])
+    n, (height, width) = OVERSAMPLING, samples.shape
+    by_sample = samples.reshape(height // n, n, width // n, n).transpose(1, 3, 0, 2)
+    return by_sample.reshape(n * n, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +129,7 @@ class _Paint:
     values: tuple[FloatArray, FloatArray, FloatArray]
     table: FloatArray
 
-    def is_even(self, owner: IntArray) -> BoolArray:
+    def is_even(self, owner: IndexArray) -> BoolArray:
         """Whether the samples (s, n) of pixels belong to one triangle, to triangles of one colour, or to none, (n,)."""
         even: BoolArray = np.asarray((owner == owner[0]).all(axis=0))
         several = np.flatnonzero(~even & (owner >= 0).all(axis=0))
@@ -133,7 +139,7 @@ class _Paint:
         even[several] = True
         return even
 
-    def __call__(self, triangle: IntArray, column: FloatArray, row: FloatArray) -> FloatArray:
+    def __call__(self, triangle: IndexArray, column: FloatArray, row: FloatArray) -> FloatArray:
         """Colours (n, 3) at places of triangles (n,)."""
         right, down = column - self.corner[0, triangle], row - self.corner[1, triangle]
         lamp, eye, *rest = (
@@ -170,7 +176,7 @@ def _make_paint(
     return _Paint(corner, means, (np.stack([value[:, 0] for value in values]), by_column, by_row), table)
 
 
-def _paint_samples(paint: _Paint, owner: IntArray, pixels: IntArray, under: FloatArray, width: int) -> FloatArray:
+def _paint_samples(paint: _Paint, owner: IndexArray, pixels: IntArray, under: FloatArray, width: int) -> FloatArray:
     """Colours (samples of a pixel, pixels, 3) of samples; where they belong to no triangle, those `under` them."""
     colours = under.copy()
     sample, pixel = np.nonzero(owner >= 0)

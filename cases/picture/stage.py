@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.cases.picture.scale import Scale, scale_of
 from tetlux.cases.picture.view import PANEL, UPRIGHT, Camera, Ray, camera_at, choose_view, unit
-from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, perpendicular_axes, sum_by_index
 
 Image = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
@@ -21,13 +21,15 @@ LIGHT: Vector = (0.0, 0.62, 0.72)
 # Both are near enough to 1 for colours to be compared with the bar.
 SHADED, FULL = 0.66, 1.0
 # Neighbours that meet at a larger angle than this are shaded as separate faces.
-SHARP = math.cos(math.radians(40.0))
+SHARP, HALF_SHARP = math.cos(math.radians(40.0)), math.cos(math.radians(20.0))
 # Normals are not smoothed at vertices of more triangles than this, since the cost grows with the square.
 MOST_NEIGHBOURS = 100
 # Shortest and longest arrow, as shares of the body's diagonal.
 SHORTEST_ARROW, LONGEST_ARROW = 0.1, 0.18
 # Radius of the shaft of an arrow, as a share of the body's diagonal.
 ARROW_RADIUS = 0.0042
+# An arrow within 20 degrees of the line of sight hides what it lights, and is drawn as a mark.
+END_ON = math.cos(math.radians(20.0))
 # Opacity of arrows in front of the body.
 ARROW_OPACITY = 0.5
 
@@ -87,10 +89,11 @@ def build_stage(
     shares = scale.shares(exitance if values is None else values)
     corners = points[triangles]
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point]
+    camera = choose_camera(points, triangles, exitance, lights, up=up, toward=toward, panel=panel)
+    shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point and not is_end_on(ray, camera)]
     arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
     return Stage(
-        camera=choose_camera(points, triangles, exitance, lights, up=up, toward=toward, panel=panel),
+        camera=camera,
         corners=corners,
         normals=corner_normals(corners, triangles),
         shares=shares[triangles],
@@ -124,6 +127,11 @@ def choose_camera(
     return camera_at(np.vstack([points, *near]), toward, up, panel)
 
 
+def is_end_on(ray: Ray, camera: Camera) -> bool:
+    """Whether a camera looks along the arrow of a light, from either end."""
+    return abs(float(unit(np.subtract(ray.start, ray.end)) @ camera.toward)) > END_ON
+
+
 def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:
     """Tail and tip of a light's arrow, with its length clipped to shares of the body's diagonal."""
     tip, back = np.asarray(ray.end, dtype=float), np.subtract(ray.start, ray.end)
@@ -138,21 +146,30 @@ def corner_normals(corners: FloatArray, triangles: IntArray) -> FloatArray:
     The normal at a corner is the mean, weighted by area, over those triangles at its vertex whose normals are within
     40 degrees of that of its own triangle.
     """
+    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat, vertex = unit(weighted), triangles.ravel()
+    owner = np.repeat(np.arange(len(triangles)), 3)
+    count = int(vertex.max()) + 1
+    summed = np.column_stack([sum_by_index(vertex, np.repeat(axis, 3), count) for axis in weighted.T])[vertex]
+    # Triangles within half the angle of their mean are within the angle of each other; others are compared in pairs.
+    bent = np.einsum("ij,ij->i", flat[owner], unit(summed)) < HALF_SHARP
+    apart = sum_by_index(vertex, bent, count)[vertex] > 0
+    summed[apart] = _sums_of_like(flat, weighted, owner[apart], vertex[apart])
+    normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
+    return np.asarray(unit(normals).reshape(-1, 3, 3))
+
+
+def _sums_of_like(flat: FloatArray, weighted: FloatArray, owner: IntArray, vertex: IntArray) -> FloatArray:
+    """For corners (c,) of given triangles and vertices the sum of normals of like triangles at the vertex, (c, 3)."""
     from scipy.sparse import csr_array  # noqa: PLC0415
 
-    weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat = unit(weighted)
-    owner = np.repeat(np.arange(len(triangles)), 3)
     count = len(owner)
-    vertex = triangles.ravel()
-    calm = np.flatnonzero(np.bincount(vertex)[vertex] <= MOST_NEIGHBOURS)
-    at_vertex = csr_array((np.ones(len(calm)), (calm, vertex[calm])), shape=(count, int(vertex.max()) + 1))
+    calm = np.flatnonzero(np.bincount(vertex)[vertex] <= MOST_NEIGHBOURS) if count else np.zeros(0, np.int64)
+    at_vertex = csr_array((np.ones(len(calm)), (calm, vertex[calm])), shape=(count, int(vertex.max(initial=0)) + 1))
     corner, other = (at_vertex @ at_vertex.T).tocoo().coords
     alike = np.einsum("ij,ij->i", flat[owner[corner]], flat[owner[other]]) > SHARP
     corner, other = corner[alike], other[alike]
-    summed = csr_array((np.ones(len(corner)), (corner, owner[other])), shape=(count, len(triangles))) @ weighted
-    normals = np.where(summed.any(axis=1, keepdims=True), summed, weighted[owner])
-    return np.asarray(unit(normals).reshape(-1, 3, 3))
+    return np.asarray(csr_array((np.ones(len(corner)), (corner, owner[other])), shape=(count, len(flat))) @ weighted)
 
 
 def _arrow(tail: FloatArray, tip: FloatArray, radius: float, sides: int = 24) -> tuple[FloatArray, FloatArray]:

@@ -182,9 +182,16 @@ def in_view(body: RayCaster, places: FloatArray, toward: FloatArray, diagonal: f
     return hit < 0
 
 
+_last_cast: tuple[FloatArray, RayCaster] | None = None
+
+
 def caster_of(corners: FloatArray) -> RayCaster:
-    """Triangles (m, 3, 3), prepared for `in_view`."""
-    return RayCaster(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    """Triangles (m, 3, 3), prepared for `in_view`; the last ones are kept, which a picture asks for three times."""
+    global _last_cast  # noqa: PLW0603
+    last = _last_cast
+    if last is None or not np.array_equal(last[0], corners):
+        last = _last_cast = corners, RayCaster(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    return last[1]
 
 
 def camera_at(points: FloatArray, toward: FloatArray, up: Vector, panel: tuple[int, int] = PANEL) -> Camera:

@@ -12,7 +12,7 @@ from tetlux.cases.stress.panels import Panel
 from tetlux.cases.stress.picture import draw_map
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
-from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import TIME_LIMIT, Trial, run_trials
 from tetlux.cases.write.publish import check_writable, replace_files
 

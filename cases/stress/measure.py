@@ -8,7 +8,7 @@ import numpy as np
 
 from tetlux.cases.chart.samples import relative_error
 from tetlux.cases.stress.panels import Variant
-from tetlux.cases.stress.scenarios import TOLERANCE, Readout, Scenario, Truth
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Readout, Scenario, Truth
 from tetlux.fem import ChargeSolution, ClosedFormSolution, PointDetector
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve

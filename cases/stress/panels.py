@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from tetlux.cases.stress.scenarios import Scenario
+from tetlux.cases.stress.scenes.scenarios import Scenario
 
 Value = float | str
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from tetlux.cases.stress.measure import Diagnostics
 from tetlux.cases.stress.panels import PLANNED, Axis, Panel, Value
 from tetlux.cases.stress.rules import broken_rules, is_warned, violations
-from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 
 HEADS = (

@@ -31,9 +31,12 @@ def content_of(case: Case) -> str:
     str
         Hexadecimal digits.
     """
-    scene = describe_run(case)["scene"]
-    for key in WITHOUT_EFFECT:
-        scene.pop(key, None)
+    return content_of_scene(describe_run(case)["scene"])
+
+
+def content_of_scene(scene: dict[str, Any]) -> str:
+    """`content_of` a case by its description, `describe_run(case)["scene"]`."""
+    scene = {key: value for key, value in scene.items() if key not in WITHOUT_EFFECT}
     text = json.dumps([NUMERICS, __version__, _by_content(scene)], sort_keys=True)
     return hashlib.blake2b(text.encode(), digest_size=LENGTH // 2).hexdigest()
 

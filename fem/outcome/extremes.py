@@ -1,12 +1,13 @@
 """Places where the exitance is largest and least, found without the many vertices that a picture of it needs."""
 
+from collections.abc import Callable
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from tetlux.fem.models.modulation import modulus
 from tetlux.fem.outcome.solution import Solution
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray, freeze, perpendicular_axes
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
 
@@ -14,13 +15,17 @@ from tetlux.meshing.surface.triangles import longest_sides
 # coarse mesh may miss most of a peak; directions of a step; and lengths that are tried at once, each half of the one
 # before, the first the longest side of the facets around the node.
 PEAKS, LEAST_PEAK, DIRECTIONS, LENGTHS = 4, 0.1, 8, 6
+SHORTER = 0.5 ** np.arange(LENGTHS)
 # The least value is that of so many of the dimmest nodes and of the vertices on facets around them.
 DIMMEST = 16
 # A step that gains less than this share is the last.
 LEAST_GAIN, MOST_STEPS = 1e-3, 40
 
-# Copies of vertices that cannot be written to, whose nearest points a mesh keeps.
+# Vertices of a surface; and what was last tried, by the nodes or places that it is around: runs on one mesh mostly try
+# the same. None can be written to, so that the mesh keeps which of its facets they are on.
+MOST_KEPT = 64
 _VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[Surface, dict[bytes, FloatArray]] = WeakKeyDictionary()
 
 
 def extreme_places(solution: Solution) -> FloatArray:
@@ -43,16 +48,27 @@ def extreme_places(solution: Solution) -> FloatArray:
     dimmest = mesh.boundary_nodes[np.argsort(modulus(solution.exitance))[:DIMMEST]]
     dim[dimmest] = True
     near = dim[mesh.boundary_faces[mesh.closest_boundary(vertices)[1]]].any(axis=1)
-    return np.vstack([solution.surface.project(mesh.points[dimmest])[0], vertices[near], _climb(solution)])
+    nodes = mesh.points[dimmest]
+    places = _kept(solution.surface, nodes.tobytes(), lambda: solution.surface.project(nodes)[0])
+    return np.vstack([places, vertices[near], _climb(solution)])
 
 
 def _vertices_of(surface: Surface) -> FloatArray:
     """The vertices of a surface, (n, 3), as one array that cannot be written to."""
     if surface not in _VERTICES:
-        vertices = surface.points.copy()
-        vertices.setflags(write=False)
-        _VERTICES[surface] = vertices
+        _VERTICES[surface] = freeze(surface.points.copy())
     return _VERTICES[surface]
+
+
+def _kept(surface: Surface, key: bytes, make: Callable[[], FloatArray]) -> FloatArray:
+    """Points of a surface that are made only if they are not among the last that were asked for."""
+    kept = _KEPT.setdefault(surface, {})
+    # The last that was used is the last that is forgotten.
+    points = kept.pop(key, None)
+    kept[key] = points = freeze(make()) if points is None else points
+    while len(kept) > MOST_KEPT:
+        del kept[next(iter(kept))]
+    return points
 
 
 def _peaks(solution: Solution) -> IntArray:
@@ -74,30 +90,36 @@ def _climb(solution: Solution) -> FloatArray:
     facets = mesh.boundary_faces
     np.maximum.at(sides, facets.ravel(), np.repeat(longest_sides(mesh.points[facets]), 3))
     brightest = _peaks(solution)
-    places, normals = surface.project(mesh.points[brightest])
-    values, steps = modulus(solution.exitance_on(places)), sides[brightest]
-    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    shorter = 0.5 ** np.arange(LENGTHS)
+    places, steps = mesh.points[brightest], sides[brightest]
     climbing = np.arange(len(brightest))
     for _ in range(MOST_STEPS):
+        tried = _around(surface, places[climbing], steps[climbing])
+        bright = modulus(solution.exitance_on(tried)).reshape(len(climbing), -1)
+        best = bright.argmax(axis=1)
+        places[climbing] = tried.reshape(len(climbing), -1, 3)[np.arange(len(climbing)), best]
+        # The first place is where it is. The next steps begin with the length that led farthest.
+        better = bright.max(axis=1) - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
+        climbing, best = climbing[better], best[better]
         if len(climbing) == 0:
             break
-        first = np.cross(normals[climbing], np.eye(3)[np.abs(normals[climbing]).argmin(axis=1)])
-        first /= np.linalg.norm(first, axis=1)[:, None]
-        second = np.cross(normals[climbing], first)
-        ways = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
-        # (climbing, lengths, directions, 3)
-        tried = places[climbing, None, None] + (steps[climbing, None] * shorter)[..., None, None] * ways[:, None]
-        found, found_normals = surface.project(tried.reshape(-1, 3))
-        bright = modulus(solution.exitance_on(found)).reshape(len(climbing), LENGTHS * DIRECTIONS)
-        best = bright.argmax(axis=1)
-        row = np.arange(len(climbing)) * LENGTHS * DIRECTIONS + best
-        gains = bright.max(axis=1) - values[climbing]
-        better = gains > LEAST_GAIN * np.abs(values[climbing])
-        moved = climbing[better]
-        places[moved], normals[moved] = found[row[better]], found_normals[row[better]]
-        values[moved] = bright.max(axis=1)[better]
-        # The next steps begin with the length that led farthest.
-        steps[moved] *= shorter[best[better] // DIRECTIONS]
-        climbing = moved
+        steps[climbing] *= SHORTER[(best - 1) // DIRECTIONS]
     return places
+
+
+def _around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:
+    """For each of places (p, 3) its projection on the surface, and others around it within steps (p,), (p t, 3)."""
+    key = places.tobytes() + steps.tobytes()
+    return _kept(surface, key, lambda: _points_around(surface, places, steps))
+
+
+def _points_around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:
+    """`_around`, without what is remembered."""
+    middles, normals = surface.project(places)
+    first, second = perpendicular_axes(normals)
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    ways = np.cos(angles)[:, None] * first[:, None] + np.sin(angles)[:, None] * second[:, None]
+    # (p, lengths, directions, 3)
+    offsets = (steps[:, None] * SHORTER)[..., None, None] * ways[:, None]
+    around = middles[:, None] + offsets.reshape(len(places), -1, 3)
+    found = surface.project(around.reshape(-1, 3))[0].reshape(around.shape)
+    return np.concatenate([middles[:, None], found], axis=1).reshape(-1, 3)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.outcome.exitance_field import ResolvedField
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, freeze
 from tetlux.meshing.surface.subdivide import mark_longest_edges, number_triangle_edges, split_edges
 from tetlux.meshing.surface.surface import Surface
 
@@ -41,7 +41,8 @@ def surface_exitance(solution: ResolvedField) -> tuple[Surface, FloatArray]:
     """
     given = solution.surface
     flat, faces, parents = given.points, given.faces, np.arange(len(given.faces))
-    points, exitance = given.points, solution.exitance_on(given.points)
+    points = freeze(given.points.copy())
+    exitance = solution.exitance_on(points)
     splits = _Splits(solution)
     while len(flat) < len(given.points) + MOST_ADDED:
         edges = ends, edge = number_triangle_edges(faces)
@@ -53,7 +54,7 @@ def surface_exitance(solution: ResolvedField) -> tuple[Surface, FloatArray]:
         flat, faces, origin = split_edges(flat, faces, edges, marked)
         parents = parents[origin]
         points, exitance = np.vstack([points, places]), np.concatenate([exitance, values])
-    return replace(given, points=points, faces=faces, repairs=(), warnings=()), exitance
+    return replace(given, points=freeze(points), faces=faces, repairs=(), warnings=()), exitance
 
 
 class _Splits:
@@ -112,7 +113,8 @@ class _Splits:
 
     def _middles(self, flat: FloatArray, ends: IntArray, owner: IntArray) -> tuple[FloatArray, FloatArray]:
         """Middles (k, 3) of edges (k, 2) on the smooth surface, and the exitance there, (k,)."""
-        places, _ = self._solution.surface.on_curve(owner, flat[ends].mean(axis=1))
+        # Several lights and channels are evaluated there.
+        places = freeze(self._solution.surface.on_curve(owner, flat[ends].mean(axis=1))[0])
         return places, self._solution.exitance_on(places)
 
     def _are_long(self, flat: FloatArray, ends: IntArray, values: FloatArray, exitance: FloatArray) -> BoolArray:

@@ -1,6 +1,6 @@
 """`QuadraticScene`: the lights of a scene on a mesh, solved for by quadratic elements."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -121,16 +121,10 @@ class QuadraticScene:
         That is the fluence with the interpolants of its patches, and of patches that are the whole body the fluence
         less that of their charges.
         """
-        fitted, loads = self._fitted_and_loads()
-        return fitted + self.operator.solve_near(loads, self.known, self.stop_residual)
-
-    def _fitted_and_loads(self) -> tuple[NumberArray, NumberArray]:
-        """Interpolants of fitted charges, and the loads of what is missing, of each light, (size, k) both.
-
-        The system is solved for the remainder, which is far smaller near the light than the fitted charges.
-        """
+        # The remainder is far smaller near the light than the fitted charges.
         fitted = self._interpolants(lambda each: each.is_fitted and not each.is_whole)
-        return fitted, self.loads - self.operator.matrix @ fitted
+        loads = self.loads - self.operator.matrix @ fitted
+        return fitted + self.operator.solve_near(loads, self.known, self.stop_residual)
 
     @cached_property
     def fluence(self) -> NumberArray:
@@ -145,24 +139,6 @@ class QuadraticScene:
         )
 
     __repr__ = one_line
-
-
-def solve_together(scenes: Iterable[QuadraticScene]) -> None:
-    """Solve for several scenes: those of one operator at once, which takes half the time of one after the other.
-
-    Scenes that volume sources light come after those that excite them.
-    """
-    by_operator: dict[QuadraticOperator, list[QuadraticScene]] = {}
-    for scene in scenes:
-        if "solved" not in vars(scene) and not scene.known:
-            by_operator.setdefault(scene.operator, []).append(scene)
-    for operator, some in by_operator.items():
-        parts = [scene._fitted_and_loads() for scene in some]
-        loads = np.hstack([load for _, load in parts])
-        found = operator.solve(loads, min(scene.stop_residual for scene in some))
-        ends = np.cumsum([load.shape[1] for _, load in parts])[:-1]
-        for scene, (fitted, _), own in zip(some, parts, np.split(found, ends, axis=1), strict=True):
-            vars(scene)["solved"] = fitted + own
 
 
 def _patch(operator: QuadraticOperator, patch: Patch, fluence: NumberArray) -> QuadraticPatch:

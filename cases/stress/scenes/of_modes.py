@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.cases.stress.scenarios import TOLERANCE, Readout, Scenario, medium_of_albedo, mesh_of_unit_edges
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Readout, Scenario, medium_of_albedo, mesh_of_unit_edges
 from tetlux.fem import Medium, PointDetector, PointSource, Solution, System, sensitivity, solve
 from tetlux.fem.exact.modulated.sphere import point_exitance, pulse_exitance
 from tetlux.fem.models.modulation import seconds_per_length

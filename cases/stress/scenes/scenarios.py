@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tetlux.cases.chart.samples import Samples, project_to_sphere, surface_samples
-from tetlux.cases.stress.bodies import BODIES
-from tetlux.cases.stress.meshes import degrade, layered_ball
+from tetlux.cases.stress.scenes.bodies import BODIES
+from tetlux.cases.stress.scenes.meshes import degrade, layered_ball
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light

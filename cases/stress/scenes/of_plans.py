@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from tetlux.cases.chart.samples import surface_samples
-from tetlux.cases.stress.point_bodies import PointBody, ball, block, layers, plate
-from tetlux.cases.stress.point_scenarios import MOST_SAMPLES
-from tetlux.cases.stress.scenarios import (
+from tetlux.cases.stress.scenes.of_points import MOST_SAMPLES
+from tetlux.cases.stress.scenes.point_bodies import PointBody, ball, block, layers, plate
+from tetlux.cases.stress.scenes.scenarios import (
     Scenario,
     ball_in_diffuse_light,
     beam_by_radius_and_albedo,
