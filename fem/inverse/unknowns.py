@@ -182,7 +182,8 @@ def _parts(start: Start | Sequence[Start | Sequence[Medium]], regions: Sequence[
     """What the body and each region begin with."""
     if isinstance(start, Medium | Mapping):
         return [start, *(region.medium for region in regions)]
-    if not isinstance(start, Sequence) or isinstance(start, str):
+    given: object = start
+    if not isinstance(given, Sequence) or isinstance(given, str):
         raise InputError(f"start is {start!r}; give a Medium, or the arguments of tissue.", field="start")
     if len(start) != 1 + len(regions):
         raise InputError(

@@ -136,7 +136,8 @@ class Tabulated:
             return np.asarray((_terms(step[None])[0] @ self.polynomial - np.log(readings)) / NOISE)
 
         found = least_squares(residuals, np.zeros(2))
-        deviations = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+        jacobian = np.asarray(found.jac)
+        deviations = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)))
         return self.center + found.x, deviations
 
 
