@@ -1,7 +1,7 @@
 """What a batch saves, and whether it is right: ``python -m tests.benchmarks.batches [PART...]``.
 
-Seconds are CPU seconds with those of all children, which other work on the machine changes least. The parts, all by
-default:
+Seconds are CPU seconds with those of all children, which other work on the machine changes least. Commands find modules
+compiled, as those of an installed package are. The parts, all by default:
 
 * ``hare``: single commands against a batch on the hare (10 sigma_a x 10 sigma_s' x 10 directions, tolerance .05);
 * ``errors``: 20 of its runs, drawn with a fixed seed, against solutions at a tenth of the tolerance;
@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.benchmarks.compiled import compile_modules
 from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.batch.jobs import MeshJob
 from tetlux.cases.batch.mesh_store import MeshStore
@@ -198,6 +199,7 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", metavar="PART", choices=[[], *PARTS])
     parser.add_argument("--runs", type=int, default=1000)
     options = parser.parse_args()
+    compile_modules()
     for part in options.parts or PARTS:
         with tempfile.TemporaryDirectory() as folder:
             PARTS[part](Path(folder), options.runs)
