@@ -116,9 +116,7 @@ def _climb(solution: Solution) -> FloatArray:
 
 def _around(solution: Solution, places: FloatArray, steps: FloatArray) -> FloatArray:
     """For each of places (p, 3) its projection on the surface, and others around it within steps (p,), (p t, 3)."""
-    return _kept(
-        solution, np.column_stack([places, steps]), lambda: _points_around(solution.surface, places, steps)
-    )
+    return _kept(solution, np.column_stack([places, steps]), lambda: _points_around(solution.surface, places, steps))
 
 
 def _points_around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:

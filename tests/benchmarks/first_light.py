@@ -2,8 +2,9 @@
 
 Each row is a command in a process of its own, and the least of N times (3): wall clock, CPU seconds with those of its
 child processes, and both until the last line that says "solved". Cold: no mesh is remembered; warm: it is. Modules are
-compiled, as those of an installed package are. On a machine that does other things too, compare CPU seconds. A surface, scaled to some 35 mm, is lit in marble by sun and
-sky, with all outputs. To compare with another commit, run this file in its worktree as well.
+compiled, as those of an installed package are. On a machine that does other things too, compare CPU seconds. A
+surface, scaled to some 35 mm, is lit in marble by sun and sky, with all outputs. To compare with another commit, run
+this file in its worktree as well.
 """
 
 import argparse
