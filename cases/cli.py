@@ -3,6 +3,7 @@
 
 import argparse
 import contextlib
+import functools
 import os
 import re
 import signal
@@ -115,6 +116,7 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+@functools.cache
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="tetlux", description="Solve light diffusion through bodies of any shape, by tetrahedral finite elements."
@@ -184,11 +186,20 @@ def _add_inspections(commands: "argparse._SubParsersAction[_Parser]") -> None:
     )
     compare.set_defaults(command=does.compare)
 
+    film = commands.add_parser("film", help="show finished runs one after the other, such as those of a sweep")
+    film.add_argument("results", nargs="+", type=Path, metavar="RESULT", help="the folder of a run, or that of a sweep")
+    film.add_argument("--field", default="exitance", help="an array of surface.ply; default: exitance")
+    film.add_argument(
+        "--out", type=Path, default=Path("film.gif"), metavar="FILE", help="a .gif or .webp; default: film.gif"
+    )
+    film.set_defaults(command=does.film)
+
 
 def _add_helpers(commands: "argparse._SubParsersAction[_Parser]") -> None:
     """Add the commands that help to write cases and to report trouble."""
     new = commands.add_parser("new", help="write a commented case file to start from")
     new.add_argument("name", metavar="NAME", help="name of the case: NAME.yaml is written")
+    new.add_argument("surface", nargs="?", metavar="SURFACE", help="a surface file, which becomes the body")
     new.set_defaults(command=does.new)
 
     schema = commands.add_parser("schema", help="print the JSON Schema of the case file")

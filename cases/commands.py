@@ -132,11 +132,20 @@ def compare(options: argparse.Namespace) -> int:
     return 0
 
 
+def film(options: argparse.Namespace) -> int:
+    """Show finished runs one after the other."""
+    from tetlux.cases.results.film import film_results  # noqa: PLC0415
+
+    count = film_results(options.results, options.out, options.field)
+    print(f"{count} runs, written to {options.out}")
+    return 0
+
+
 def new(options: argparse.Namespace) -> int:
     """Write a commented case file."""
     from tetlux.cases.new import write_new_case  # noqa: PLC0415
 
-    path = write_new_case(options.name)
+    path = write_new_case(options.name, options.surface)
     print(f"wrote {path}; change it, then: tetlux run {path}")
     return 0
 

@@ -69,6 +69,8 @@ def _need_of_mesh(case: Case) -> str:
         return "compare is of finite elements"
     if case.fluorophores:
         return "what dyes emit is solved for on a mesh"
+    if case.fit is not None:
+        return "a fit has meshes"
     return MODULATED if any(case.frequencies) else ""
 
 

@@ -12,43 +12,54 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
+from tetlux.cases.fitting.record import FIT_FILES, FitRecord
+from tetlux.cases.fitting.solve import fit_case, with_fitted_media
 from tetlux.cases.solve import solve_case, solve_pulse
 from tetlux.cases.viewer import PAGE
 from tetlux.cases.write.content import content_of_scene
-from tetlux.cases.write.fields import surface_values, volume_values
-from tetlux.cases.write.ply import write_ply
+from tetlux.cases.write.fields import volume_values
 from tetlux.cases.write.publish import claim_folder, publish, write_error
 from tetlux.cases.write.pulse import PULSE_FILES, PulseResults
-from tetlux.cases.write.results import Results, collect_results
+from tetlux.cases.write.results import Results, collect_results, warnings_of
 from tetlux.cases.write.summary import summarize
-from tetlux.cases.write.vtp import write_vtp
+from tetlux.cases.write.surface_files import PLY, VTP, write_surface
 from tetlux.fem.lights.arrows import HasArrows
 from tetlux.fem.shared import SharedMesh
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.errors import RunError, memory_ran_out
 from tetlux.meshing.files.meshes import write_mesh
-from tetlux.meshing.notes import add_prefix
 
 # Pictures and comparisons are imported where they are used: together they take as long as a small solve.
 Report = Callable[[str], None]
 FILES = {
-    "surface": "surface.ply",
+    "surface": PLY,
     "volume": "volume.vtu",
     "picture": "picture.png",
     "viewer": PAGE,
     "glb": "surface.glb",
+    "sensitivity": "sensitivity.npz",
 }
-# The same surface for VTK, PyVista and ParaView, which do not show the values of a PLY file.
-VTP = "surface.vtp"
 MORE_PICTURES = ("picture-*.png", "picture.gif", "picture-*.gif")
 READINGS = "detectors.csv"
 # The picture of readings is drawn from this number of detectors on.
 READINGS_PICTURE, ENOUGH_TO_DRAW = "readings.png", 3
-FIGURES, MITSUBA = ("figures.svg", "figures.pdf"), ("emitter.ply", "emitter.pfm", "mitsuba.xml")
+FIGURES = ("figures.svg", "figures.pdf", "figures.png")
+MITSUBA = ("emitter.ply", "emitter.pfm", "mitsuba.xml")
 COMPARISON = ("compare.json", "compare.png")
 SUMMARY = "summary.json"
 # The summary is last, as `publish` needs it.
-ALL_FILES = (*FILES.values(), *FIGURES, *MITSUBA, VTP, *PULSE_FILES, READINGS, READINGS_PICTURE, *COMPARISON, SUMMARY)
+ALL_FILES = (
+    *FILES.values(),
+    *FIGURES,
+    *MITSUBA,
+    VTP,
+    *PULSE_FILES,
+    *FIT_FILES,
+    READINGS,
+    READINGS_PICTURE,
+    *COMPARISON,
+    SUMMARY,
+)
 
 
 @dataclass(frozen=True)
@@ -139,13 +150,15 @@ def finish_case(
     try:
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
+            record = FitRecord(case, fit_case(case, report)) if case.fit else None
+            case = with_fitted_media(case, record.found) if record else case
             transients = solve_pulse(case, report, cache=cache) if case.times else []
             solutions = [each.as_steady for each in transients] or solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds
             report(f"meshed in {seconds['mesh']:.2f} s, solved in {seconds['total'] - seconds['mesh']:.2f} s")
             writing = time.perf_counter()
             try:
-                results = replace(collect_results(case, solutions), transients=tuple(transients))
+                results = replace(collect_results(case, solutions), transients=tuple(transients), fit=record)
                 summary, warnings, readings = _write(results, folder, started, writing)
                 publish(folder, target, [*_more_pictures(folder, target), *ALL_FILES])
                 report(f"written in {time.perf_counter() - writing:.2f} s")
@@ -155,7 +168,8 @@ def finish_case(
         if not memory_ran_out(error):
             raise
         raise RunError("memory ran out; give a larger tolerance, or run it on a machine with more memory.") from error
-    return FinishedCase(target, summary, warnings, describe_readings(readings, case.surface.unit))
+    lines = [*(record.lines if record else []), *describe_readings(readings, case.surface.unit)]
+    return FinishedCase(target, summary, warnings, lines)
 
 
 def _write(
@@ -164,14 +178,15 @@ def _write(
     """Write all files of a run into a folder, and return its summary, warnings and readings."""
     case = results.case
     unit = case.surface.unit
-    warnings = _warnings(results)
+    warnings = warnings_of(results)
     pulse = PulseResults(results) if results.transients else None
+    if results.fit is not None:
+        results.fit.write(folder)
     if "surface" in case.outputs:
-        _write_surface(results, folder, {} if pulse is None else pulse.arrays())
-    if "volume" in case.outputs:
-        write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results))
+        write_surface(results, folder, {} if pulse is None else pulse.arrays())
     readings = read_detectors(case.detectors, results.by_channel_and_light())
-    _draw(results, readings, folder)
+    _write_on_mesh(results, readings, folder)
+    _draw(results, readings, folder, pulse)
     if pulse is not None:
         pulse.write(readings, folder)
     if readings:
@@ -197,6 +212,20 @@ def _write(
     figures["seconds"] = _seconds(results, started, writing)
     (folder / SUMMARY).write_text(_a_key_a_line(figures), encoding="utf-8")
     return figures, warnings, readings
+
+
+def _write_on_mesh(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+    """Write the volume and sensitivities, and add path lengths to readings."""
+    outputs, fields = results.case.outputs, {}
+    if "sensitivity" in outputs:
+        from tetlux.cases.write.sensitivities import Sensitivities  # noqa: PLC0415
+
+        found = Sensitivities(results)
+        found.write(folder / FILES["sensitivity"])
+        found.add_path_lengths(readings)
+        fields = found.fields()
+    if "volume" in outputs:
+        write_mesh(results.mesh_solutions[0].mesh, folder / FILES["volume"], volume_values(results) | fields)
 
 
 def _a_key_a_line(figures: dict[str, Any]) -> str:
@@ -233,20 +262,7 @@ def _places_lit(case: Case) -> FloatArray:
     return np.vstack([np.zeros((0, 3)), *places])
 
 
-def _write_surface(results: Results, folder: Path, more: dict[str, FloatArray]) -> None:
-    """Write the surface with its values and more, as PLY for mesh tools and as VTP for VTK."""
-    unit, values = results.case.surface.unit, surface_values(results) | more
-    notes = {"units": f"lengths in {unit}, exitance in W/{unit}^2"}
-    if results.has_colours:
-        notes["colours"] = f"red, green, blue: sRGB preview, white is {results.preview[1]:.6g} W/{unit}^2"
-    write_ply(results.surface, folder / FILES["surface"], values, list(notes.values()))
-    if results.has_colours:
-        # VTK's viewers show a colour only from a single array of three bytes.
-        values["preview"] = results.preview[0]
-    write_vtp(results.surface, folder / VTP, values, {"case": results.case.name, **notes})
-
-
-def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> None:
+def _draw(results: Results, readings: list[dict[str, Any]], folder: Path, pulse: PulseResults | None) -> None:
     """Draw pictures and figures, and write the viewer and what renderers read."""
     outputs = set(results.case.outputs)
     if "figures" in outputs:
@@ -263,25 +279,8 @@ def _draw(results: Results, readings: list[dict[str, Any]], folder: Path) -> Non
     if "viewer" in outputs:
         from tetlux.cases.viewer.write import write_viewer  # noqa: PLC0415
 
-        write_viewer(results, readings, scene, folder / FILES["viewer"])
+        write_viewer(results, readings, scene, folder / FILES["viewer"], pulse)
     if outputs & {"glb", "mitsuba"}:
         from tetlux.cases.renderers.write import write_for_renderers  # noqa: PLC0415
 
         write_for_renderers(results, scene, folder)
-
-
-def _warnings(results: Results) -> list[str]:
-    """The warnings of all channels; one that holds for some channels only names them."""
-    names, solutions = results.case.channel_names, results.solutions
-    channels_by_warning: dict[str, list[str]] = {}
-    for name, solution in zip(names, solutions, strict=True):
-        # Repairs are reported when the case is read.
-        for warning in (each for each in solution.warnings if each not in results.case.repairs):
-            channels_by_warning.setdefault(results.case.name_region(warning), []).append(name)
-    return [
-        *results.case.region_warnings,
-        *(
-            warning if len(channels) == len(names) else add_prefix(warning, f"in {' and '.join(channels)}: ")
-            for warning, channels in channels_by_warning.items()
-        ),
-    ]

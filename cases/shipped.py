@@ -24,7 +24,7 @@ def library_folder() -> Path:
 
 def shipped_cases() -> dict[str, str]:
     """Names of the shipped case files, each with the sentence in its first line."""
-    files = sorted(library_folder().glob("*.yaml"))
+    files = sorted(library_folder().glob("*.yaml"), key=lambda path: path.stem)
     return {path.stem: path.read_text(encoding="utf-8").splitlines()[0].lstrip("# ") for path in files}
 
 

@@ -1,5 +1,10 @@
 """How Sphinx builds these pages: ``python -m sphinx -W docs docs/_build``."""
 
+from docutils import nodes
+from latex2mathml.converter import convert
+from sphinx.application import Sphinx
+from sphinx.writers.html5 import HTML5Translator
+
 project = "tetlux"
 copyright = "2026, the authors of tetlux"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon"]
@@ -12,6 +17,7 @@ html_static_path = ["_static"]
 html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_show_sphinx = False
+html_math_renderer = "mathml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 # Links are checked by tests/test_readme.py.
@@ -26,3 +32,18 @@ default_role = "code"
 # Blocks without a language are no program.
 highlight_language = "text"
 nitpicky = False
+
+
+def _inline_math(writer: HTML5Translator, node: nodes.math) -> None:
+    writer.body.append(convert(node.astext()))
+    raise nodes.SkipNode
+
+
+def _math_block(writer: HTML5Translator, node: nodes.math_block) -> None:
+    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Write formulas as MathML, which browsers draw without a script."""
+    app.add_html_math_renderer("mathml", (_inline_math, None), (_math_block, None))

@@ -2,8 +2,9 @@
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.dyes.solve import fluorescence
-from tetlux.fem.inverse.fit import FitResult, fit
+from tetlux.fem.inverse.fit import fit
 from tetlux.fem.inverse.problem import FitProblem
+from tetlux.fem.inverse.result import FitResult
 from tetlux.fem.lights import (
     CollimatedBeam,
     Deposit,

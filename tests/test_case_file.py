@@ -191,8 +191,8 @@ def test_files_that_are_no_case(content: bytes, message: str, tmp_path: Path) ->
 def test_a_missing_case_names_those_that_ship(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "unicorn"]) == 2
     assert (
-        "unicorn is neither a file nor one of the shipped cases: candle, daylight, fibres, finger, hare, head, "
-        "inclusion, laser, marble, slab, sphere, torus." in capsys.readouterr().err
+        "unicorn is neither a file nor one of the shipped cases: candle, daylight, fibres, finger, finger-fit, hare, "
+        "head, inclusion, laser, marble, slab, sphere, torus." in capsys.readouterr().err
     )
     assert main(["run", "no/such.yaml"]) == 2
     assert "no/such.yaml does not exist" in capsys.readouterr().err
@@ -219,7 +219,7 @@ def test_check_says_which_case_files_can_run(tmp_path: Path, capsys: pytest.Capt
 
 def test_every_case_that_ships_can_run() -> None:
     names = sorted(p.stem for p in library_folder().glob("*.yaml"))
-    shipped = "candle daylight fibres finger hare head inclusion laser marble slab sphere torus"
+    shipped = "candle daylight fibres finger finger-fit hare head inclusion laser marble slab sphere torus"
     assert names == shipped.split()
     assert main(["check", *names]) == 0
 

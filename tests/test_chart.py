@@ -546,7 +546,7 @@ sweep: {medium.sigma_a: [0.01, 0.1]}
         (
             ["ball"],
             'ball: did you mean "sphere"? it is neither a file nor one of the shipped cases: '
-            "candle, daylight, fibres, finger, hare, head, inclusion, laser, marble, slab, sphere, torus.",
+            "candle, daylight, fibres, finger, finger-fit, hare, head, inclusion, laser, marble, slab, sphere, torus.",
         ),
         (["sweep.yaml"], "sweep.yaml has a sweep, but a chart takes single scenes; leave sweep out."),
         (

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 import yaml
 
 from tests.conftest import needs
@@ -18,6 +19,7 @@ from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.shipped import SCHEMA, library_folder, schema_line
+from tetlux.fem import PencilBeam
 
 
 def test_a_new_case_runs_as_it_is(
@@ -47,6 +49,43 @@ def test_what_a_new_case_has_in_comments_is_right(tmp_path: Path, monkeypatch: p
     assert len(cases[0].channels[0].lights) == 4
     for replaced in ("surface: {file", "up: [", "medium: {material", "tolerance: {"):
         assert f"# {replaced}" in text
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".obj"])
+def test_a_new_case_of_a_surface_is_lit_from_above(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ring = trimesh.creation.torus(20.0, 4.0, major_sections=24, minor_sections=12)
+    # A ring far from the origin: a beam through its middle misses it.
+    ring.apply_translation([1000.0, -50.0, 7.0])
+    if suffix == ".obj":
+        ring.apply_scale(0.001)
+    Path("of scans").mkdir()
+    ring.export(f"of scans/ring{suffix}")
+    assert main(["new", "mine", f"of scans/ring{suffix}"]) == 0
+    (case,) = load_cases(Path("mine.yaml"))
+    # A small one is taken to be in metres.
+    assert case.surface.volume == pytest.approx(ring.volume * (1e9 if suffix == ".obj" else 1), rel=1e-3)
+    assert "# The body is 48 x 48 x 8 mm" in Path("mine.yaml").read_text()
+    # OBJ files mostly have y up.
+    axis = 1 if suffix == ".obj" else 2
+    assert case.up == tuple(float(each == axis) for each in range(3))
+    (light,) = case.channels[0].lights.values()
+    assert isinstance(light, PencilBeam)
+    assert light.direction[axis] == -1
+
+
+def test_a_new_case_of_an_open_scan_closes_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=10.0)
+    ball.update_faces(ball.triangles_center[:, 2] > -6)
+    ball.export("open.ply")
+    assert main(["new", "mine", "open.ply"]) == 0
+    (case,) = load_cases(Path("mine.yaml"))
+    assert 3000 < case.surface.volume < 4200
+    assert main(["new", "other", "missing.ply"]) == 2
+    assert not Path("other.yaml").exists()
 
 
 @pytest.mark.parametrize(

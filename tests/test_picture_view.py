@@ -214,6 +214,21 @@ def test_an_arrow_does_not_hide_what_it_lights() -> None:
     assert arrow[inner, 1:].max() < 1.02
 
 
+def test_light_along_the_line_of_sight_is_a_ring_with_a_cross(tmp_path: Path) -> None:
+    front, back = Ray((0.5, -15.0, 0.5), (0.0, -5.0, 0.0)), Ray((2.0, 15.0, 0.0), (2.0, 5.0, 0.0))
+    shown = []
+    for lights in ((), (front, back)):
+        draw_picture(cube_from_the_front(lights=lights), tmp_path / "cube.png")
+        shown.append(pixels(tmp_path / "cube.png"))
+    rows, columns = np.nonzero((np.abs(shown[1] - shown[0]) > 3).any(axis=2))
+    x, y = front_camera().project(np.array([front.end]))[0, :2]
+    # One mark, of the beam that is seen, which leaves most of what it lights free: an arrow covers all of the middle.
+    assert (np.hypot(columns + 0.5 - x, rows + 0.5 - y) < 18).all()
+    assert 300 < len(rows) < 750
+    quarters = {(bool(c > x), bool(r > y)) for c, r in zip(columns, rows, strict=True)}
+    assert len(quarters) == 4
+
+
 def test_arrows_in_front_of_nothing_are_solid() -> None:
     cube = box((10.0, 10.0, 10.0))
     # Beside the cube; another marks the other side, so that the first lies within the panel.

@@ -4,10 +4,12 @@ import csv
 import json
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.viewer_made import data_of, unpack
 from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.meshing import InputError
@@ -18,7 +20,7 @@ medium: {sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}
 lights:
   - point: {position: [0, 0, 9.00990099009901], power: [1, 2]}
 pulse: {times: [1e-10, 2e-10, 5e-10, 2e-9]}
-outputs: [surface, film]
+outputs: [surface, film, viewer]
 detectors:
   - {name: side, point: [10, 0, 0]}
   - {name: far, disc: {center: [0, 0, -10], radius: 0.1}}
@@ -69,6 +71,17 @@ def test_the_surface_has_an_array_for_each_time(finished: Path) -> None:
         "exitance_500ps",
         "exitance_2000ps",
     ]
+
+
+def test_the_viewer_has_a_field_for_each_time_on_one_scale(finished: Path) -> None:
+    moments = data_of(finished / "viewer.html")["inTime"]
+    assert [moment["time"] for moment in moments] == [1e-10, 2e-10, 5e-10, 2e-9]
+    surface = meshio.read(finished / "surface.ply")
+    for moment, name in zip(moments, ("100ps", "200ps", "500ps", "2000ps"), strict=True):
+        np.testing.assert_allclose(unpack(moment["values"]), surface.point_data[f"exitance_{name}"], rtol=1e-6)
+        low, high = moment["ends"]
+        assert high == pytest.approx(1e4 * low)
+    assert high == pytest.approx(np.nanmax(surface.point_data["exitance_100ps"]))
 
 
 def test_the_film_has_a_frame_for_each_time(finished: Path) -> None:

@@ -1,14 +1,16 @@
 """The code in README and on the pages of docs."""
 
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
 from tests.meshes_made import cube_of_cubes
-from tetlux.cases.cli import main
+from tetlux.cases.cli import _parser, main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.shipped import case_text
@@ -135,6 +137,8 @@ def test_every_key_of_the_case_file_is_explained() -> None:
         ("CutSpec", ["picture.cut."]),
         ("FluorescenceSpec", ["fluorescence."]),
         ("DyeSpec", ["fluorescence.dyes[]."]),
+        ("FitSpec", ["fit."]),
+        ("FitReadingsSpec", ["fit.readings."]),
     ):
         for name in CaseSpec.model_json_schema()["$defs"][section]["properties"]:
             for prefix in prefixes:
@@ -160,11 +164,12 @@ def test_the_readme_is_short_and_its_code_runs(tmp_path: Path) -> None:
 def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
     (python,) = blocks("docs/start.md", "python")
     exec(python, {})
-    (tmp_path / "mine.yaml").write_text(
-        blocks("docs/start.md", "yaml")[0].replace("{file: mine.stl}", "{sphere: {radius: 20}}")
-    )
-    assert load_cases(tmp_path / "mine.yaml")[0].channel_names == ("red", "green", "blue")
-    fibres, tissue = blocks("docs/how-to.md", "yaml")
+    trimesh.creation.box((20.0, 30.0, 25.0)).export(tmp_path / "scan.stl")
+    (tmp_path / "mine.yaml").write_text(blocks("docs/start.md", "yaml")[0])
+    assert load_cases(tmp_path / "mine.yaml")[0].surface.volume == pytest.approx(15_000)
+    fibres, fitted, tissue = blocks("docs/how-to.md", "yaml")
+    (tmp_path / "fitted.yaml").write_text(fitted)
+    assert load_cases(tmp_path / "fitted.yaml")[0].fit is not None
     (tmp_path / "fibres.yaml").write_text(fibres)
     assert load_cases(tmp_path / "fibres.yaml")[0].detector_tolerance == 0.01
     ball = "surface: {sphere: {radius: 20}}\nlights: [{diffuse: {irradiance: 1}}]\n"
@@ -172,7 +177,8 @@ def test_the_start_and_the_recipes_run(tmp_path: Path) -> None:
     assert len(load_cases(tmp_path / "tissue.yaml")[0].channels) == 2
     names: dict[str, Any] = {}
     exec(blocks("docs/how-to.md", "python")[0], names)
-    assert (names["sigma_a"], names["sigma_s_prime"]) == pytest.approx((0.01, 1.0), rel=2e-3)
+    assert names["found"].values == pytest.approx({"sigma_a": 0.02, "sigma_s_prime": 1.2}, rel=0.02)
+    assert names["found"].undetermined == ()
 
 
 def test_the_cases_of_the_how_to_pages_are_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -187,6 +193,14 @@ def test_the_cases_of_the_how_to_pages_are_right(tmp_path: Path, monkeypatch: py
         for other in others:
             Path("other.yaml").write_text(other)
             assert load_cases(Path("other.yaml"))
+    layers, head = blocks("docs/layers.md", "yaml")
+    Path("layers.yaml").write_text(layers)
+    assert [len(case.regions) for case in load_cases(Path("layers.yaml"))] == [2, 2]
+    points, tetrahedra, places = cube_of_cubes(2, 10.0)
+    write_mesh(TetMesh(points, tetrahedra, regions=np.where(places[:, 2] > 0, 1, 2)), Path("head.msh"))
+    Path("head.yaml").write_text(head + "lights: [{diffuse: {irradiance: 1}}]\n")
+    (case,) = load_cases(Path("head.yaml"))
+    assert case.mesh is not None
     (text,) = blocks("docs/cluster.md", "yaml")
     Path("probe.yaml").write_text(text)
     assert len(load_cases(Path("probe.yaml"))) == 30
@@ -196,6 +210,48 @@ def test_the_cases_of_the_how_to_pages_are_right(tmp_path: Path, monkeypatch: py
     assert case.up == (0.0, 1.0, 0.0)
     for key in ("file: scan.obj", "scale: 1000", "holes: close"):
         assert key in text
+
+
+def test_the_line_of_exitance_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    names: dict[str, Any] = {}
+    exec(blocks("docs/pictures.md", "python")[0], names)
+    weak, strong = (line.get_ydata() for line in names["axes"].get_lines())
+    assert (strong < weak).all()
+    assert Path("line.svg").exists()
+
+
+# Blocks of each page that tests of this file run or read; a new one needs a test.
+BLOCKS = {
+    "README.md": {"python": 1, "yaml": 1},
+    "docs/case-files.md": {"python": 1, "yaml": 4},
+    "docs/cluster.md": {"yaml": 1},
+    "docs/how-to.md": {"python": 1, "yaml": 3},
+    "docs/layers.md": {"yaml": 2},
+    "docs/pictures.md": {"python": 1, "yaml": 3},
+    "docs/python.md": {"python": 3},
+    "docs/rendering.md": {"yaml": 1},
+    "docs/scan.md": {"yaml": 1},
+    "docs/start.md": {"python": 1, "yaml": 1},
+}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_no_block_is_left_untested(page: str) -> None:
+    found = {language: len(blocks(page, language)) for language in ("python", "yaml")}
+    assert {language: count for language, count in found.items() if count} == BLOCKS.get(page, {})
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_of_pages_are_understood(page: str) -> None:
+    commands = re.findall(r"(?:^|&& |bin/)tetlux ([^\n#&]+)", "\n".join(blocks(page, "sh")), flags=re.MULTILINE)
+    for command in commands:
+        assert _parser().parse_args(shlex.split(command)).command, command
+    for name in re.findall(r"`tetlux ([a-z]+)", text_of(page)):
+        with pytest.raises(SystemExit) as ended:
+            _parser().parse_args([name, "--help"])
+        assert ended.value.code == 0, name
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -187,7 +187,9 @@ def test_the_page_holds_everything_itself(tmp_path: Path) -> None:
     assert data["rows"][0][data["columns"].index("up")] == "[0, 0, 1]"
     assert (data["units"]["exited"], data["units"]["medium.sigma_a"], data["units"]["up"]) == ("W", "1/unit", "")
     assert list(data["pictures"]) == ["a/x=1"]
-    assert data["pictures"]["a/x=1"].startswith("data:image/jpeg;base64,")
+    name, small = data["pictures"]["a/x=1"]
+    assert name == "picture.png"
+    assert small.startswith("data:image/jpeg;base64,")
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")

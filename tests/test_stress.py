@@ -15,17 +15,28 @@ from PIL import Image
 
 from tetlux.cases.cli import main
 from tetlux.cases.stress import command as stress_module
-from tetlux.cases.stress import point_scenarios, scenarios
-from tetlux.cases.stress.command import stress
-from tetlux.cases.stress.files import COLUMNS, FILES
+from tetlux.cases.stress.command import COLUMNS, FILES, stress
 from tetlux.cases.stress.grid import PANELS
 from tetlux.cases.stress.measure import Diagnostics, measure
-from tetlux.cases.stress.meshes import degrade, layered_ball
-from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.panels import (
+    CHARGES,
+    CONSISTENT,
+    DEFAULT,
+    NOT_REFINED,
+    NOTHING,
+    PLANNED,
+    TRUNCATED,
+    Axis,
+    Panel,
+    Value,
+    Variant,
+)
 from tetlux.cases.stress.report import as_markdown
 from tetlux.cases.stress.rules import broken_rules, violations
+from tetlux.cases.stress.scenes import of_modes, of_plans, of_points, scenarios
+from tetlux.cases.stress.scenes.meshes import degrade, layered_ball
+from tetlux.cases.stress.scenes.scenarios import Scenario
 from tetlux.cases.stress.trials import Trial
-from tetlux.cases.stress.variants import CHARGES, CONSISTENT, DEFAULT, NOT_REFINED, NOTHING, Variant
 from tetlux.fem.linear import direct, krylov
 from tetlux.fem.linear import solver as linear
 from tetlux.meshing.arrays import FloatArray
@@ -194,7 +205,7 @@ def test_iterations_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_charges_are_measured_against_the_closed_form() -> None:
-    scenario = point_scenarios.charges_by_body_and_light("box, by an edge", "1 deep")
+    scenario = of_points.charges_by_body_and_light("box, by an edge", "1 deep")
     found = measure(scenario, CHARGES)
     assert found.error is not None
     assert found.bound is not None
@@ -206,8 +217,35 @@ def test_charges_are_measured_against_the_closed_form() -> None:
     assert list(violations(run_of(replace(found, bound=0.5 * found.error), CHARGES))) == ["bound"]
 
 
+def test_a_part_is_measured_where_the_light_is() -> None:
+    scenario = of_plans.part_by_body_and_albedo("ball of 300", 0.9)
+    found = measure(scenario, TRUNCATED)
+    assert found.error is not None
+    # Measured .0013, estimate .0012; the whole ball would take a hundred times as many nodes.
+    assert 1e-4 < found.error < 0.01
+    assert found.nodes < 3000
+    assert broken_rules(run_of(found, TRUNCATED)) == {}
+
+
+def test_the_plan_solves_a_plate_by_its_closed_form() -> None:
+    found = measure(of_plans.plan_by_scene_and_albedo("plate, point", 0.99), PLANNED)
+    assert (found.nodes, found.ledger, found.lowest) == (0, None, None)
+    assert found.error is not None
+    assert found.error < 1e-12
+
+
+def test_the_report_says_the_regret_of_the_plan() -> None:
+    trials = [
+        run_of(replace(GOOD, seconds=seconds, estimate=estimate), variant)
+        for variant, seconds, estimate in ((PLANNED, 3.0, 0.01), (DEFAULT, 2.0, 0.01), (CHARGES, 1.0, 0.2))
+    ]
+    # Charges are fastest, but miss the tolerance.
+    assert "1.50 in the median of 1, 1.50 in the worst" in as_markdown(trials)
+    assert "Regret" not in as_markdown(trials[1:])
+
+
 def test_readings_are_measured_and_a_miss_is_found() -> None:
-    scenario = point_scenarios.readings_by_body_and_place("ball", "behind")
+    scenario = of_points.readings_by_body_and_place("ball", "behind")
     found = measure(scenario, DEFAULT)
     assert found.error is not None
     # Measured .0005, bar .0006.
@@ -219,6 +257,27 @@ def test_readings_are_measured_and_a_miss_is_found() -> None:
     other = measure(replace(scenario, readings=(places, truth * np.array([1.0, 1.0, 1.2, 1.0]))), DEFAULT)
     assert other.error == pytest.approx(1.0 - 1.0 / 1.2, abs=0.03)
     assert list(violations(run_of(other))) == ["silent error"]
+
+
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        of_modes.modulated_by_frequency_and_place(0.1, "near"),
+        of_modes.modulated_by_wave_number_and_ratio(0.3, 10.0),
+        of_modes.sensitivity_by_albedo_and_place(0.99, "near"),
+    ],
+)
+def test_modes_are_measured_and_a_miss_is_found(scenario: Scenario) -> None:
+    found = measure(scenario, DEFAULT)
+    assert found.of_readings
+    assert found.finite
+    assert found.error is not None
+    assert found.error < 0.01
+    assert scenario.readings is not None
+    places, truth = scenario.readings
+    missed = measure(replace(scenario, readings=(places, truth * 1.2)), DEFAULT)
+    (rule,) = broken_rules(Trial(PANELS[0], 0.1, 0.1, DEFAULT, "ran", "", missed))
+    assert rule == "silent error"
 
 
 @pytest.mark.parametrize("kind", scenarios.LENGTH_KINDS[:4])

@@ -1,6 +1,7 @@
 """The viewer in Chromium: what it shows, and what it reads."""
 
 import io
+import json
 import math
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.viewer_made import CHROMIUM, OPTIONS, data_of, run_with_viewer
+from tests.viewer_made import CHROMIUM, OPTIONS, data_of, run_with_viewer, unpack
+from tetlux.cases.viewer.pack import pack_floats
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.search.rays import RayCaster
 
@@ -24,7 +26,7 @@ SIZES = {"wide": (1280, 900), "phone": (390, 844)}
 SMALL = (872, 500)
 FIRST = (
     "quantity: 'exitance', channel: 'all', light: 'all', logarithmic: true, map: 'inferno', edges: false, "
-    "lights: true, detectors: true, regions: true, cut: 'off', position: 0.5"
+    "lights: true, detectors: true, regions: true, cut: 'off', position: 0.5, moment: 0"
 )
 # Draw what is asked for, then as finely as at rest.
 AT_REST = (
@@ -315,3 +317,56 @@ def test_names_of_detectors_and_regions_are_shown_and_hidden(wide: Page) -> None
     assert {"top", "ball"} <= set(wide.do(names))
     wide.change("detectors: false, regions: false")
     assert wide.do(names) == []
+
+
+def test_a_slider_goes_through_light_in_time(browser: Any, folder: Path, tmp_path: Path) -> None:
+    html = (folder / "viewer.html").read_text(encoding="utf-8")
+    data = data_of(folder / "viewer.html")
+    first = data["fields"][0]
+    count = first["values"]["shape"][0]
+    # The vertices of a half are bright at first, those of the other later; one of all is not known at all.
+    left = unpack(data["points"])[:, 0] < 0
+    values = [np.where(left, 100.0, 1.0), np.where(left, 1.0, 100.0)]
+    values[0][count - 1] = np.nan
+    moments = [
+        {**first, "quantity": "pulse", "unit": "W/mm²/J", "ends": [1, 100], "time": time, "values": pack_floats(each)}
+        for time, each in zip((5e-11, 1.2e-9), values, strict=True)
+    ]
+    text = json.dumps({**data, "inTime": moments}).replace("<", "\\u003c")
+    before, opening, rest = html.partition('<script type="application/json" id="data">')
+    path = tmp_path / "pulse.html"
+    path.write_text(f"{before}{opening}{text}</script>{rest.partition('</script>')[2]}")
+    shown = Page(browser, path, SMALL)
+    assert not shown.page.is_visible("#moment")
+    early = shown.change("quantity: 'pulse', lights: false, detectors: false, regions: false")
+    assert shown.page.inner_text("#time") == "50 ps"
+    shown.page.focus("#moment")
+    shown.page.keyboard.press("ArrowRight")
+    late = shown.shown()
+    assert shown.page.inner_text("#time") == "1.2 ns"
+    x, y = shown.place_of(np.array([103.0, 0, 4]))
+    assert number(shown.do(f"tetlux.pick({x}, {y})")["exitance at 1.2 ns"]) == pytest.approx(100)
+    # What was bright is dark and the reverse, on one scale.
+    body = body_of(early) & body_of(late)
+    brighter = (late - early).sum(axis=2)[body] > 60
+    assert 0.2 < brighter.mean() < 0.8
+    assert ((late - early).sum(axis=2)[body] < -60).mean() > 0.2
+    shown.change("quantity: 'exitance'")
+    assert not shown.page.is_visible("#moment")
+    assert [text for text in shown.said if OF_THE_DRIVER not in text] == []
+
+
+def test_an_arrow_along_the_line_of_sight_becomes_a_ring(wide: Page) -> None:
+    ring = "document.querySelector('.mark.beams.end-on i')"
+    wide.shown()
+    assert wide.do("tetlux.arrows.children.map(arrow => arrow.visible)") == [True]
+    assert wide.do(f"{ring} === null")
+    wide.do("tetlux.view.turn(0, 2)")
+    wide.shown()
+    assert wide.do("tetlux.arrows.children.map(arrow => arrow.visible)") == [False]
+    assert wide.do(f"getComputedStyle({ring}).display") == "block"
+    # From behind nothing is marked: the body hides where the beam enters.
+    wide.do("tetlux.view.turn(0, -4)")
+    wide.shown()
+    assert wide.do("tetlux.arrows.children.map(arrow => arrow.visible)") == [False]
+    assert wide.do(f"{ring} === null")

@@ -11,8 +11,8 @@ from tetlux.meshing.host.blocks import CORES
 
 # CPU seconds, measured on surfaces of 5,000 to 10,000 triangles at tolerances of .02 to .1: to start; for a mesh that
 # is not in the cache; for each channel of a run with a mesh of its own, or of one that starts from a shared mesh; for a
-# picture.
-TO_START, PER_MESH, PER_OWN_RUN, PER_SHARED_RUN, PER_PICTURE = 2.0, 2.0, 1.5, 0.2, 3.0
+# picture; for each channel of a fit of ten readings.
+TO_START, PER_MESH, PER_OWN_RUN, PER_SHARED_RUN, PER_PICTURE, PER_FIT = 2.0, 2.0, 1.5, 0.2, 3.0, 15.0
 
 
 def describe_plan(plan: Plan, cases: Sequence[Case]) -> str:
@@ -44,7 +44,8 @@ def _seconds(plan: Plan, cases: Sequence[Case]) -> float:
     for task in plan.tasks:
         each = PER_SHARED_RUN if task.mesh in shared else PER_OWN_RUN
         for run in task.runs:
-            total += each * len(cases[run].channels) + PER_PICTURE * ("picture" in cases[run].outputs)
+            of_channel = each + PER_FIT * (cases[run].fit is not None)
+            total += of_channel * len(cases[run].channels) + PER_PICTURE * ("picture" in cases[run].outputs)
     return TO_START + total / min(CORES, len(plan.names))
 
 

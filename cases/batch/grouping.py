@@ -93,7 +93,7 @@ def _name(case: Case) -> str:
 def _makes_mesh(case: Case) -> bool:
     """Whether the run makes a mesh that others can begin with."""
     model = case.spec.model if case.plan is None else case.plan.chosen
-    return case.mesh is None and model == "full" and not case.fluorophores
+    return case.mesh is None and model == "full" and not case.fluorophores and case.fit is None
 
 
 def _wanted(case: Case) -> tuple[Hashable, ...]:

@@ -10,7 +10,8 @@ from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.light_names import BODY
 from tetlux.cases.file.media import read_media
 from tetlux.cases.file.reader import Reader
-from tetlux.cases.file.schema.case import CaseSpec, MeshSpec
+from tetlux.cases.file.schema.body import MeshSpec
+from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.fluorescence import DyeSpec, FluorescenceSpec
 from tetlux.cases.file.schema.media import Media
 from tetlux.fem.body.body import Body

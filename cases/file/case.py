@@ -9,6 +9,7 @@ from tetlux.cases.file.detectors import NamedDetector
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.picture.view import UPRIGHT
 from tetlux.fem.assessment import Tolerances
+from tetlux.fem.inverse.request import FitRequest
 from tetlux.fem.lights import Light
 from tetlux.fem.media.coefficients import AnyMedium, MediaByLabel, base_of
 from tetlux.fem.media.fluorophore import Fluorophore
@@ -99,6 +100,8 @@ class Case:
     fluorophores : tuple of Fluorophore
         If there are any, the second half of the channels are what they emit, lit by the first half; and regions have
         media for all of these.
+    fit : FitRequest, optional
+        What is fitted before it is solved, beginning with its media.
     """
 
     name: str
@@ -124,6 +127,7 @@ class Case:
     mesh: TetMesh | None = None
     plan: Plan | None = None
     fluorophores: tuple[Fluorophore, ...] = ()
+    fit: FitRequest | None = None
 
     @property
     def tolerances(self) -> Tolerances:

@@ -13,7 +13,9 @@ from tetlux.cases.file.channels import ALL, channel_names, check_unique_names, n
 from tetlux.cases.file.detectors import NamedDetector, build_detector
 from tetlux.cases.file.documents.base import read_with_base
 from tetlux.cases.file.documents.document import Document, Key
+from tetlux.cases.file.fit import read_fit
 from tetlux.cases.file.light_names import field_keys, light_names
+from tetlux.cases.file.measured.table import Names
 from tetlux.cases.file.reader import FilesRead, Reader
 from tetlux.cases.file.schema.case import CaseSpec, ModulationSpec
 from tetlux.cases.file.schema.pulse import PulseSpec
@@ -107,6 +109,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
     frequencies = _build_frequencies(document, spec, body)
     _check_times(document, spec, body)
     lights, deposits = _build_lights(document, spec, names, body, channels, reader)
+    of_fit = Names(channels, names, tuple(detector.name for detector in spec.detectors))
     if spec.model == "closed-form":
         _check_for_closed_form(document, body, deposits)
     return Case(
@@ -130,6 +133,7 @@ def _build_case(document: Document, spec: CaseSpec, name: str, reader: Reader, v
         up=spec.up,
         toward=_direction_to_camera(document, spec, body.surface),
         comparison=_build_comparison(document, spec, body, deposits),
+        fit=read_fit(document, spec, body, of_fit, lights, frequencies, reader),
     )
 
 

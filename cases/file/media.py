@@ -1,5 +1,7 @@
 """Media of the case file, built as `Medium` or `VaryingMedium`."""
 
+from typing import Any
+
 from tetlux.cases.file.channels import value_in_channel
 from tetlux.cases.file.documents.document import Document, Key
 from tetlux.cases.file.reader import Reader
@@ -79,24 +81,41 @@ def _medium(
         return varying
 
 
-def _tissue(document: Document, key: Key, spec: TissueSpec, unit: str, reader: Reader) -> tuple[AnyMedium, ...]:
+def tissue_arguments(key: Key, spec: TissueSpec, unit: str, document: Document, reader: Reader) -> dict[str, Any]:
+    """The arguments of `tissue` for a medium by chromophores, with the spectra that it names.
+
+    Raises
+    ------
+    InputError
+        If a file of a spectrum cannot be read.
+    """
     others: dict[str, tuple[Spectrum, float]] = {}
-    keys: dict[str, Key] = {name: ("chromophores", name) for name in SPECTRA}
     for name, substance in spec.chromophores.others.items():
-        keys.setdefault(name, ("chromophores", "others", name))
-        with document.at((*key, *keys[name])):
+        with document.at((*key, *_keys_of_tissue(spec)[name])):
             others[name] = reader.spectrum(substance)
-    keys |= {"a": ("scattering", "a"), "b": ("scattering", "b")}
-    with document.at(key, keys | {name: (name,) for name in TissueSpec.model_fields}):
-        media = tissue(
-            wavelengths=spec.wavelengths,
-            **{name: getattr(spec.chromophores, name) for name in SPECTRA},
-            others=others,
-            **dict(spec.scattering),
-            eta=spec.eta,
-            unit=unit,
-            boundary=spec.boundary,
-        )
+    return {
+        "wavelengths": spec.wavelengths,
+        **{name: getattr(spec.chromophores, name) for name in SPECTRA},
+        "others": others,
+        **dict(spec.scattering),
+        "eta": spec.eta,
+        "unit": unit,
+        "boundary": spec.boundary,
+    }
+
+
+def _keys_of_tissue(spec: TissueSpec) -> dict[str, Key]:
+    """The keys of amounts, scattering and the rest within the section of a medium, by name."""
+    keys: dict[str, Key] = {name: (name,) for name in TissueSpec.model_fields}
+    keys |= {name: ("chromophores", "others", name) for name in spec.chromophores.others}
+    keys |= {name: ("chromophores", name) for name in SPECTRA}
+    return keys | {"a": ("scattering", "a"), "b": ("scattering", "b")}
+
+
+def _tissue(document: Document, key: Key, spec: TissueSpec, unit: str, reader: Reader) -> tuple[AnyMedium, ...]:
+    arguments = tissue_arguments(key, spec, unit, document, reader)
+    with document.at(key, _keys_of_tissue(spec)):
+        media = tissue(**arguments)
         for medium in media:
             check_scattering(medium)
     return tuple(media)

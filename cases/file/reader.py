@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tetlux.cases.file.fields import read_array_field, read_image_field, read_mesh_field
 from tetlux.cases.file.images import read_pixels
-from tetlux.cases.file.schema.case import MeshSpec, SurfaceSpec
+from tetlux.cases.file.schema.body import MeshSpec, SurfaceSpec
 from tetlux.cases.file.schema.media import FieldSpec, SubstanceSpec
 from tetlux.cases.file.schema.parts import Encoding
 from tetlux.cases.file.spectra import read_spectrum

@@ -28,7 +28,21 @@ YAML_WORDS = {None: "nothing", True: "true", False: "false"}
 # How to write a section for which a single word was given.
 ONE_WORD = {"surface": "surface: {{file: {0}}}", "medium": "medium: {{material: {0}}}"}
 # Lists that do not hold three numbers.
-COUNTS: dict[str | int, str] = {"values": "two", "range": "two", "pixels": "two"}
+COUNTS: dict[str | int, str] = {"values": "two", "range": "two", "pixels": "two", "bounds": "two"}
+# Types of errors whose messages say all.
+WHOLE_SENTENCES = (
+    "unknown_key",
+    "one_of",
+    "scale",
+    "holes",
+    "body",
+    "no_mesh",
+    "tolerance",
+    "sweep",
+    "picture",
+    "pulse",
+    "fit",
+)
 
 
 def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
@@ -45,7 +59,7 @@ def validate(document: Document, data: dict[str, Any]) -> CaseSpec:
         first = failure.errors()[0]
         key: Key = tuple(part for part in first["loc"] if not str(part).startswith(TAG))
         context = first.get("ctx", {})
-        if first["type"] in ("unknown_key", "no_mesh", "pulse"):
+        if first["type"] in ("unknown_key", "no_mesh", "pulse", "fit") and "key" in context:
             key = (*key, context["key"])
         if first["type"] == "body":
             key = () if "name" in context else ("mesh",)
@@ -68,7 +82,7 @@ def _sentence(kind: str, message: str, given: object, key: Key) -> str:
             text = plain or several
     if kind.startswith("string_pattern") and key != ("name",):
         text = "expected a name of letters from A to Z, digits and . + - _ that begins with a letter or digit"
-    if kind in ("unknown_key", "one_of", "scale", "holes", "body", "no_mesh", "tolerance", "sweep", "picture", "pulse"):
+    if kind in WHOLE_SENTENCES:
         return f"{text}."
     hint = ""
     if kind == "literal_error" and isinstance(given, str):

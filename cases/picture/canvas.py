@@ -126,6 +126,12 @@ class Canvas:
         """Fill a rectangle of whole pixels."""
         self._draw.rectangle((left, top, left + width - 1, top + height - 1), fill=color)
 
+    def halved(self) -> "Canvas":
+        """The same at half the width and height."""
+        small = Canvas((self._image.width // 2, self._image.height // 2), (0.0, 0.0, 0.0))
+        small._image.paste(self._image.reduce(2))
+        return small
+
     def save(self, path: Path) -> None:
         """Write a PNG."""
         self._image.save(path, format="PNG", compress_level=COMPRESSION)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from PIL.Image import Image as PillowImage
 
 from tetlux.cases.picture.canvas import Canvas
 from tetlux.cases.picture.frame import AROUND, draw_frame
@@ -23,6 +24,10 @@ __all__ = ["PictureScene", "Ray", "RegionOutline", "draw_picture"]
 # Of a picture, pixels, unless the case gives one; seconds of a turn and of a film.
 SIZE = (PANEL[0] + AROUND[0], PANEL[1] + AROUND[1])
 SECONDS, FILM_SECONDS = 4, 6
+# Pictures smaller than this along one side are drawn twice as large and shrunk, or letters would leave no room.
+SMALL = 640
+# Of one picture of a film, milliseconds, at most.
+SLOWEST = 800
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,14 +128,17 @@ def draw_turntable(scene: PictureScene, frames: int, path: Path) -> None:
         x = math.cos(turn) * level[0] - math.sin(turn) * level[1]
         y = math.sin(turn) * level[0] + math.cos(turn) * level[1]
         images.append(canvas_of(replace(scene, toward=x * first + y * second + height * above), turning=True).image)
-    with replacing(path) as unfinished:
-        images[0].save(
-            unfinished, format="GIF", save_all=True, append_images=images[1:], duration=SECONDS * 1000 // frames, loop=0
-        )
+    _write_frames(images, [SECONDS * 1000 // frames] * frames, path)
 
 
 def draw_film(scenes: Sequence[PictureScene], path: Path) -> None:
-    """Write a GIF of scenes, one after the other, and the last for longer.
+    """Write scenes one after the other, from one side, and the last for longer.
+
+    Parameters
+    ----------
+    scenes : sequence of PictureScene
+    path : Path
+        A GIF, or WebP by its suffix ``.webp``.
 
     Raises
     ------
@@ -139,26 +147,31 @@ def draw_film(scenes: Sequence[PictureScene], path: Path) -> None:
     """
     toward = scene_stage(scenes[0]).camera.toward
     images = [canvas_of(replace(scene, toward=toward)).image for scene in scenes]
-    each = FILM_SECONDS * 1000 // len(images)
+    each = min(FILM_SECONDS * 1000 // len(images), SLOWEST)
+    _write_frames(images, [each] * (len(images) - 1) + [each + 1000], path)
+
+
+def _write_frames(images: Sequence[PillowImage], durations: list[int], path: Path) -> None:
+    """Write pictures that follow each other for ever, each for so many milliseconds."""
+    kind = "WEBP" if path.suffix.lower() == ".webp" else "GIF"
     with replacing(path) as unfinished:
         images[0].save(
-            unfinished,
-            format="GIF",
-            save_all=True,
-            append_images=images[1:],
-            duration=[each] * (len(images) - 1) + [each + 1000],
-            loop=0,
+            unfinished, format=kind, save_all=True, append_images=images[1:], duration=durations, loop=0, method=4
         )
 
 
 def canvas_of(scene: PictureScene, *, turning: bool = False) -> Canvas:
     """Draw a scene; `turning`: at a scale in which any side of the body fits into the panel."""
+    if min(scene.size) < SMALL:
+        width, height = scene.size
+        return canvas_of(replace(scene, size=(2 * width, 2 * height)), turning=turning).halved()
     stage = scene_stage(scene)
     if turning:
         stage = replace(stage, camera=_fixed(stage.camera, scene.points))
     scale = scene.scale or scale_of(scene.exitance, "exitance", f"W/{scene.unit}²")
     extent = np.ptp(scene.points, axis=0)
-    marks = project_marks(stage.camera, stage.corners, scene.regions, scene.detectors, float(np.linalg.norm(extent)))
+    diagonal = float(np.linalg.norm(extent))
+    marks = project_marks(stage.camera, stage.corners, scene.regions, scene.detectors, scene.lights, diagonal)
     return draw_frame(
         draw_stage(stage),
         stage.camera,

@@ -21,6 +21,9 @@ PALE, PALE_FAINT = "#e8eaee", "#9aa3b0"
 # top of the picture, and its lower end from the bottom, pixels.
 RIGHT = 95
 BAR_WIDTH, BAR_TOP, BAR_LOW = 30, 190, 120
+# Colour of lights, and the radius of the mark of one that is seen end-on, pixels.
+TEAL = "#" + "".join(f"{round(255 * value):02x}" for value in LIGHT)
+BEAM = 15.0
 # Height of the arrow below the bar that stands for all that is darker.
 BELOW = 22
 
@@ -71,6 +74,7 @@ def draw_frame(
     _axes_cross(canvas, camera, faint)
     draw_marks(canvas, marks, LEFT, TOP)
     _light_marks(canvas, camera, lights)
+    _beam_marks(canvas, marks.beams + np.array([LEFT, TOP]))
     right = LEFT + camera.panel[0] + RIGHT
     if white is not None:
         _white_note(canvas, right, white, unit)
@@ -101,7 +105,7 @@ def _size_marks(canvas: Canvas, camera: Camera, unit: str, extent: FloatArray, i
 
 def _axes_cross(canvas: Canvas, camera: Camera, faint: str) -> None:
     """Draw the directions of x, y and z at the lower right."""
-    x0, y0 = LEFT + camera.panel[0] + float(RIGHT), camera.panel[1] + AROUND[1] - 50.0
+    x0, y0 = LEFT + camera.panel[0] + float(RIGHT), camera.panel[1] + AROUND[1] - 62.0
     length = 40.0
     for axis, name in zip(np.eye(3), "xyz", strict=True):
         dx, dy = float(length * axis @ camera.right), float(-length * axis @ camera.up)
@@ -118,12 +122,20 @@ def _light_marks(canvas: Canvas, camera: Camera, lights: tuple[Ray, ...]) -> Non
     placed = camera.project(points)[:, :2]
     # The camera may leave points outside the panel that are far from the body.
     inside = placed[((placed > 0) & (placed < camera.panel)).all(axis=1)]
-    light = "#" + "".join(f"{round(255 * value):02x}" for value in LIGHT)
     for x, y in (inside + np.array([LEFT, TOP])).tolist():
         canvas.disc((x, y), 13.9, "white", hole=7.0)
-        canvas.disc((x, y), 12.2, light, hole=8.6)
+        canvas.disc((x, y), 12.2, TEAL, hole=8.6)
         canvas.disc((x, y), 4.2, "white")
-        canvas.disc((x, y), 3.2, light)
+        canvas.disc((x, y), 3.2, TEAL)
+
+
+def _beam_marks(canvas: Canvas, places: FloatArray) -> None:
+    """Draw a ring with a cross, the tail of an arrow, where light enters along the line of sight."""
+    for x, y in places.tolist():
+        for radius, width, colour in ((BEAM + 0.8, 5.2, "white"), (BEAM, 2.8, TEAL)):
+            arm = (radius - 0.5 * width) / math.sqrt(2.0)
+            canvas.disc((x, y), radius, colour, hole=radius - width)
+            canvas.lines([[(x - arm, y - s * arm), (x + arm, y + s * arm)] for s in (-1, 1)], 0.6 * width, colour)
 
 
 def _white_note(canvas: Canvas, right: int, white: float, unit: str) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 from tetlux.cases.picture.canvas import Canvas
 from tetlux.cases.picture.rasterizer import visible_triangles
 from tetlux.cases.picture.shading import place_samples, samples_of
-from tetlux.cases.picture.stage import OVERSAMPLING
-from tetlux.cases.picture.view import Camera, caster_of, in_view
+from tetlux.cases.picture.stage import OVERSAMPLING, is_end_on
+from tetlux.cases.picture.view import Camera, Ray, caster_of, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 
 INK, PAPER = "#20242b", "#ffffff"
@@ -46,12 +46,15 @@ class Marks:
         Positions of the detectors.
     hidden : (d,) ndarray of bool
         Whether the body hides the detector.
+    beams : (b, 2) ndarray
+        Where light enters along the line of sight and the entry is visible.
     """
 
     outlines: Sequence[tuple[str, FloatArray]]
     names: Sequence[str]
     dots: FloatArray
     hidden: BoolArray
+    beams: FloatArray
 
 
 def project_marks(
@@ -59,9 +62,10 @@ def project_marks(
     corners: FloatArray,
     regions: Sequence[RegionOutline],
     detectors: Sequence[tuple[str, Vector]],
+    lights: Sequence[Ray],
     diagonal: float,
 ) -> Marks:
-    """Project regions and detectors into the panel of a camera.
+    """Project regions, detectors and light that is seen end-on into the panel of a camera.
 
     Parameters
     ----------
@@ -71,6 +75,7 @@ def project_marks(
     regions : sequence of RegionOutline
     detectors : sequence of (str, Vector)
         Name and position on the surface.
+    lights : sequence of Ray
     diagonal : float
         Diagonal of the body, unit.
 
@@ -79,11 +84,15 @@ def project_marks(
     Marks
     """
     places = np.array([place for _, place in detectors], dtype=float).reshape(-1, 3)
+    entries = [ray.end for ray in lights if not ray.is_point and is_end_on(ray, camera)]
+    beams = np.array(entries, dtype=float).reshape(-1, 3)
+    body = caster_of(corners)
     return Marks(
         outlines=[(region.name, _coverage(camera, region)) for region in regions],
         names=[name for name, _ in detectors],
         dots=camera.project(places)[:, :2],
-        hidden=~in_view(caster_of(corners), places, camera.toward, diagonal),
+        hidden=~in_view(body, places, camera.toward, diagonal),
+        beams=camera.project(beams[in_view(body, beams, camera.toward, diagonal)])[:, :2],
     )
 
 

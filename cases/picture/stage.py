@@ -28,6 +28,8 @@ MOST_NEIGHBOURS = 100
 SHORTEST_ARROW, LONGEST_ARROW = 0.1, 0.18
 # Radius of the shaft of an arrow, as a share of the body's diagonal.
 ARROW_RADIUS = 0.0042
+# An arrow within 20 degrees of the line of sight hides what it lights, and is drawn as a mark.
+END_ON = math.cos(math.radians(20.0))
 # Opacity of arrows in front of the body.
 ARROW_OPACITY = 0.5
 
@@ -87,10 +89,11 @@ def build_stage(
     shares = scale.shares(exitance if values is None else values)
     corners = points[triangles]
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point]
+    camera = choose_camera(points, triangles, exitance, lights, up=up, toward=toward, panel=panel)
+    shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point and not is_end_on(ray, camera)]
     arrows = [_arrow(tail, tip, ARROW_RADIUS * diagonal) for tail, tip in shafts]
     return Stage(
-        camera=choose_camera(points, triangles, exitance, lights, up=up, toward=toward, panel=panel),
+        camera=camera,
         corners=corners,
         normals=corner_normals(corners, triangles),
         shares=shares[triangles],
@@ -122,6 +125,11 @@ def choose_camera(
     if toward is None:
         toward = choose_view(points[triangles], exitance[triangles].mean(axis=1), lights, diagonal, up)
     return camera_at(np.vstack([points, *near]), toward, up, panel)
+
+
+def is_end_on(ray: Ray, camera: Camera) -> bool:
+    """Whether a camera looks along the arrow of a light, from either end."""
+    return abs(float(unit(np.subtract(ray.start, ray.end)) @ camera.toward)) > END_ON
 
 
 def arrow_ends(ray: Ray, diagonal: float) -> tuple[FloatArray, FloatArray]:

@@ -22,7 +22,7 @@ METRES = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254
 
 
 def write_glb(
-    surface: Surface, path: Path, colours: Bytes, values: Mapping[str, FloatArray], up: Vector, notes: Mapping[str, str]
+    surface: Surface, path: Path, colours: Bytes, exitance: FloatArray, up: Vector, notes: Mapping[str, str]
 ) -> None:
     """Write a triangle mesh as GLB, in metres with y up, as the format asks for.
 
@@ -32,9 +32,10 @@ def write_glb(
     path : Path
     colours : (v, 3) ndarray of uint8
         sRGB at the vertices. ``COLOR_0`` are these in linear light, as the format has it, shown without lamps;
-        ``_SRGB`` as they are.
-    values : mapping of str to (v,) ndarray
-        Other values at the vertices: ``_EXITANCE`` for exitance.
+        ``COLOR_1`` as they are.
+    exitance : (v,) ndarray
+        ``_EXITANCE`` at the vertices. No other name begins with ``_``: Blender 4.5 mixes up several such arrays, since
+        it reads them into a set, and refuses the file if they differ in width.
     up : (3,) floats
         The direction that becomes y.
     notes : mapping of str to str
@@ -45,8 +46,8 @@ def write_glb(
         # Relative to the middle, so that 32 bits do for a body far from the origin.
         "POSITION": (surface.points - middle).astype("<f4"),
         "COLOR_0": to_linear(colours / 255.0).astype("<f4"),
-        "_SRGB": (colours / 255.0).astype("<f4"),
-        **{f"_{name.upper()}": column.astype("<f4") for name, column in values.items()},
+        "COLOR_1": (colours / 255.0).astype("<f4"),
+        "_EXITANCE": exitance.astype("<f4"),
     }
     accessors: list[dict[str, Any]] = []
     views: list[dict[str, int]] = []

@@ -16,8 +16,8 @@ def write_for_renderers(results: Results, scene: PictureScene, folder: Path) -> 
     case = results.case
     if "glb" in case.outputs:
         notes = {"case": case.name, "units": f"lengths in m, _EXITANCE in W/{scene.unit}^2"}
-        values = {"exitance": scene.exitance}
-        write_glb(results.surface, folder / "surface.glb", vertex_colours(scene), values, case.up, notes)
+        colours = vertex_colours(scene)
+        write_glb(results.surface, folder / "surface.glb", colours, scene.exitance, case.up, notes)
     if "mitsuba" in case.outputs:
         channels = [results.exitance(name) for name in RGB] if results.has_colours else [scene.exitance] * 3
         toward = scene_stage(scene).camera.toward

@@ -1,6 +1,6 @@
 """`compare_results`: two finished runs side by side, and their difference, on one scale."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from tetlux.cases.picture.draw import PictureScene, canvas_of, replacing, scene_stage
-from tetlux.cases.picture.scale import scale_of
+from tetlux.cases.picture.scale import Scale, scale_of
 from tetlux.cases.results.load import RunResult, load_result
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 from tetlux.meshing.describe import percent
@@ -70,7 +70,7 @@ def compare_results(first: Path, second: Path, picture: Path, field: str = FIELD
         If the picture cannot be written.
     """
     a, b = (load_result(folder) for folder in (first, second))
-    values = _values(a, field), _values(b, field)
+    values = field_values(a, field), field_values(b, field)
     if a.summary["unit"] != b.summary["unit"]:
         raise InputError(f"{first} is in {a.summary['unit']}, {second} in {b.summary['unit']}; run both in one unit.")
     found = difference(a, b, *values)
@@ -115,7 +115,14 @@ def _mesh(result: RunResult) -> tuple[FloatArray, IntArray]:
     return np.asarray(result.points, dtype=np.float64), np.asarray(result.triangles, dtype=np.int64)
 
 
-def _values(result: RunResult, field: str) -> FloatArray:
+def field_values(result: RunResult, field: str) -> FloatArray:
+    """The array of a surface, (v,).
+
+    Raises
+    ------
+    InputError
+        If the run has no surface or no such array.
+    """
     if result.points is None:
         raise InputError(f"{result.folder} holds no surface; run its case with outputs: [surface].")
     if field not in result.values:
@@ -158,13 +165,11 @@ def _draw(
     path: Path,
 ) -> None:
     """Draw both from one side on one scale, and beside them the difference in per cent."""
-    quantity = field.partition("_")[0]
-    unit = {"exitance": f"W/{a.summary['unit']}²", "phase": "degrees"}.get(quantity, "")
-    scale = scale_of(np.concatenate(values), field, unit, logarithmic=quantity not in LINEAR)
-    first = _scene(a, values[0], f"A: {a.summary['case']}")
+    scale = common_scale(values, field, a.summary["unit"])
+    first = scene_of_result(a, values[0], f"A: {a.summary['case']}")
     toward = scene_stage(first).camera.toward
     scenes = [replace(first, scale=scale, toward=toward)]
-    scenes.append(replace(_scene(b, values[1], f"B: {b.summary['case']}"), scale=scale, toward=toward))
+    scenes.append(replace(scene_of_result(b, values[1], f"B: {b.summary['case']}"), scale=scale, toward=toward))
     if found is not None:
         known = np.abs(found.relative[np.isfinite(found.relative)])
         reach = 100 * max(float(np.quantile(known, REACH)) if len(known) else 0.0, LEAST)
@@ -180,7 +185,15 @@ def _draw(
         whole.save(unfinished, format="PNG")
 
 
-def _scene(result: RunResult, values: FloatArray, title: str) -> PictureScene:
+def common_scale(values: Sequence[FloatArray], field: str, unit: str) -> Scale:
+    """One scale for the values of a field in several results; `unit` is that of length."""
+    quantity = field.partition("_")[0]
+    name = {"exitance": f"W/{unit}²", "phase": "degrees"}.get(quantity, "")
+    return scale_of(np.concatenate(values), field, name, logarithmic=quantity not in LINEAR)
+
+
+def scene_of_result(result: RunResult, values: FloatArray, title: str) -> PictureScene:
+    """A finished run in the colours of values at the vertices of its surface."""
     x, y, z = result.summary["as_ran"]["scene"]["up"]
     up: Vector = (float(x), float(y), float(z))
     return PictureScene(*_mesh(result), values, result.summary["unit"], title, up=up, values=values, size=SIZE)

@@ -14,7 +14,8 @@ from tetlux.meshing.errors import InputError
 
 # Height of a thumbnail in pixels, and how many there are: 200 take about 2 MB.
 HEIGHT, MOST_THUMBNAILS = 96, 200
-PICTURE = "picture.png"
+# The first picture of a run, or one with a name of its own.
+PICTURES = ("picture.png", "picture-*.png", "picture*.gif")
 # Units of swept keys, by the last part of their names.
 SWEPT_UNITS = {
     **dict.fromkeys(("sigma_a", "sigma_s", "sigma_s_prime"), "1/unit"),
@@ -88,14 +89,16 @@ def _plain(value: Any) -> Any:
     return json.dumps(value) if isinstance(value, list | dict) else value
 
 
-def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, str]:
-    """Small pictures of the first runs that have one, as data addresses by the name of the run."""
+def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, tuple[str, str]]:
+    """Names of the pictures of the first runs that have one, and small ones as data addresses, by the run's name."""
     from PIL import Image  # noqa: PLC0415 - only needed where there are pictures
 
-    found: dict[str, str] = {}
+    found: dict[str, tuple[str, str]] = {}
     for run in dict.fromkeys(row["run"] for row in rows):
-        picture = folder / run / PICTURE
-        if len(found) == MOST_THUMBNAILS or not picture.is_file():
+        if len(found) == MOST_THUMBNAILS:
+            break
+        picture = next((path for name in PICTURES for path in sorted((folder / run).glob(name))), None)
+        if picture is None:
             continue
         try:
             with Image.open(picture) as image:
@@ -105,5 +108,5 @@ def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, str]:
             continue
         target = io.BytesIO()
         small.save(target, "JPEG", quality=80)
-        found[run] = "data:image/jpeg;base64," + base64.b64encode(target.getvalue()).decode()
+        found[run] = picture.name, "data:image/jpeg;base64," + base64.b64encode(target.getvalue()).decode()
     return found

@@ -58,8 +58,9 @@ READING_FIGURES = {
     "relative_error": "1",
     "model_error": "1",
 }
-# Columns of what detectors read (W, or W/unit² at a point), of seconds by stage, and of codes of warnings.
-READING, SECONDS, WARNINGS = "reading.", "seconds_", "warnings"
+# Columns of what detectors read (W, or W/unit² at a point), of fitted values and their errors, of seconds by stage, and
+# of codes of warnings.
+READING, FIT, SECONDS, WARNINGS = "reading.", "found.", "seconds_", "warnings"
 # The light that stands for all of them.
 ALL = "all"
 
@@ -94,6 +95,8 @@ def result_rows(summary: Mapping[str, Any]) -> list[Row]:
                 row[f"{READING}{reading['name']}"] = value
                 row[f"{READING}{reading['name']}.phase"] = reading.get("phase")
                 row[f"{READING}{reading['name']}.relative_error"] = reading["relative_error"]
+        for name, found in summary.get("fit", {}).get("values", {}).items():
+            row |= {f"{FIT}{name}": found["value"], f"{FIT}{name}.error": found["error"]}
         row |= {f"{SECONDS}{stage}": value for stage, value in summary["seconds"].items()}
         row[WARNINGS] = " ".join(summary.get("warning_codes", ()))
         rows.append({name: value for name, value in (row | summary["as_ran"]["sweep"]).items() if value is not None})
@@ -129,17 +132,17 @@ def _head(summary: Mapping[str, Any]) -> Row:
 def swept_keys(columns: Iterable[str]) -> list[str]:
     """The columns of the results that hold swept values under the key of the case."""
     fixed = {*HEAD, *FIGURES, WARNINGS}
-    return [name for name in columns if name not in fixed and not name.startswith((READING, SECONDS))]
+    return [name for name in columns if name not in fixed and not name.startswith((READING, FIT, SECONDS))]
 
 
 def order_columns(columns: Iterable[str], head: Sequence[str], figures: Sequence[str]) -> list[str]:
-    """Put columns in order: what a row is about, swept keys, figures, readings, seconds, warnings.
+    """Put columns in order: what a row is about, swept keys, figures, readings, fitted values, seconds, warnings.
 
     All of the first and of the figures are there, whether or not a row has them.
     """
     found = list(dict.fromkeys([*head, *columns]))
     fixed = {*head, *figures, WARNINGS}
-    readings = [name for name in found if name.startswith(READING)]
+    readings = [name for kind in (READING, FIT) for name in found if name.startswith(kind)]
     seconds = [name for name in found if name.startswith(SECONDS)]
     swept = [name for name in found if name not in {*fixed, *readings, *seconds}]
     return [*head, *swept, *figures, *readings, *seconds, *(name for name in found if name == WARNINGS)]

@@ -2,10 +2,20 @@
 
 from dataclasses import replace
 
-from tetlux.cases.stress import point_scenarios, scenarios
-from tetlux.cases.stress.bodies import BODIES
-from tetlux.cases.stress.panels import Axis, Panel
-from tetlux.cases.stress.variants import CHARGES, DEFAULT, FREE_SPACE, NOT_REFINED, NOTHING, SIGN_VARIANTS
+from tetlux.cases.stress.panels import (
+    CHARGES,
+    DEFAULT,
+    FREE_SPACE,
+    NOT_REFINED,
+    NOTHING,
+    PLANNED,
+    SIGN_VARIANTS,
+    TRUNCATED,
+    Axis,
+    Panel,
+)
+from tetlux.cases.stress.scenes import of_modes, of_plans, of_points, scenarios
+from tetlux.cases.stress.scenes.bodies import BODIES
 
 ALBEDO = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0), (1e-3, 0.9, 1.0))
 ALBEDO_BELOW_ONE = Axis("reduced albedo", (1e-3, 0.1, 0.5, 0.9, 0.99, 0.9999), (1e-3, 0.5, 0.9999))
@@ -138,17 +148,65 @@ PANELS = (
     Panel(
         "charges",
         "a point source, lengths in mean free paths; by charges alone, and by finite elements",
-        Axis("", point_scenarios.CHARGE_BODIES, point_scenarios.FEW_CHARGE_BODIES),
-        Axis("", tuple(point_scenarios.CHARGE_LIGHTS), point_scenarios.FEW_CHARGE_LIGHTS),
-        point_scenarios.charges_by_body_and_light,
+        Axis("", of_points.CHARGE_BODIES, of_points.FEW_CHARGE_BODIES),
+        Axis("", tuple(of_points.CHARGE_LIGHTS), of_points.FEW_CHARGE_LIGHTS),
+        of_points.charges_by_body_and_light,
         (CHARGES, DEFAULT),
     ),
     Panel(
         "readings",
         "four detectors on each body, the source 1 mean free path deep; the colour is that of the worst reading",
-        Axis("", point_scenarios.READING_BODIES, point_scenarios.FEW_READING_BODIES),
-        Axis("", point_scenarios.PLACES, point_scenarios.FEW_PLACES),
-        point_scenarios.readings_by_body_and_place,
+        Axis("", of_points.READING_BODIES, of_points.FEW_READING_BODIES),
+        Axis("", of_points.PLACES, of_points.FEW_PLACES),
+        of_points.readings_by_body_and_place,
         (CHARGES, DEFAULT),
+    ),
+    Panel(
+        "frequency and mesh",
+        "modulated light of a point in a ball, on a given mesh of edges h; the colour is that of the worst reading",
+        Axis("|k| h", (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 3.0)),
+        Axis("ω/(v σ_a)", (0.1, 1.0, 10.0), (10.0,)),
+        of_modes.modulated_by_wave_number_and_ratio,
+        (DEFAULT,),
+    ),
+    Panel(
+        "frequency and place",
+        "modulated light of a point in a ball of radius 10; the colour is that of the worst reading",
+        Axis("ω/(v σ_t')", (0.001, 0.01, 0.1, 0.3), (0.1,)),
+        Axis("", tuple(of_modes.PLACES), ("near", "behind")),
+        of_modes.modulated_by_frequency_and_place,
+        (DEFAULT,),
+    ),
+    Panel(
+        "time",
+        "light of a point in a ball after a pulse, at three times; the colour is that of the worst reading",
+        Axis("radius (mean free paths)", (5.0, 10.0, 30.0), (10.0,)),
+        Axis("", tuple(of_modes.TIMES)),
+        of_modes.pulse_by_radius_and_time,
+        (DEFAULT,),
+    ),
+    Panel(
+        "sensitivities",
+        "derivatives of readings to both coefficients of a ball of radius 10; the colour is that of the worst",
+        Axis("reduced albedo", (0.5, 0.9, 0.99, 0.9999), (0.5, 0.9999)),
+        Axis("", tuple(of_modes.PLACES), ("near", "behind")),
+        of_modes.sensitivity_by_albedo_and_place,
+        (DEFAULT,),
+    ),
+    Panel(
+        "truncation",
+        "a point source 1 mean free path deep in a body of which most is dark; compared within 12 of the source",
+        Axis("", tuple(of_plans.TRUNCATED_BODIES), of_plans.FEW_TRUNCATED_BODIES),
+        replace(ALBEDO, values=(0.5, 0.9, 0.99, 0.999), few=(0.5, 0.99)),
+        of_plans.part_by_body_and_albedo,
+        (TRUNCATED,),
+    ),
+    Panel(
+        "plan",
+        "scenes that several models can solve, lengths in mean free paths; the regret is in the report",
+        Axis("", tuple(of_plans.PLANNED), of_plans.FEW_PLANNED),
+        replace(ALBEDO, values=(0.5, 0.9, 0.99, 0.9999), few=(0.5, 0.9999)),
+        of_plans.plan_by_scene_and_albedo,
+        (PLANNED, CHARGES, DEFAULT),
     ),
 )

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tetlux.cases.chart.samples import relative_error
-from tetlux.cases.stress.scenarios import TOLERANCE, Scenario, Truth
-from tetlux.cases.stress.variants import CHARGES, Variant
-from tetlux.fem import ChargeSolution, PointDetector
+from tetlux.cases.stress.panels import Variant
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Readout, Scenario, Truth
+from tetlux.fem import ChargeSolution, ClosedFormSolution, PointDetector
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.mesher.api import tetrahedralize
 
 # Limit of the adaptive runs, low since the map shows failures and not how fine a mesh can get.
 MOST_TETRAHEDRA = 30_000
-AnySolution = Solution | ChargeSolution
+AnySolution = Solution | ChargeSolution | ClosedFormSolution
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class Diagnostics:
     overshoot : float or None
         Largest fluence at a node divided by the bound of the maximum principle, minus 1.
     ledger : float or None
-        Missing power, as a share of the incident power; None for charges, of which it is a measure of their error.
+        Missing power, as a share of the incident power; None without a mesh: of charges it is a measure of their
+        error.
     residual : float or None
         Largest relative residual of the linear systems on the last mesh, recomputed from their solutions; None for
         charges.
@@ -78,12 +79,15 @@ class Diagnostics:
 def measure(scenario: Scenario, variant: Variant) -> Diagnostics:
     """Solve a scenario and measure the solution."""
     started = time.perf_counter()
+    if scenario.read is not None and scenario.readings is not None:
+        found = _of_readout(scenario.read(scenario), scenario.readings[1])
+        return replace(found, seconds=time.perf_counter() - started)
     solution = _solve(scenario, variant)
     seconds = time.perf_counter() - started
-    found = _of_charges(solution) if isinstance(solution, ChargeSolution) else _of_mesh(solution, scenario)
+    found = _of_mesh(solution, scenario) if isinstance(solution, Solution) else _without_mesh(solution)
     found = replace(found, seconds=seconds, warnings=tuple(solution.warnings), may_be_negative=scenario.may_be_negative)
     if scenario.readings is not None:
-        error, bar = _worst_reading(solution, scenario.readings[1])
+        error, bar = _worst_reading(*_readings_of(solution), scenario.readings[1])
         return replace(found, error=error, estimate=bar, bound=None, of_readings=True)
     if scenario.truth is not None:
         found = replace(found, error=_true_error(solution, scenario.truth))
@@ -111,7 +115,7 @@ def _of_mesh(solution: Solution, scenario: Scenario) -> Diagnostics:
     )
 
 
-def _of_charges(solution: ChargeSolution) -> Diagnostics:
+def _without_mesh(solution: ChargeSolution | ClosedFormSolution) -> Diagnostics:
     return Diagnostics(
         lowest=None,
         overshoot=None,
@@ -123,17 +127,42 @@ def _of_charges(solution: ChargeSolution) -> Diagnostics:
         scaling=None,
         finite=bool(np.isfinite(solution.exitance).all()),
         may_be_negative=False,
-        nodes=solution.charges,
+        nodes=solution.charges if isinstance(solution, ChargeSolution) else 0,
         seconds=0.0,
         warnings=(),
         bound=solution.error_bound if np.isfinite(solution.error_bound) else None,
     )
 
 
-def _worst_reading(solution: AnySolution, truth: FloatArray) -> tuple[float, float]:
-    """Error and bar of the reading that exceeds its allowance by most; a missing bar allows any error."""
-    errors = np.abs(np.array([reading.exitance for reading in solution.readings]) / truth - 1.0)
+def _of_readout(readout: Readout, truth: NumberArray) -> Diagnostics:
+    error, bar = _worst_reading(readout.values, readout.bars, truth)
+    return Diagnostics(
+        lowest=None,
+        overshoot=None,
+        ledger=None,
+        residual=None,
+        iterations=0,
+        estimate=bar,
+        error=error,
+        scaling=None,
+        finite=bool(np.isfinite(readout.values).all()),
+        may_be_negative=True,
+        nodes=readout.nodes,
+        seconds=0.0,
+        warnings=readout.warnings,
+        of_readings=True,
+    )
+
+
+def _readings_of(solution: AnySolution) -> tuple[FloatArray, FloatArray]:
+    """What the detectors read, and its bars; a missing bar allows any error."""
     bars = np.array([math.inf if each.relative_error is None else each.relative_error for each in solution.readings])
+    return np.array([reading.exitance for reading in solution.readings]), bars
+
+
+def _worst_reading(values: NumberArray, bars: FloatArray, truth: NumberArray) -> tuple[float, float]:
+    """Error and bar of the reading that exceeds its allowance by most."""
+    errors = np.abs(values / truth - 1.0)
     worst = int(np.lexsort((errors, errors / np.maximum(TOLERANCE, 2.0 * bars)))[-1])
     return float(errors[worst]), float(bars[worst])
 
@@ -141,31 +170,22 @@ def _worst_reading(solution: AnySolution, truth: FloatArray) -> tuple[float, flo
 def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
     places = [] if scenario.readings is None else scenario.readings[0].tolist()
     detectors = [PointDetector((x, y, z)) for x, y, z in places]
-    if variant == CHARGES:
-        return solve(
-            scenario.surface,
-            scenario.medium,
-            [scenario.light],
-            regions=scenario.regions,
-            tolerance=TOLERANCE,
-            detectors=detectors,
-            model="charges",
-        )
+    options = {"model": "full", **variant.options}
     mesh = scenario.mesh
     if mesh is None and not variant.adaptive:
         mesh = tetrahedralize(scenario.surface, [region.surface for region in scenario.regions])
+    if options["model"] in ("full", "auto"):
+        options["most_tetrahedra"] = MOST_TETRAHEDRA
     solution: AnySolution = solve(
         scenario.surface,
         scenario.medium,
         [scenario.light],
         regions=scenario.regions,
         mesh=mesh,
-        tolerance=None if detectors else TOLERANCE,
+        tolerance=None if detectors and options["model"] == "full" else TOLERANCE,
         detectors=detectors,
         detector_tolerance=TOLERANCE if detectors else None,
-        most_tetrahedra=MOST_TETRAHEDRA,
-        model="full",
-        **variant.options,
+        **options,
     )
     return solution
 
@@ -186,5 +206,5 @@ def _scaling_error(solution: AnySolution, unit_scale: AnySolution) -> float:
 
 def _dimensionless_exitance(solution: AnySolution) -> FloatArray:
     """Exitance at the nodes divided by the mean exitance if all power left."""
-    area = solution.area if isinstance(solution, ChargeSolution) else solution.mesh.area
+    area = solution.mesh.area if isinstance(solution, Solution) else solution.area
     return np.asarray(solution.exitance * (area / solution.power.incident))

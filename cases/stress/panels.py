@@ -1,12 +1,46 @@
-"""`Panel` of the stress map: a pair of axes, the scenarios over them, and the variants of the solver."""
+"""`Panel` of the stress map: a pair of axes, the scenarios over them, and the `Variant`s of the solver."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
-from tetlux.cases.stress.scenarios import Scenario
-from tetlux.cases.stress.variants import Variant
+from tetlux.cases.stress.scenes.scenarios import Scenario
 
 Value = float | str
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Settings of the solver.
+
+    Attributes
+    ----------
+    name : str
+    options : dict
+        Keyword arguments of `tetlux.fem.solve`.
+    adaptive : bool
+        Whether the mesh is refined until the estimated error is within the tolerance; no effect on a given mesh.
+    counts : bool
+        Whether breaking a rule is a violation; other variants are there for comparison only.
+    """
+
+    name: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    adaptive: bool = True
+    counts: bool = False
+
+
+CHARGES = Variant("charges", {"model": "charges"}, counts=True)
+DEFAULT = Variant("default", counts=True)
+PLANNED = Variant("chosen by the plan", {"model": "auto"}, counts=True)
+TRUNCATED = Variant("truncated", {"model": "truncated"}, counts=True)
+NOT_REFINED = Variant("default, not refined", adaptive=False, counts=True)
+NO_LIMITER = Variant("no limiter", {"limit": False})
+CONSISTENT = Variant("consistent mass, no limiter", {"mass": "consistent", "limit": False})
+FREE_SPACE = Variant("free space subtracted", {"subtract": "free-space"})
+NOTHING = Variant("nothing subtracted", {"subtract": "nothing"})
+# Variants that differ in how they keep the fluence nonnegative.
+SIGN_VARIANTS = (DEFAULT, NO_LIMITER, CONSISTENT)
 
 
 @dataclass(frozen=True)

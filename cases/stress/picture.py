@@ -16,7 +16,7 @@ from matplotlib.patheffects import withStroke
 
 from tetlux.cases.stress.panels import Axis, Panel, Value
 from tetlux.cases.stress.rules import broken_rules, is_warned, violations
-from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 
 # Inches: width of the picture, size of a map, gap between maps, margins of a panel (left, right, above, below); then,

@@ -1,11 +1,13 @@
 """The stress map as text: the worst figures by panel and variant, broken rules, and refused scenarios."""
 
+import statistics
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 from tetlux.cases.stress.measure import Diagnostics
-from tetlux.cases.stress.panels import Axis, Panel, Value
+from tetlux.cases.stress.panels import PLANNED, Axis, Panel, Value
 from tetlux.cases.stress.rules import broken_rules, is_warned, violations
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 
 HEADS = (
@@ -44,11 +46,41 @@ def as_markdown(trials: Sequence[Trial]) -> str:
     lines += ["", "## Refused", ""]
     refused = Counter((trial.panel.name, trial.message) for trial in trials if trial.outcome == "refused")
     lines += [f"* {panel}, {_times(count)}: {message}" for (panel, message), count in refused.items()] or ["Nothing."]
+    lines += _regret(trials)
     # Last, since the end of a long log is what its reader sees.
     lines += ["", "## Violations", ""]
     found = [f"* {_place(trial)}: {rule}, {figure}." for trial in trials for rule, figure in violations(trial).items()]
     lines += found or ["None."]
     return "\n".join(lines) + "\n"
+
+
+def _regret(trials: Sequence[Trial]) -> list[str]:
+    """The section on the regret of the plan: seconds of the model that it chose over those of the fastest."""
+    planned = [trial for trial in trials if trial.variant == PLANNED and trial.diagnostics is not None]
+    if not planned:
+        return []
+    regrets = []
+    for trial in planned:
+        scene = (trial.panel.name, trial.x, trial.y)
+        met = [
+            found.seconds
+            for other in trials
+            if (other.panel.name, other.x, other.y) == scene
+            and (found := other.diagnostics) is not None
+            and (other == trial or found.estimate <= TOLERANCE)
+        ]
+        assert trial.diagnostics is not None
+        regrets.append((trial.diagnostics.seconds / min(met), trial))
+    worst, where = max(regrets, key=lambda pair: pair[0])
+    middle = statistics.median(regret for regret, _ in regrets)
+    return [
+        "",
+        "## Regret of the plan",
+        "",
+        "Seconds of the model that the plan chose, planning and vain trials included, over those of the fastest model "
+        f"within the tolerance: {middle:.2f} in the median of {len(regrets)}, {worst:.2f} in the worst "
+        f"({_place(where)}).",
+    ]
 
 
 def _times(count: int) -> str:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from tetlux.cases.stress.measure import Diagnostics
-from tetlux.cases.stress.scenarios import TOLERANCE
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE
 from tetlux.cases.stress.trials import Trial
 from tetlux.meshing.notes import codes_of
 

@@ -11,8 +11,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from tetlux.cases.stress.measure import Diagnostics, measure
-from tetlux.cases.stress.panels import Panel, Value
-from tetlux.cases.stress.variants import Variant
+from tetlux.cases.stress.panels import Panel, Value, Variant
 from tetlux.meshing.errors import TetluxError
 from tetlux.meshing.host.blocks import THREADS
 

@@ -16,15 +16,24 @@ from tetlux.cases.picture.view import PANEL
 from tetlux.cases.plain import finite
 from tetlux.cases.viewer.pack import pack_bytes, pack_floats, pack_indices
 from tetlux.cases.write.fields import Field, surface_fields, volume_fields
+from tetlux.cases.write.pulse import PulseResults
 from tetlux.cases.write.results import Results
 from tetlux.meshing.arrays import FloatArray
 
 HERE = Path(__file__).parent
 # Colour maps to choose from, that of the pictures first.
 MAPS = ("inferno", "viridis", "grey")
+# Values of light in time, at vertices and times together: some 3 MB.
+MOST_IN_TIME = 1_000_000
 
 
-def write_viewer(results: Results, readings: Sequence[dict[str, Any]], scene: PictureScene, path: Path) -> None:
+def write_viewer(
+    results: Results,
+    readings: Sequence[dict[str, Any]],
+    scene: PictureScene,
+    path: Path,
+    pulse: PulseResults | None = None,
+) -> None:
     """Write a page that shows a run and asks nothing of any server.
 
     Parameters
@@ -36,13 +45,15 @@ def write_viewer(results: Results, readings: Sequence[dict[str, Any]], scene: Pi
         What the picture of the run shows: the page begins with its view.
     path : Path
         The file to write.
+    pulse : PulseResults, optional
+        Light in time, of which the page shows as many times as there is room for.
 
     Raises
     ------
     OSError
         If it cannot be written.
     """
-    data = describe_scene(results, readings, scene)
+    data = {**describe_scene(results, readings, scene), **_in_time(pulse, scene.unit)}
     # In a script of HTML, "<" could begin its end.
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
     page = (HERE / "page.html").read_text(encoding="utf-8")
@@ -115,6 +126,17 @@ def _field(field: Field) -> dict[str, Any]:
         "ends": _ends(field),
         "values": pack_floats(field.values),
     }
+
+
+def _in_time(pulse: PulseResults | None, unit: str) -> dict[str, Any]:
+    """The exitance at times after a pulse, if there is one, all on one scale."""
+    if pulse is None:
+        return {}
+    some = pulse.some(max(2, MOST_IN_TIME // pulse.exitance.shape[1]))
+    fields = [
+        {**_field(Field("pulse", values, f"W/{unit}²/J")), "ends": pulse.ends(), "time": time} for time, values in some
+    ]
+    return {"inTime": fields}
 
 
 def _ends(field: Field) -> tuple[float, float] | None:

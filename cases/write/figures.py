@@ -1,4 +1,4 @@
-"""Figures for papers: exitance against distance from the light, and where the power went; as SVG and PDF."""
+"""Figures for papers: exitance against distance from the light, and where the power went; as SVG, PDF and PNG."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,13 +14,15 @@ from tetlux.cases.write.results import Results
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.triangles import triangle_areas
 
-NAMES = ("figures.svg", "figures.pdf")
+NAMES = ("figures.svg", "figures.pdf", "figures.png")
 COLOURS = ("#30343f", "#d1495b", "#2e86ab", "#3a7d44", "#edae49", "#6d597a")
 OF_CHANNELS = {"red": "#d1495b", "green": "#3a7d44", "blue": "#2e86ab"}
 PARTS = ("exited", "absorbed", "specular", "ballistic")
 # Rings around the light over which the exitance is averaged, and the share of the largest mean that is drawn.
 RINGS, FLOOR = 40, 1e-8
 SIZE = (7.0, 3.0)
+# Of the PNG, pixels an inch.
+SHARPNESS = 300
 # Text stays text, so that it can be searched and set in other fonts; the same run gives the same file.
 STYLE: Any = {"svg.fonttype": "none", "pdf.fonttype": 42, "svg.hashsalt": "tetlux", "font.size": 8}
 
@@ -34,7 +36,7 @@ def write_figures(results: Results, lit: FloatArray, folder: Path) -> None:
     lit : (p, 3) ndarray
         Where the lights meet the body, or shine from; without any, distance is that from the brightest place.
     folder : Path
-        Where ``figures.svg`` and ``figures.pdf`` go.
+        Where ``figures.svg``, ``figures.pdf`` and ``figures.png`` go.
     """
     with rc_context(STYLE):
         figure = Figure(figsize=SIZE, layout="constrained")
@@ -46,6 +48,7 @@ def write_figures(results: Results, lit: FloatArray, folder: Path) -> None:
             axes.spines[["top", "right"]].set_visible(False)
         figure.savefig(folder / NAMES[0], metadata={"Date": None})
         figure.savefig(folder / NAMES[1], metadata={"CreationDate": None})
+        figure.savefig(folder / NAMES[2], dpi=SHARPNESS)
 
 
 def exitance_by_distance(results: Results, lit: FloatArray) -> tuple[FloatArray, Mapping[str, FloatArray]]:

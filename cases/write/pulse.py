@@ -50,8 +50,16 @@ class PulseResults:
 
     def arrays(self) -> dict[str, FloatArray]:
         """Arrays of the surface, by names such as ``exitance_50ps``."""
-        chosen = _spread(len(self.times), MOST_ARRAYS)
-        return {f"exitance_{picoseconds(self.times[i])}": self.exitance[i] for i in chosen}
+        return {f"exitance_{picoseconds(time)}": values for time, values in self.some(MOST_ARRAYS)}
+
+    def some(self, most: int) -> list[tuple[float, FloatArray]]:
+        """Times, s, and the exitance then, (v,): all of them, or every second, third, ... of too many."""
+        return [(float(self.times[i]), self.exitance[i]) for i in _spread(len(self.times), most)]
+
+    def ends(self) -> tuple[float, float] | None:
+        """The ends of one logarithmic scale for all times; None if no light leaves."""
+        brightest = float(np.nanmax(self.exitance, initial=0.0))
+        return (brightest / 10.0**DECADES, brightest) if brightest > 0 else None
 
     def write(self, readings: list[dict[str, Any]], folder: Path) -> None:
         """Write what detectors read, if there are some, and the film, if it is among the outputs."""
@@ -83,19 +91,17 @@ class PulseResults:
         from tetlux.cases.picture.draw import draw_film  # noqa: PLC0415
         from tetlux.cases.picture.scale import scale_of  # noqa: PLC0415
 
-        chosen = _spread(len(self.times), MOST_FRAMES)
-        brightest = float(np.nanmax(self.exitance[chosen], initial=0.0))
-        ends = (brightest / 10.0**DECADES, brightest) if brightest > 0 else (None, None)
-        scale = scale_of(np.nan_to_num(self.exitance[chosen]).ravel(), "exitance", f"W/{scene.unit}² per J", ends=ends)
+        ends = self.ends() or (None, None)
+        scale = scale_of(np.nan_to_num(self.exitance).ravel(), "exitance", f"W/{scene.unit}² per J", ends=ends)
         frames = [
             replace(
                 scene,
-                values=np.nan_to_num(self.exitance[i]),
+                values=np.nan_to_num(values),
                 scale=scale,
                 colours=None,
-                title=f"{scene.title}, {self.times[i] * 1e12:.4g} ps",
+                title=f"{scene.title}, {time * 1e12:.4g} ps",
             )
-            for i in chosen
+            for time, values in self.some(MOST_FRAMES)
         ]
         draw_film(frames, path)
 

@@ -9,6 +9,7 @@ import numpy as np
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.colours import RGB, Bytes, preview
+from tetlux.cases.fitting.record import FitRecord
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
@@ -19,6 +20,7 @@ from tetlux.fem.planner.solve import AnySolution
 from tetlux.fem.transient.transient import Transient
 from tetlux.meshing.arrays import FloatArray, NumberArray, freeze
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.notes import add_prefix
 from tetlux.meshing.surface.surface import Surface
 
 
@@ -65,6 +67,8 @@ class Results:
         Exitance at the surface's vertices by channel and light, W/unit²; complex of modulated light.
     transients : tuple of Transient
         Of a pulse, one for each channel, of which `solutions` are the integrals over time.
+    fit : FitRecord, optional
+        What was fitted; `case` has the media that were found.
     """
 
     case: Case
@@ -72,6 +76,7 @@ class Results:
     surface: Surface
     parts: dict[tuple[str, str], NumberArray]
     transients: tuple[Transient, ...] = ()
+    fit: FitRecord | None = None
 
     def exitance(self, channel: str = ALL, light: str = ALL) -> FloatArray:
         """Exitance (v,) of a channel and a light, or summed over all channels or lights, W/unit².
@@ -158,3 +163,21 @@ def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
         points = freeze(np.vstack([points, *others]))
     total = sum(modulus(each.exitance_on(points)) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
+
+
+def warnings_of(results: Results) -> list[str]:
+    """The warnings of all channels; one that holds for some channels only names them."""
+    names, solutions = results.case.channel_names, results.solutions
+    channels_by_warning: dict[str, list[str]] = {}
+    for name, solution in zip(names, solutions, strict=True):
+        # Repairs are reported when the case is read.
+        for warning in (each for each in solution.warnings if each not in results.case.repairs):
+            channels_by_warning.setdefault(results.case.name_region(warning), []).append(name)
+    return [
+        *(results.fit.warnings if results.fit else []),
+        *results.case.region_warnings,
+        *(
+            warning if len(channels) == len(names) else add_prefix(warning, f"in {' and '.join(channels)}: ")
+            for warning, channels in channels_by_warning.items()
+        ),
+    ]

@@ -77,6 +77,7 @@ def summarize(results: Results, readings: list[dict[str, Any]], warnings: list[s
             if mesh
             else {"left_out": _left_out(results.solutions[0].model)}
         ),
+        **({"fit": results.fit.summary()} if results.fit else {}),
         "channels": channels,
         **({"preview_white": results.preview[1]} if results.has_colours else {}),
         **({"detectors": readings} if readings else {}),

@@ -83,11 +83,14 @@ class LightSources:
     boundary_source : (s,) ndarray
         Right-hand side of the boundary condition ``D dphi/dn + phi/(2A)`` on the whole surface, W/unit²: 0 except under
         diffuse light.
+    unscattered : float
+        Exitance in addition to ``phi/(2A)`` of all lights together, W/unit²: 0 except under diffuse light.
     """
 
     points: FloatArray
     powers: NumberArray
     boundary_source: NumberArray
+    unscattered: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,8 +225,8 @@ def fit_placed_charges(placement: ChargePlacement, equation: Equation, lights: L
     field, factors = fit_strengths(placement, equation, lights)
     exitance, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation = (residual - lights.boundary_source).sum(axis=1)
-    errors = estimate_errors(equation, checked, EQUATION_REFINEMENT * checked.spacing, exitance.sum(axis=1), violation)
-    total = exitance.sum(axis=1)
+    total, spacing = exitance.sum(axis=1), EQUATION_REFINEMENT * checked.spacing
+    errors = estimate_errors(equation, checked, spacing, total + lights.unscattered, violation)
     # Amplitudes of modulated light may be below zero.
     below = np.zeros(len(total), bool) if np.iscomplexobj(total) else total < -NEGLIGIBLE_DIP * total.max(initial=0.0)
     negative_share = float(checked.areas[below].sum() / checked.areas.sum())

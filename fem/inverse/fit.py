@@ -1,24 +1,23 @@
 """`fit`: coefficients or chromophores of a body from what detectors read."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from tetlux.fem.inverse.problem import FitProblem
-from tetlux.fem.inverse.unknowns import Unknowns, unknowns_of
+from tetlux.fem.inverse.request import Bounds, FitRequest, Readings, Starts, make_request
+from tetlux.fem.inverse.result import FitResult, result_of
+from tetlux.fem.inverse.unknowns import Unknowns
 from tetlux.fem.known.split import check_lights
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, check_list_of_regions
 from tetlux.fem.outcome.detector_kinds import Detector
-from tetlux.fem.outcome.reading import Reading
 from tetlux.fem.solve import solve
 from tetlux.fem.sources.light import Light
-from tetlux.meshing.arrays import FloatArray, NumberArray
-from tetlux.meshing.describe import one_line
-from tetlux.meshing.errors import InputError
+from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.describe import count
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -29,61 +28,28 @@ MOST_MESHES = 6
 FIRST_TOLERANCE = 0.03
 # Accuracies of logarithms of unknowns, on the first mesh and on others.
 ROUGH, FINE = 2e-2, 1e-3
-# Unknowns end within this factor of their start.
-WIDEST = 1e3
-# A combination of unknowns is undetermined if its standard deviation is more than this share of the unknowns.
-UNDETERMINED = 1.0
-# Share of the largest component from which an unknown belongs to an undetermined combination.
-BELONGS = 0.3
+# Relative error of readings by the mesh.
+DETECTOR_TOLERANCE = 0.005
+# Values begin this share of the way between the logarithms of their bounds away from these.
+INSET = 1e-6
 
-
-@dataclass(frozen=True, eq=False)
-class FitResult:
-    """What a fit found.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        The unknowns.
-    covariance : (u, u) ndarray
-        Of the values, in their order; by the noise that was given, or by the residuals.
-    residuals : (n,) ndarray
-        Logarithms of readings of the model less those measured, over the noise.
-    undetermined : tuple of str
-        Sentences on what the readings do not tell.
-    evaluations : int
-        How often readings and their derivatives were computed.
-    mesh : TetMesh
-        The last one.
-    """
-
-    values: dict[str, float]
-    covariance: FloatArray
-    residuals: FloatArray
-    undetermined: tuple[str, ...]
-    evaluations: int
-    mesh: TetMesh
-
-    @property
-    def errors(self) -> dict[str, float]:
-        """Standard deviations of the values."""
-        return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
-
-    __repr__ = one_line
+Report = Callable[[str], None]
 
 
 def fit(
     surface: Surface,
     lights: Sequence[Light],
     detectors: Sequence[Detector],
-    readings: npt.ArrayLike | Sequence[Reading] | Sequence[Sequence[Reading]],
+    readings: Readings,
     unknowns: Sequence[str],
-    start: Medium | Mapping[str, Any],
+    start: Starts,
     *,
     regions: Sequence[Region] = (),
     noise: npt.ArrayLike | None = None,
+    bounds: Bounds | None = None,
     frequency: float = 0.0,
-    detector_tolerance: float = 0.005,
+    outside_index: float = 1.0,
+    detector_tolerance: float = DETECTOR_TOLERANCE,
 ) -> FitResult:
     """Fit coefficients of a body to readings.
 
@@ -102,15 +68,19 @@ def fit(
     unknowns : sequence of str
         Of the body ``"sigma_a"`` and ``"sigma_s_prime"``; of region 1 ``"1.sigma_a"`` and so on; of tissue ``"hbo2"``,
         ``"hhb"``, ``"water"``, ``"fat"``, ``"a"`` and ``"b"``. ``"gain"`` is an unknown factor of all readings.
-    start : Medium, or mapping
+    start : Medium, mapping, or sequence of these
         The medium of the body to begin with; or the arguments of `tetlux.fem.tissue`, with its wavelengths. What is not
-        unknown stays as it is there.
+        unknown stays as it is there. A sequence is of the body and of each region, in place of the media of these.
     regions : sequence of Region
         With media to begin with, or one for each wavelength.
     noise : float or array_like, optional
         Relative standard deviation of all or of each reading. If it is not given, it is estimated by the residuals.
+    bounds : mapping of str to (float, float), optional
+        Least and largest value of unknowns; of others a thousandth and a thousand times the start.
     frequency : float
         Of modulated light, Hz.
+    outside_index : float
+        Refractive index of what surrounds the body, for modulated light.
     detector_tolerance : float
         Relative error of readings by the mesh.
 
@@ -139,44 +109,85 @@ def fit(
     """
     check_lights(lights)
     check_list_of_regions(regions)
-    wanted = unknowns_of(unknowns, start, regions)
-    measured = _measured(readings, len(wanted.media(wanted.start)), len(lights), len(detectors))
-    relative = _noise(noise, measured)
-    numbers = np.isfinite(measured).sum() * (2 if np.iscomplexobj(measured) else 1)
-    if len(wanted.names) > numbers:
-        raise InputError(
-            f"there are {len(wanted.names)} unknowns and {numbers} readings; give fewer unknowns or more readings.",
-            field="unknowns",
-        )
+    request = make_request(
+        surface.unit,
+        len(lights),
+        len(detectors),
+        readings,
+        unknowns,
+        start,
+        regions=regions,
+        noise=noise,
+        bounds=bounds,
+        frequency=frequency,
+    )
+    return fit_request(
+        surface,
+        lights,
+        detectors,
+        request,
+        regions=regions,
+        frequency=frequency,
+        outside_index=outside_index,
+        detector_tolerance=detector_tolerance,
+    )
+
+
+def fit_request(
+    surface: Surface,
+    lights: Sequence[Light],
+    detectors: Sequence[Detector],
+    request: FitRequest,
+    *,
+    regions: Sequence[Region],
+    frequency: float,
+    outside_index: float,
+    detector_tolerance: float,
+    report: Report = lambda _: None,
+) -> FitResult:
+    """Fit what a request asks for; see `fit`. `report` is called with a line for each mesh."""
+    wanted = request.unknowns
     values, tolerance, evaluations = wanted.start, max(detector_tolerance, FIRST_TOLERANCE), 0
-    for _ in range(MOST_MESHES):
-        mesh = _mesh(surface, wanted.media(values), lights, detectors, regions, frequency, tolerance)
-        problem = FitProblem(surface, mesh, lights, detectors, regions, wanted, measured, relative, frequency)
+    for number in range(MOST_MESHES):
+        media = wanted.media(values)
+        mesh = _mesh(surface, media, lights, detectors, regions, frequency, outside_index, tolerance)
+        problem = FitProblem(
+            surface, mesh, lights, detectors, regions, wanted, request.readings, request.noise, frequency, outside_index
+        )
         is_last_tolerance = tolerance <= detector_tolerance
-        before, values = values, _least_squares(problem, values, ROUGH if not is_last_tolerance else FINE)
+        before, values = values, _least_squares(problem, request, values, FINE if is_last_tolerance else ROUGH)
         evaluations += problem.evaluations
+        found = ", ".join(f"{name} {value:.4g}" for name, value in zip(wanted.names, values.tolist(), strict=True))
+        size = count(len(mesh.tetrahedra), "tetrahedron", "tetrahedra")
+        report(f"fitted on mesh {number + 1}, {size}, by {count(problem.evaluations, 'evaluation')}: {found}")
         if is_last_tolerance and _ratio(wanted, before, values) <= FAR:
             break
         tolerance = detector_tolerance
-    return _result(problem, values, evaluations, estimate_noise=noise is None)
+    return result_of(problem, request, values, evaluations)
 
 
-def _least_squares(problem: FitProblem, values: FloatArray, accuracy: float) -> FloatArray:
+def _least_squares(problem: FitProblem, request: FitRequest, values: FloatArray, accuracy: float) -> FloatArray:
     """Values (u,) that fit best, from values (u,)."""
     # Imported here, since SciPy's optimizers take a tenth of the time that tetlux.fem takes to import.
     from scipy.optimize import least_squares  # noqa: PLC0415
 
     found = least_squares(
         problem.residuals,
-        np.log(values),
+        np.log(_within(values, request.bounds)),
         jac=problem.jacobian,
-        bounds=(np.log(problem.unknowns.start / WIDEST), np.log(problem.unknowns.start * WIDEST)),
+        bounds=(np.log(request.bounds[:, 0]), np.log(request.bounds[:, 1])),
         xtol=accuracy,
         ftol=accuracy**2,
         gtol=None,
     )
     logarithms: FloatArray = np.asarray(found.x, dtype=float)
     return np.asarray(np.exp(logarithms))
+
+
+def _within(values: FloatArray, bounds: FloatArray) -> FloatArray:
+    """Values (u,) moved strictly within bounds (u, 2), as the optimizer begins."""
+    inset = (bounds[:, 1] / bounds[:, 0]) ** INSET
+    return np.asarray(np.clip(values, bounds[:, 0] * inset, bounds[:, 1] / inset))
 
 
 def _mesh(
@@ -186,6 +197,7 @@ def _mesh(
     detectors: Sequence[Detector],
     regions: Sequence[Region],
     frequency: float,
+    outside_index: float,
     tolerance: float,
 ) -> TetMesh:
     """A mesh that is fine enough for all detectors and channels of media."""
@@ -199,6 +211,7 @@ def _mesh(
         detectors=detectors,
         detector_tolerance=tolerance,
         frequency=frequency,
+        outside_index=outside_index,
     )
     mesh: TetMesh = solutions[0].mesh
     return mesh
@@ -214,78 +227,3 @@ def _ratio(unknowns: Unknowns, before: FloatArray, after: FloatArray) -> float:
     )
     there = (old > 0) & (new > 0)
     return float(np.exp(np.abs(np.log(new[there] / old[there])).max(initial=0.0)))
-
-
-def _result(problem: FitProblem, values: FloatArray, evaluations: int, *, estimate_noise: bool) -> FitResult:
-    """The result at values (u,), with what is not determined."""
-    names, logarithms = problem.unknowns.names, np.log(values)
-    residuals, jacobian = problem.residuals(logarithms), problem.jacobian(logarithms)
-    variance = 1.0
-    if estimate_noise:
-        variance = float(residuals @ residuals) / max(len(residuals) - len(values), 1)
-    _, sizes, ways = np.linalg.svd(jacobian, full_matrices=False)
-    sizes = np.maximum(sizes, np.finfo(float).tiny ** 0.25)
-    of_logarithms = (ways.T * (variance / sizes**2)) @ ways
-    # Without noise given, a combination that changes no reading by a millionth of the others is undetermined.
-    lost = sizes <= 1e-6 * sizes[0]
-    if not estimate_noise:
-        lost |= 1.0 / sizes > UNDETERMINED
-    sentences = tuple(_undetermined(names, way) for way in ways[lost])
-    covariance = values[:, None] * of_logarithms * values
-    found = dict(zip(names, values.tolist(), strict=True))
-    return FitResult(found, covariance, residuals, sentences, evaluations, problem.mesh)
-
-
-def _undetermined(names: Sequence[str], way: FloatArray) -> str:
-    """A sentence on a combination of unknowns (u,) that readings do not tell."""
-    belong = [
-        name for name, share in zip(names, np.abs(way).tolist(), strict=True) if share > BELONGS * np.abs(way).max()
-    ]
-    if len(belong) == 1:
-        return f"the readings do not tell {belong[0]}."
-    signs = "a product" if len(set(np.sign(way[[names.index(name) for name in belong]]).tolist())) == 1 else "a ratio"
-    return f"the readings do not tell {' and '.join(belong)} apart: {signs} of their powers is free."
-
-
-def _measured(
-    readings: npt.ArrayLike | Sequence[Reading] | Sequence[Sequence[Reading]],
-    channels: int,
-    lights: int,
-    detectors: int,
-) -> NumberArray:
-    """Measured readings as an array (c, l, d)."""
-    rows: Any = readings
-    if isinstance(rows, Sequence):
-        rows = [
-            each.exitance
-            if isinstance(each, Reading)
-            else [one.exitance if isinstance(one, Reading) else one for one in each]
-            if isinstance(each, Sequence)
-            else each
-            for each in rows
-        ]
-    values = np.asarray(rows)
-    if values.dtype.kind not in "iufc" or values.size != channels * lights * detectors:
-        raise InputError(
-            f"readings have shape {values.shape}; give {channels} x {lights} x {detectors} numbers, one for each "
-            "wavelength, light and detector.",
-            field="readings",
-        )
-    values = values.reshape(channels, lights, detectors)
-    known = values[~np.isnan(values)]
-    if not np.isfinite(known).all() or (known == 0 if np.iscomplexobj(values) else known <= 0).any():
-        raise InputError(
-            "a reading is 0 or below: that detector is in the dark; leave it out, or give nan.", field="readings"
-        )
-    return values
-
-
-def _noise(noise: npt.ArrayLike | None, measured: NumberArray) -> FloatArray:
-    """Relative standard deviations as an array (c, l, d)."""
-    given = np.asarray(1.0 if noise is None else noise, dtype=float)
-    if not (np.isfinite(given).all() and (given > 0).all()):
-        raise InputError("noise is a relative standard deviation of readings, greater than 0.", field="noise")
-    if given.size not in (1, measured.size):
-        raise InputError(f"noise has shape {given.shape}; give one number, or one for each reading.", field="noise")
-    shape = measured.shape
-    return np.full(shape, given.item()) if given.size == 1 else given.reshape(shape)

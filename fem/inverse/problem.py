@@ -39,6 +39,8 @@ class FitProblem:
         Relative standard deviations.
     frequency : float
         Hz; 0 for steady light.
+    outside_index : float
+        Refractive index of what surrounds the body.
 
     Examples
     --------
@@ -59,7 +61,8 @@ class FitProblem:
     readings: NumberArray
     noise: FloatArray
     frequency: float = 0.0
-    _found: dict[bytes, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+    outside_index: float = 1.0
+    _found: dict[bytes, tuple[FloatArray, FloatArray, NumberArray]] = field(default_factory=dict)
     _counter: Counter[str] = field(default_factory=Counter)
 
     @property
@@ -77,10 +80,14 @@ class FitProblem:
 
     def value_and_gradient(self, logarithms: FloatArray) -> tuple[float, FloatArray]:
         """Half the sum of the squares of the residuals, and its gradient (u,)."""
-        residuals, jacobian = self._at(logarithms)
+        residuals, jacobian, _ = self._at(logarithms)
         return 0.5 * float(residuals @ residuals), residuals @ jacobian
 
-    def _at(self, logarithms: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def fitted(self, logarithms: FloatArray) -> NumberArray:
+        """Readings of the model, times the gain, (c, l, d), W/unit²."""
+        return self._at(logarithms)[2]
+
+    def _at(self, logarithms: FloatArray) -> tuple[FloatArray, FloatArray, NumberArray]:
         key = np.asarray(logarithms, dtype=float).tobytes()
         if key not in self._found:
             self._found.clear()
@@ -88,28 +95,30 @@ class FitProblem:
             self._found[key] = self._evaluate(np.exp(logarithms))
         return self._found[key]
 
-    def _evaluate(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Residuals (n,) and their derivatives to logarithms (n, u), at values (u,)."""
+    def _evaluate(self, values: FloatArray) -> tuple[FloatArray, FloatArray, NumberArray]:
+        """Residuals (n,), their derivatives to logarithms (n, u), and readings (c, l, d), at values (u,)."""
         slopes = slopes_of_media(self.unknowns, values)
-        residuals, jacobians = [], []
+        gain = values[self.unknowns.names.index(GAIN)] if GAIN in self.unknowns.names else 1.0
+        residuals, jacobians, fitted = [], [], []
         for channel, media in enumerate(self.unknowns.media(values)):
             found = sensitivity(self._system(media), self.lights, self.detectors, per="region", log=True)
-            difference = np.log(found.readings) - np.log(self.readings[channel])
+            fitted.append(found.readings * gain)
+            difference = np.log(fitted[-1]) - np.log(self.readings[channel])
             by_medium = np.stack([found.derivatives["sigma_a"], found.derivatives["sigma_s_prime"]], axis=-1)
             jacobian = np.tensordot(by_medium, slopes[channel], axes=2) * values
             if GAIN in self.unknowns.names:
-                number = self.unknowns.names.index(GAIN)
-                difference += np.log(values[number])
-                jacobian[..., number] = 1.0
+                jacobian[..., self.unknowns.names.index(GAIN)] = 1.0
             measured = np.isfinite(self.readings[channel])
             noise = self.noise[channel][measured]
             residuals += _parts(_least_turn(difference[measured]) / noise)
             jacobians += _parts(jacobian[measured] / noise[:, None])
-        return np.concatenate(residuals), np.concatenate(jacobians)
+        return np.concatenate(residuals), np.concatenate(jacobians), np.array(fitted)
 
     def _system(self, media: Sequence[Medium]) -> System:
         regions = tuple(replace(region, medium=medium) for region, medium in zip(self.regions, media[1:], strict=True))
-        shift = shift_of_frequency(self.frequency, media[0], self.surface.unit) if self.frequency else 0.0
+        shift: complex = 0.0
+        if self.frequency:
+            shift = shift_of_frequency(self.frequency, media[0], self.surface.unit, self.outside_index)
         return System(self.mesh, media[0], self.surface, regions=regions, shift=shift)
 
     __repr__ = one_line

@@ -15,8 +15,15 @@ from tetlux.meshing.errors import InputError
 
 COEFFICIENTS = ("sigma_a", "sigma_s_prime")
 OF_TISSUE = ("hbo2", "hhb", "water", "fat", "a", "b")
+HAEMOGLOBIN = ("hbo2", "hhb")
+# Those that are shares of the volume.
+FRACTIONS = ("water", "fat")
 # The unknown factor of all readings.
 GAIN = "gain"
+# What a part of the body begins with: coefficients, or the arguments of `tissue`.
+Start = Medium | Mapping[str, Any]
+# What `tissue` needs.
+NEEDED = ("wavelengths", "a", "b", "eta")
 # Step of central differences of media by unknowns, as a share of these.
 STEP = 1e-4
 
@@ -39,65 +46,101 @@ class Unknowns(Protocol):
         ...
 
 
+# The number of the part that an unknown is of, 0 for the body, and its quantity.
+Place = tuple[int, str]
+
+
 @dataclass(frozen=True, eq=False)
 class CoefficientUnknowns:
     """Coefficients of the body and of regions, in one channel."""
 
     names: tuple[str, ...]
+    places: tuple[Place, ...]
     given: tuple[Medium, ...]
 
     @property
     def start(self) -> FloatArray:
         """See `Unknowns`."""
-        return np.array([1.0 if name == GAIN else self._at(name) for name in self.names])
+        return np.array([self._at(*place) for place in self.places])
 
     def media(self, values: FloatArray) -> list[list[Medium]]:
         """See `Unknowns`."""
         media = list(self.given)
-        for name, value in zip(self.names, values.tolist(), strict=True):
-            if name != GAIN:
-                number, coefficient = _split(name)
-                media[number] = _with_coefficient(media[number], coefficient, value)
+        for (number, quantity), value in zip(self.places, values.tolist(), strict=True):
+            if quantity != GAIN:
+                media[number] = _with_coefficient(media[number], quantity, value)
         return [media]
 
-    def _at(self, name: str) -> float:
-        number, coefficient = _split(name)
+    def _at(self, number: int, quantity: str) -> float:
+        if quantity == GAIN:
+            return 1.0
         medium = self.given[number]
-        return medium.sigma_a if coefficient == "sigma_a" else medium.reduced_scattering
+        return medium.sigma_a if quantity == "sigma_a" else medium.reduced_scattering
 
     __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
 class TissueUnknowns:
-    """Chromophores and scattering of the body at several wavelengths; media of regions (c, r) are known."""
+    """Chromophores and scattering at several wavelengths.
+
+    Attributes
+    ----------
+    names : tuple of str
+    places : tuple of (int, str)
+    parts : tuple of mapping or of tuple of Medium
+        Of the body and of each region: arguments of `tissue`, or the media at all wavelengths, which are known.
+    """
 
     names: tuple[str, ...]
-    given: Mapping[str, Any]
-    regions: tuple[tuple[Medium, ...], ...]
+    places: tuple[Place, ...]
+    parts: tuple[Mapping[str, Any] | tuple[Medium, ...], ...]
 
     @property
     def start(self) -> FloatArray:
         """See `Unknowns`."""
-        return np.array([1.0 if name == GAIN else float(self.given.get(name, 0.0)) for name in self.names])
+        return np.array([self._at(*place) for place in self.places])
 
     def media(self, values: FloatArray) -> list[list[Medium]]:
         """See `Unknowns`."""
-        fitted = {name: value for name, value in zip(self.names, values.tolist(), strict=True) if name != GAIN}
-        return [
-            [medium, *others] for medium, others in zip(tissue(**{**self.given, **fitted}), self.regions, strict=True)
+        fitted: list[dict[str, float]] = [{} for _ in self.parts]
+        for (number, quantity), value in zip(self.places, values.tolist(), strict=True):
+            if quantity != GAIN:
+                fitted[number][quantity] = value
+        by_part = [
+            part if isinstance(part, tuple) else tissue(**{**part, **own})
+            for part, own in zip(self.parts, fitted, strict=True)
         ]
+        return [list(media) for media in zip(*by_part, strict=True)]
+
+    def _at(self, number: int, quantity: str) -> float:
+        part = self.parts[number]
+        return 1.0 if quantity == GAIN or isinstance(part, tuple) else float(part.get(quantity, 0.0))
 
     __repr__ = one_line
 
 
-def unknowns_of(names: Sequence[str], start: Medium | Mapping[str, Any], regions: Sequence[Region]) -> Unknowns:
+def unknowns_of(
+    names: Sequence[str],
+    start: Start | Sequence[Start | Sequence[Medium]],
+    regions: Sequence[Region],
+    region_names: Sequence[str] = (),
+) -> Unknowns:
     """The unknowns that names stand for.
+
+    Parameters
+    ----------
+    names : sequence of str
+    start : Medium, mapping, or sequence of these
+        See `tetlux.fem.fit`.
+    regions : sequence of Region
+    region_names : sequence of str
+        What stands before the dot in names of unknowns of regions; by default their numbers from 1.
 
     Raises
     ------
     InputError
-        If a name is not known or given twice, or a start is 0.
+        If a name is not known or given twice, or a start is 0 or not sensible.
     """
     if isinstance(names, str) or len(names) == 0:
         raise InputError(
@@ -106,28 +149,62 @@ def unknowns_of(names: Sequence[str], start: Medium | Mapping[str, Any], regions
     repeated = next((name for name in names if list(names).count(name) > 1), None)
     if repeated is not None:
         raise InputError(f'the unknown "{repeated}" is given twice; give each once.', field="unknowns")
-    if isinstance(start, Medium):
-        media = [_only(region.medium, number) for number, region in enumerate(regions, 1)]
-        known = [
-            f"{prefix}{name}"
-            for prefix in ["", *(f"{n}." for n in range(1, len(regions) + 1))]
-            for name in COEFFICIENTS
-        ]
-        found: Unknowns = CoefficientUnknowns(tuple(names), (start, *media))
-    else:
-        channels = len(start.get("wavelengths", ()))
-        of_regions = [_of_channels(region.medium, channels, number) for number, region in enumerate(regions, 1)]
-        known = list(OF_TISSUE)
-        found = TissueUnknowns(tuple(names), start, tuple(zip(*of_regions, strict=True)) or ((),) * channels)
+    parts = _parts(start, regions)
+    of_tissue = [part for part in parts if isinstance(part, Mapping)]
+    prefixes = ["", *(f"{name}." for name in region_names or range(1, len(parts)))]
+    known: dict[str, Place] = {
+        f"{prefixes[number]}{quantity}": (number, quantity)
+        for number, part in enumerate(parts)
+        for quantity in _quantities_of(part, of_tissue=bool(of_tissue))
+    }
+    known[GAIN] = 0, GAIN
     for name in names:
-        if name not in (*known, GAIN):
-            raise InputError(
-                f'"{name}" is no unknown of this fit; give some of {", ".join([*known, GAIN])}.', field="unknowns"
-            )
+        if name not in known:
+            raise InputError(f'"{name}" is no unknown of this fit; give some of {", ".join(known)}.', field="unknowns")
+    places = tuple(known[name] for name in names)
+    found: Unknowns
+    if of_tissue:
+        channels = _channels(of_tissue)
+        each = (part if isinstance(part, Mapping) else _of_channels(part, channels, n) for n, part in enumerate(parts))
+        found = TissueUnknowns(tuple(names), places, tuple(each))
+    else:
+        given = tuple(_only(part, number) for number, part in enumerate(parts))
+        found = CoefficientUnknowns(tuple(names), places, given)
     for name, value in zip(found.names, found.start.tolist(), strict=True):
         if not value > 0:
             raise InputError(f"{name} begins at {value:g}; begin with a value greater than 0.", field="start")
+    found.media(found.start)
     return found
+
+
+def _parts(start: Start | Sequence[Start | Sequence[Medium]], regions: Sequence[Region]) -> list[Any]:
+    """What the body and each region begin with."""
+    if isinstance(start, Medium | Mapping):
+        return [start, *(region.medium for region in regions)]
+    if len(start) != 1 + len(regions):
+        raise InputError(
+            f"start has {len(start)} entries; give one for the body and one for each of the {len(regions)} regions.",
+            field="start",
+        )
+    return list(start)
+
+
+def _quantities_of(part: object, *, of_tissue: bool) -> tuple[str, ...]:
+    if isinstance(part, Mapping):
+        return OF_TISSUE
+    return () if of_tissue else COEFFICIENTS
+
+
+def _channels(of_tissue: Sequence[Mapping[str, Any]]) -> int:
+    """How many wavelengths there are, the same ones in all parts."""
+    wavelengths = [list(part.get("wavelengths", ())) for part in of_tissue]
+    if any(each != wavelengths[0] for each in wavelengths):
+        raise InputError("parts of the body have other wavelengths; give all the same.", field="start")
+    for part in of_tissue:
+        missing = [name for name in NEEDED if name not in part]
+        if missing:
+            raise InputError(f"{' and '.join(missing)} is missing in start; give it, as to tissue.", field="start")
+    return len(wavelengths[0])
 
 
 def slopes_of_media(unknowns: Unknowns, values: FloatArray) -> FloatArray:
@@ -145,12 +222,6 @@ def _coefficients(media: list[list[Medium]]) -> FloatArray:
     return np.array([[[medium.sigma_a, medium.reduced_scattering] for medium in channel] for channel in media])
 
 
-def _split(name: str) -> tuple[int, str]:
-    """The number of the region that a name is of, 0 for the body, and the coefficient."""
-    number, _, coefficient = name.rpartition(".")
-    return int(number or 0), coefficient
-
-
 def _with_coefficient(medium: Medium, coefficient: str, value: float) -> Medium:
     if coefficient == "sigma_a":
         return replace(medium, sigma_a=value)
@@ -161,12 +232,20 @@ def _with_coefficient(medium: Medium, coefficient: str, value: float) -> Medium:
 
 def _only(medium: object, number: int) -> Medium:
     if not isinstance(medium, Medium):
-        raise InputError(f"region {number} has no single even medium, which a fit begins with; give one Medium.")
+        raise InputError(
+            f"{_where(number)} has no single even medium, which a fit begins with; give it one.", field="start"
+        )
     return medium
 
 
-def _of_channels(medium: object, channels: int, number: int) -> list[Medium]:
+def _of_channels(medium: object, channels: int, number: int) -> tuple[Medium, ...]:
     each = [medium] * channels if isinstance(medium, Medium) else medium
     if not (isinstance(each, Sequence) and len(each) == channels and all(isinstance(one, Medium) for one in each)):
-        raise InputError(f"region {number} needs one Medium, or one for each of the {channels} wavelengths.")
-    return list(each)
+        raise InputError(
+            f"{_where(number)} needs one even medium, or one for each of the {channels} wavelengths.", field="start"
+        )
+    return tuple(each)
+
+
+def _where(number: int) -> str:
+    return f"region {number}" if number else "the body"

@@ -68,9 +68,11 @@ def charge_solution(
     """
     sources = powers.sum(axis=0)
     if not inner:
-        transmitted = np.array([ledger.transmitted for ledger in ledgers])
-        boundary_source = np.asarray(boundary_condition_of(medium).inflow(transmitted))
-        lights, equation, goal = LightSources(points, powers, boundary_source), equation_of(medium, shift), None
+        transmitted, condition = np.array([ledger.transmitted for ledger in ledgers]), boundary_condition_of(medium)
+        boundary_source = np.asarray(condition.inflow(transmitted))
+        unscattered = float(condition.exitance_offset(transmitted.sum()))
+        lights = LightSources(points, powers, boundary_source, unscattered)
+        equation, goal = equation_of(medium, shift), None
         if readings is not None:
             goal = reading_goal(surface, equation, points, powers.sum(axis=1), float(boundary_source.sum()), *readings)
             fitted = fit_for_readings(surface, equation, lights, goal, tolerance=tolerance, most=most)

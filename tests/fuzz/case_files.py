@@ -15,6 +15,7 @@ from tests.meshes_made import cube_of_cubes
 from tetlux.meshing import TetMesh, box
 from tetlux.meshing.files.meshes import write_mesh
 
+QUICK = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 RIGHT = [
     yaml.safe_load(text)
     for text in (
@@ -491,7 +492,7 @@ def traps() -> Iterator[tuple[str, bytes]]:
                 data["medium"]["sigma_s_prime"]["volume"]["file"] = file
             else:
                 data["medium"]["sigma_a"]["images"]["files"] = file
-            yield f"{place} in {file[:30]!r}", yaml.safe_dump(data).encode()
+            yield f"{place} in {file[:30]!r}", yaml.dump(data, Dumper=QUICK).encode()
 
 
 def companions(folder: Path) -> None:

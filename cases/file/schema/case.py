@@ -2,109 +2,21 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
+from tetlux.cases.file.schema.body import MeshSpec, RegionSpec, SurfaceSpec
 from tetlux.cases.file.schema.camera import CameraSpec
 from tetlux.cases.file.schema.detectors import DetectorSpec
+from tetlux.cases.file.schema.fit import FitSpec, refuse_beside_fit, refuse_without_readings
 from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Choice, Each, Label, Length, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, Each, Label, Number, Section, Vector3, shape_of
 from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
 from tetlux.cases.file.schema.pulse import PulseSpec, refuse_beside_pulse
 from tetlux.cases.file.schema.sweep import SweepSpec
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
-
-
-class SphereSpec(Section):
-    """A sphere."""
-
-    radius: Length
-    center: Vector3 = (0.0, 0.0, 0.0)
-
-
-class SlabSpec(Section):
-    """A square plate whose upper face is z = 0."""
-
-    width: Length
-    depth: Length
-
-
-class BoxSpec(Section):
-    """A box with edges along the axes."""
-
-    size: tuple[Length, Length, Length]
-    center: Vector3 = (0.0, 0.0, 0.0)
-
-
-class CylinderSpec(Section):
-    """A cylinder along z."""
-
-    radius: Length
-    height: Length
-    center: Vector3 = (0.0, 0.0, 0.0)
-
-
-class TorusSpec(Section):
-    """A torus around z."""
-
-    major: Length
-    minor: Length
-    center: Vector3 = (0.0, 0.0, 0.0)
-
-
-class SurfaceSpec(Choice):
-    """The body: a surface file, or one built-in shape."""
-
-    file: str | None = Field(None, description="surface file, relative to the case file")
-    scale: Length = Field(1.0, description="factor on the file's coordinates")
-    crease_angle: float = Field(
-        30.0,
-        ge=0,
-        le=180,
-        description="degrees; triangles that bend by less form a smooth surface; 0: all are flat",
-    )
-    holes: Literal["small", "close", "refuse"] = Field(
-        "small", description="which holes are capped: small ones, all (close) or none (refuse)"
-    )
-    sphere: SphereSpec | None = None
-    slab: SlabSpec | None = None
-    box: BoxSpec | None = None
-    cylinder: CylinderSpec | None = None
-    torus: TorusSpec | None = None
-
-    @model_validator(mode="after")
-    def _scale_of_a_file(self) -> "SurfaceSpec":
-        if self.file is None and self.scale != 1.0:
-            raise PydanticCustomError("scale", "scale applies to a surface file; give a shape its lengths directly")
-        if self.file is None and self.holes != "small":
-            raise PydanticCustomError("holes", "holes applies to a surface file; leave it out")
-        return self
-
-
-class RegionSpec(Section):
-    """A closed surface inside the body, and the medium inside it."""
-
-    name: Label = Field("", description="default: region and number, as in region_1")
-    surface: SurfaceSpec
-    medium: Media
-
-
-class MeshSpec(Section):
-    """A volume mesh made elsewhere, with a medium for each of its labels."""
-
-    file: str = Field(description="volume mesh, relative to the case file")
-    scale: Length = Field(1.0, description="factor on the file's coordinates")
-    array: str | None = Field(None, description="the array of labels in the file, if there are several")
-    labels: Annotated[dict[str, Media], Field(min_length=1)] = Field(
-        description="the medium of each label, by its number or name; 0 if there are no labels"
-    )
-
-    @field_validator("labels", mode="before")
-    @classmethod
-    def _numbers_as_words(cls, labels: Any) -> Any:
-        return {str(label): medium for label, medium in labels.items()} if isinstance(labels, dict) else labels
 
 
 class ModulationSpec(Section):
@@ -117,7 +29,7 @@ class ModulationSpec(Section):
 
 
 ClosedForm = Literal["robin", "images", "dipole", "series"]
-Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba", "film"]
+Output = Literal["surface", "volume", "picture", "viewer", "figures", "glb", "mitsuba", "film", "sensitivity"]
 Model = Literal["full", "auto", "closed-form", "charges", "truncated"]
 # Models that make no mesh.
 WITHOUT_MESH = ("closed-form", "charges")
@@ -167,6 +79,11 @@ class CaseSpec(Section):
     pulse: PulseSpec | None = Field(None, description="light in time after a short pulse of all lights")
     fluorescence: FluorescenceSpec | None = Field(
         None, description="dyes that emit at another wavelength, which is a channel of its own"
+    )
+    fit: FitSpec | None = Field(
+        None,
+        description="coefficients are fitted to what the detectors have read, beginning with the media of the case; "
+        "the case is then solved with what was found",
     )
     model: Model = Field(
         "full",
@@ -279,6 +196,21 @@ class CaseSpec(Section):
             raise PydanticCustomError(
                 "pulse", "a film shows a pulse; add pulse, or leave film out of outputs", {"key": "outputs"}
             )
+        return self
+
+    @model_validator(mode="after")
+    def _with_sensitivities(self) -> "CaseSpec":
+        if "sensitivity" in self.outputs:
+            refuse_without_readings(
+                self.model, {"pulse": self.pulse, "fluorescence": self.fluorescence}, self.detectors
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _beside_fit(self) -> "CaseSpec":
+        if self.fit is not None:
+            sections = ("mesh", "pulse", "fluorescence", "compare")
+            refuse_beside_fit(self.model, {name: getattr(self, name) for name in sections}, self.detectors)
         return self
 
     @model_validator(mode="after")

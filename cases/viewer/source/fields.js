@@ -19,9 +19,15 @@ export class Fields {
     return [...new Set(this.list.filter((field) => field.quantity === quantity).map((field) => field[kind]))];
   }
 
-  // The field of a channel and a light, or of all of them where it is not known for each.
-  find(quantity, channel, light) {
+  // Times at which a quantity is known, s; none of one that does not depend on time.
+  times(quantity) {
+    return this.list.filter((field) => field.quantity === quantity && "time" in field).map((field) => field.time);
+  }
+
+  // The field of a channel and a light, or of all of them where it is not known for each, at the nth of its times.
+  find(quantity, channel, light, moment = 0) {
     const own = this.list.filter((field) => field.quantity === quantity);
+    if ("time" in own[0]) return own[Math.min(moment, own.length - 1)];
     const match = (c, l) => own.find((field) => field.channel === c && field.light === l);
     return match(channel, light) ?? match(channel, ALL) ?? match(ALL, light) ?? match(ALL, ALL) ?? own[0];
   }

@@ -19,6 +19,8 @@ import { rimMaterial } from "./shaders.js";
 
 const LIGHT = 0x009eb8;
 const ARROW_RADIUS = 0.0042;
+// Cosine of the angle, 20 degrees, below which an arrow is seen end-on.
+const END_ON = 0.94;
 // Edges of regions at which faces meet at a larger angle, degrees.
 const EDGE = 30;
 
@@ -44,9 +46,21 @@ export function makeArrows(arrows, diagonal) {
   const seen = new MeshBasicMaterial({ color: LIGHT, transparent: true, opacity: 0.75 });
   const hidden = new MeshBasicMaterial({ color: LIGHT, transparent: true, opacity: 0.2, depthTest: false, depthWrite: false });
   for (const ends of arrows) {
-    group.add(arrow(ends, ARROW_RADIUS * diagonal, hidden), arrow(ends, ARROW_RADIUS * diagonal, seen));
+    const one = new Group();
+    one.add(arrow(ends, ARROW_RADIUS * diagonal, hidden), arrow(ends, ARROW_RADIUS * diagonal, seen));
+    one.userData.along = new Vector3(...ends[1]).sub(new Vector3(...ends[0])).normalize();
+    group.add(one);
   }
   return group;
+}
+
+// Hide arrows along which the camera looks, since they would hide what they light: rings with a cross stand for them.
+export function hideEndOn(arrows, rings, toward) {
+  for (const [i, one] of arrows.children.entries()) {
+    const across = one.userData.along.dot(toward);
+    one.visible = Math.abs(across) < END_ON;
+    rings[i].classList.toggle("end-on", across <= -END_ON);
+  }
 }
 
 export async function makeRegion(region, up) {
@@ -102,7 +116,7 @@ export class Labels {
   place(camera, width, height, shown) {
     const taken = [];
     for (const { kind, place, element } of this.labels) {
-      element.hidden = !shown[kind];
+      element.hidden = !shown[kind === "beams" ? "lights" : kind];
       if (element.hidden) continue;
       const { x, y } = place.clone().project(camera);
       const [left, top] = [((x + 1) / 2) * width, ((1 - y) / 2) * height];

@@ -22,7 +22,9 @@ export class Panel {
     for (const name of ["log", "linear"]) {
       element(name).addEventListener("change", () => change({ logarithmic: name === "log" }));
     }
-    element("position").addEventListener("input", () => change({ position: Number(element("position").value) }));
+    for (const id of ["position", "moment"]) {
+      element(id).addEventListener("input", () => change({ [id]: Number(element(id).value) }));
+    }
     for (const id of Object.keys(SWITCHES)) {
       element(id).addEventListener("change", () => change({ [id]: element(id).checked }));
     }
@@ -39,13 +41,18 @@ export class Panel {
     for (const kind of ["channel", "light"]) {
       fill(element(kind), fields.names(state.quantity, kind), state[kind], (name) => (name === ALL ? "sum of all" : name));
     }
+    const times = fields.times(state.quantity);
+    element("times").hidden = times.length < 2;
+    element("moment").max = Math.max(times.length - 1, 0);
+    element("moment").value = state.moment;
+    element("time").textContent = times.length ? timeText(times[Math.min(state.moment, times.length - 1)]) : "";
     fill(element("map"), Object.keys(scene.maps), state.map);
     element("log").checked = state.logarithmic;
     element("linear").checked = !state.logarithmic;
     element("scales").hidden = element("ranges").hidden = state.quantity === "preview";
     for (const [i, end] of ["bottom", "top"].entries()) {
       const input = element(end);
-      input.value = String(Number(range[i].toPrecision(4)));
+      input.value = shortText(range[i]);
     }
     for (const id of Object.keys(SWITCHES)) element(id).checked = state[id];
     element("cut").value = state.cut;
@@ -80,6 +87,18 @@ export class Panel {
 
 export function describe(value, unit) {
   return Number.isFinite(value) ? `${label(value, 5)} ${unit}`.trim() : "not known";
+}
+
+// A number as it fits into a field of the page.
+function shortText(value) {
+  const size = Math.abs(value);
+  return size > 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(3) : String(Number(value.toPrecision(4)));
+}
+
+// A time, s, as people write it.
+export function timeText(seconds) {
+  const [factor, unit] = seconds < 1e-9 ? [1e12, "ps"] : seconds < 1e-6 ? [1e9, "ns"] : [1e6, "µs"];
+  return `${Number((factor * seconds).toPrecision(4))} ${unit}`;
 }
 
 export const percent = (share) => `${Number((100 * share).toPrecision(2))} %`;

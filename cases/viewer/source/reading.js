@@ -2,7 +2,7 @@
 
 import { ALL } from "./fields.js";
 import { label } from "./colours.js";
-import { describe, percent } from "./panel.js";
+import { describe, percent, timeText } from "./panel.js";
 import { valueAt } from "./pick.js";
 
 export async function readPoint({ data, fields, state, section, triangles }, hit) {
@@ -10,14 +10,15 @@ export async function readPoint({ data, fields, state, section, triangles }, hit
   const lines = [["place", `${place} ${data.unit}`]];
   if ("fluence" in hit) return [...lines, ["fluence", describe(hit.fluence, section.field.unit)]];
   for (const quantity of fields.quantities) {
-    const field = fields.find(quantity, state.channel, state.light);
+    const field = fields.find(quantity, state.channel, state.light, state.moment);
     const value = valueAt(hit, await fields.values(field), triangles) * field.values.factor;
     lines.push([nameOf(field), describe(value, field.unit)]);
   }
   return [...lines, ...errorsOf(data, state), ...nearestDetector(data, state, hit.place)];
 }
 
-function nameOf({ quantity, channel, light }) {
+function nameOf({ quantity, channel, light, time }) {
+  if (time !== undefined) return `exitance at ${timeText(time)}`;
   const parts = [channel, light].filter((name) => name !== ALL);
   return parts.length ? `${quantity}, ${parts.join(", ")}` : quantity;
 }

@@ -9,7 +9,7 @@ import { Fields, rangeOf, ALL } from "./fields.js";
 import { compileWith } from "./shaders.js";
 import { Sharpness } from "./sharpness.js";
 import { drawAxes, drawBar, drawNothing, drawScale, drawWhite, pen } from "./legend.js";
-import { Labels, makeArrows, makeRegion } from "./marks.js";
+import { Labels, hideEndOn, makeArrows, makeRegion } from "./marks.js";
 import { Panel, SWITCHES, element } from "./panel.js";
 import { firstHit } from "./pick.js";
 import { readPoint } from "./reading.js";
@@ -29,7 +29,7 @@ ColorManagement.enabled = false;
 class Viewer {
   constructor(scene) {
     this.data = scene;
-    this.fields = new Fields(scene.fields);
+    this.fields = new Fields([...scene.fields, ...(scene.inTime ?? [])]);
     this.scene = new Scene();
     this.renderer = new WebGLRenderer({ canvas: element("view"), antialias: false });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
@@ -53,6 +53,7 @@ class Viewer {
       regions: true,
       cut: "off",
       position: 0.5,
+      moment: 0,
     };
     this.picked = null;
     this.frames = 0;
@@ -68,6 +69,7 @@ class Viewer {
     this.regions = await Promise.all(data.regions.map((region) => makeRegion(region, data.up)));
     this.section = new Section(data, this.regions);
     this.scene.add(this.body.mesh, this.arrows, ...this.regions.map((region) => region.group), ...this.section.objects);
+    this.rings = data.lights.arrows.map(([, tip]) => this.labels.add("beams", tip));
     for (const place of data.lights.points) this.labels.add("lights", place);
     for (const { name, place } of data.detectors) this.labels.add("detectors", place, name);
     for (const { name, top } of this.regions) this.labels.add("regions", top, name);
@@ -76,8 +78,8 @@ class Viewer {
   }
 
   get field() {
-    const { quantity, channel, light } = this.state;
-    return this.fields.find(quantity === "preview" ? "exitance" : quantity, channel, light);
+    const { quantity, channel, light, moment } = this.state;
+    return this.fields.find(quantity === "preview" ? "exitance" : quantity, channel, light, moment);
   }
 
   get logarithmic() {
@@ -176,6 +178,7 @@ class Viewer {
     this.sharpness.set(resting);
     const plane = this.plane;
     if (plane) this.body.mesh.material.uniforms.plane.value.set(...plane.normal, plane.offset);
+    hideEndOn(this.arrows, this.rings, view.toward);
     this.renderer.render(this.scene, view.camera);
     this.sharpness.learn();
     this.labels.place(view.camera, ...this.size, { ...this.state, picked: this.picked !== null });

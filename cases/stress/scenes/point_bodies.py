@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.cases.stress.scenarios import INDEX
+from tetlux.cases.stress.scenes.scenarios import INDEX
 from tetlux.fem.exact import box, cylinder, layered_ball, slab, sphere
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region

@@ -3,8 +3,8 @@
 import numpy as np
 
 from tetlux.cases.chart.samples import project_to_sphere, surface_samples
-from tetlux.cases.stress.point_bodies import LAYERS, PointBody, ball, block, layers, plate, rod, round_places
-from tetlux.cases.stress.scenarios import Scenario, medium_of_albedo
+from tetlux.cases.stress.scenes.point_bodies import LAYERS, PointBody, ball, block, layers, plate, rod, round_places
+from tetlux.cases.stress.scenes.scenarios import Scenario, medium_of_albedo
 from tetlux.fem import PointSource
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.solids import Slab, Sphere

@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tetlux.cases.chart.samples import Samples, project_to_sphere, surface_samples
-from tetlux.cases.stress.bodies import BODIES
-from tetlux.cases.stress.meshes import degrade, layered_ball
+from tetlux.cases.stress.scenes.bodies import BODIES
+from tetlux.cases.stress.scenes.meshes import degrade, layered_ball
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.grading import places_to_resolve
 from tetlux.meshing import shapes
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.solids import Sphere
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
@@ -28,6 +28,16 @@ OFF_NODES = 0.5
 
 # Samples of the true surface, and the exitance there in closed form, W/unit².
 Truth = tuple[Samples, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Readout:
+    """Values (n,) that are held against a closed form, their relative error bars (n,), and how they were found."""
+
+    values: NumberArray
+    bars: FloatArray
+    nodes: int
+    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +60,10 @@ class Scenario:
         Whether the exact fluence may be negative, since the source has a first moment.
     unit_scale : Scenario or None
         The same scenario with all lengths divided by its radius.
-    readings : ((d, 3), (d,) ndarray) or None
+    readings : ((d, 3), (n,) ndarray) or None
         Positions of point detectors, and the exitance there in closed form; the run is then for them alone.
+    read : callable or None
+        Finds what the closed form of `readings` is of, where that is not the exitance of steady light.
     """
 
     surface: Surface
@@ -63,7 +75,8 @@ class Scenario:
     bound: float | None = None
     may_be_negative: bool = False
     unit_scale: "Scenario | None" = None
-    readings: tuple[FloatArray, FloatArray] | None = None
+    readings: tuple[FloatArray, NumberArray] | None = None
+    read: "Callable[[Scenario], Readout] | None" = None
 
 
 def medium_of_albedo(albedo: float, eta: float = INDEX, free_path: float = 1.0) -> Medium:
