@@ -336,4 +336,4 @@ def test_the_extremes_of_a_run_do_not_depend_on_those_before_it() -> None:
         found = [
             extreme_places(System(mesh, medium, ball).solve([PointSource(position)])) for mesh in (first.mesh, same)
         ]
-        np.testing.assert_allclose(*found, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)
