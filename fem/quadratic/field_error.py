@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.fem.quadratic.error import weigh_residual
+from tetlux.fem.quadratic.gaps import gaps_of
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.solution import QuadraticSolution, Where
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
@@ -128,7 +129,7 @@ def _errors(solution: QuadraticSolution, bands: list[Band], scales: FloatArray) 
         loads[band.nodes, column] = ALMOST_ALL * signs * np.sqrt(band.shares) / scales[band.nodes]
     duals = solution.operator.solve(loads, STOP_RESIDUAL_OF_PROBES)
     # What threads share is computed before.
-    _ = solution.gradient_difference, solution.broad_beams
+    _ = solution.gradient_difference, solution.broad_beams, solution.inflow, gaps_of(solution.operator)
     found = map_in_threads(lambda dual: weigh_residual(solution, dual, 1.0), list(duals.T))
     return [_mean_square(found[start : start + PROBES]) for start in range(0, len(found), PROBES)]
 
@@ -140,6 +141,7 @@ def _mean_square(probes: list[ReadingError]) -> ReadingError:
         np.mean([probe.squares for probe in probes], axis=0),
         float(np.sqrt(np.mean([abs(probe.sum) ** 2 for probe in probes]))),
         float(np.sqrt(np.mean([probe.rays**2 for probe in probes]))),
+        float(np.sqrt(np.mean([abs(probe.gaps) ** 2 for probe in probes]))),
     )
 
 

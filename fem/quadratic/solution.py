@@ -1,6 +1,6 @@
 """`QuadraticSolution`: the fluence of lights in quadratic elements, and measurements of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -132,14 +132,21 @@ class QuadraticSolution:
 
     def fluence_at(self, discrete: DiscreteMeasurement) -> NumberArray:
         """Fluence at the points of a measurement, (q,), W/unit²."""
-        fluence, points = discrete.values(self.solved), discrete.measurement.points
+        fluence, points = self.remainder_at(discrete), discrete.measurement.points
         for patch in self.patches:
             inside = np.flatnonzero(patch.patch.cells[discrete.cells])
             if len(inside):
                 fluence[inside] += patch.patch.charges.fluence(points[inside])
-                if not patch.is_whole:
-                    fluence[inside] -= discrete.values(patch.interpolant)[inside]
         return fluence
+
+    def remainder_at(self, discrete: DiscreteMeasurement) -> NumberArray:
+        """The fluence less that of charges at the points of a measurement, as on the mesh, (q,), W/unit²."""
+        remainder = discrete.values(self.solved)
+        for patch in self.patches:
+            if not patch.is_whole:
+                inside = np.flatnonzero(patch.patch.cells[discrete.cells])
+                remainder[inside] -= discrete.values(patch.interpolant)[inside]
+        return remainder
 
     def exitance_on(self, points: FloatArray, linear: NumberArray) -> NumberArray:
         """Exitance at points (q, 3) that lie on the surface, (q,), W/unit².
@@ -169,10 +176,18 @@ class QuadraticSolution:
     @cached_property
     def _unscattered_at_nodes(self) -> FloatArray:
         """Exitance in addition to ``phi/(2A)`` under diffuse light at all nodes, (n,), as in `Solution.exitance`."""
-        mesh = self.operator.mesh
-        found = np.zeros(len(mesh.points))
+        return self._on_boundary(boundary_condition_of(self.operator.coefficients.outer).exitance_offset)
+
+    @cached_property
+    def inflow(self) -> FloatArray:
+        """Inflow of diffuse light at all nodes, (n,), W/unit²."""
+        return self._on_boundary(boundary_condition_of(self.operator.coefficients.outer).inflow)
+
+    def _on_boundary(self, change: Callable[[float | FloatArray], float | FloatArray]) -> FloatArray:
+        """A function of the transmitted irradiance at the boundary nodes, and 0 inside, (n,)."""
+        found = np.zeros(len(self.operator.mesh.points))
         given = sum(self.scene.deposits[light].terms.transmitted_irradiance for light in self.lights)
-        found[mesh.boundary_nodes] = boundary_condition_of(self.operator.coefficients.outer).exitance_offset(given)
+        found[self.operator.mesh.boundary_nodes] = change(given)
         return found
 
     def _unscattered(self, discrete: DiscreteMeasurement) -> FloatArray:
