@@ -1,12 +1,13 @@
-"""What sensitivities and fits cost, and how good fits are: ``python -m tests.benchmarks.sensitivities [EDGE | fits]``.
+"""What sensitivities and fits cost, and how good fits are: ``python -m tests.benchmarks.sensitivities [N | fits]``.
 
 Sensitivities: a ball of three layers with 16 beams and 16 detectors, all 256 rows to both coefficients of each node, on
-a mesh of edges of a length in mm (1.0: 60,000 nodes; targets 12 s, 2 GB). Fits: ten fibres on a ball, read by charges,
-from starts a factor of 3 off (targets .5 % in 15 times a solve), and `TRIALS` fits to readings with 1 % of noise (60 to
-75 % within one standard deviation), by polynomials through what is read on one mesh, and `WHOLE` of them as a whole.
-With the argument ``fits`` these alone. Times are processor seconds. On two busy cores: 46 s and .7 GB with 8,000 nodes,
-of which solutions by quadratic elements take half; fits within .01 % in 11.9 and 13.3
-solves of 1.6 s; 68 and 66 % of the 200 fits within one standard deviation, whole fits within .01 of it of these.
+a mesh that is halved N times everywhere (0: 6,000 nodes, 1: 22,000, 2: 69,000; targets of 60,000 nodes: 12 s, 2 GB).
+Fits: ten fibres on a ball, read by charges, from starts a factor of 3 off (targets .5 % in 15 times a solve), and
+`TRIALS` fits to readings with 1 % of noise (60 to 75 % within one standard deviation), by polynomials through what is
+read on one mesh, and `WHOLE` of them as a whole. With the argument ``fits`` these alone. Times are processor seconds.
+On two busy cores: 13.4 s with 6,000 nodes (.46 GB), 38 with 22,000 (1.0 GB), of which solves take 12; with
+61,000 it had not ended after 105, with 2.2 GB. Fits within .01 % in 11.9 and 13.3 solves of 1.6 s; 68 and 66 % of the
+200 fits within one standard deviation, whole fits within .01 of it of these.
 """
 
 import itertools
@@ -34,18 +35,21 @@ from tetlux.fem import (
 from tetlux.fem.inverse.unknowns import unknowns_of
 from tetlux.meshing import Surface, TetMesh, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.tets.refine import refine
 
 # Fits to readings with noise; those of them that are made as a whole, with meshes and solves.
 TRIALS, WHOLE, NOISE = 200, 6, 0.01
 # How far from the truth readings are tabulated, in logarithms of coefficients.
 REACH = 0.1
+# Edges of the coarsest mesh of sensitivities, mm.
+EDGE = 2.1
 RADII = (20.0, 17.0, 12.0)
 COEFFICIENTS = ((0.012, 0.9), (0.008, 1.2), (0.02, 1.0))
 MEDIA = [Medium(sigma_a=sigma_a, sigma_s_prime=reduced, eta=1.4) for sigma_a, reduced in COEFFICIENTS]
 TRUTH = Medium(sigma_a=0.02, sigma_s_prime=1.1, eta=1.4)
 
 
-def measure_rows(edge: float) -> None:
+def measure_rows(halvings: int) -> None:
     """Print the time and memory of all rows."""
     ball, inner = sphere(RADII[0]), [sphere(radius) for radius in RADII[1:]]
     number = np.arange(16) + 0.5
@@ -54,12 +58,16 @@ def measure_rows(edge: float) -> None:
     places = np.column_stack([np.cos(angle) * ring, np.sin(angle) * ring, height])
     beams = [PencilBeam((1.5 * x, 1.5 * y, 1.5 * z), (-x, -y, -z)) for x, y, z in (RADII[0] * places).tolist()]
     there = [PointDetector((y, -z, x)) for x, y, z in (RADII[0] * places).tolist()]
-    mesh = tetrahedralize(ball, edge_length=edge, regions=inner)
+    mesh = tetrahedralize(ball, edge_length=EDGE, regions=inner)
+    for _ in range(halvings):
+        mesh = refine(mesh, np.ones(len(mesh.tetrahedra), dtype=bool), ball, inner)
     regions = tuple(Region(surface, medium) for surface, medium in zip(inner, MEDIA[1:], strict=True))
-    started = time.process_time()
+    started, clock = time.process_time(), time.perf_counter()
     sensitivity(System(mesh, MEDIA[0], ball, regions=regions, expected=16), beams, there)
     seconds, most = time.process_time() - started, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    print(f"{len(mesh.points):,} nodes: 256 rows to both coefficients in {seconds:.1f} s, {most:.2f} GB")
+    clock = time.perf_counter() - clock
+    print(f"{len(mesh.points):,} nodes: 256 rows to both coefficients in {clock:.1f} s,", end=" ")
+    print(f"{seconds:.1f} s of CPU, {most:.2f} GB")
 
 
 def measure_fits() -> None:
@@ -149,7 +157,7 @@ def _terms(steps: FloatArray) -> FloatArray:
 def main() -> None:
     """Print all of it."""
     if sys.argv[1:] != ["fits"]:
-        measure_rows(float(sys.argv[1]) if len(sys.argv) > 1 else 1.0)
+        measure_rows(int(sys.argv[1]) if len(sys.argv) > 1 else 0)
     measure_fits()
 
 
