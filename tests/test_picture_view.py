@@ -114,7 +114,7 @@ def test_the_case_file_turns_the_picture(keys: str, toward: Vector | None, tmp_p
         ("camera: {azimuth: 3, elevation: 91}", "camera.elevation: expected a number less than or equal to 90"),
         ("camera: {position: [0, 0, 3]}", "camera.position: the camera is inside the body"),
         ("up: [0, 0, 0]", "line 6: up: up"),
-        ("up: y", "up: expected a list of three numbers"),
+        ("up: y", "up: write the axis as a vector, [0, 1, 0]"),
     ],
 )
 def test_a_wrong_view_gets_one_sentence(keys: str, sentence: str, tmp_path: Path) -> None:
