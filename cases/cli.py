@@ -103,7 +103,19 @@ class _Parser(argparse.ArgumentParser):
             commands = re.findall(r"[\w-]+", invalid[2])
             hint = did_you_mean(invalid[1], commands)
             message = f'there is no command "{invalid[1]}"; {hint}the commands are {", ".join(commands)}.'
+        unknown = re.search(r"unrecognized arguments: (--[\w-]+)", message)
+        if unknown:
+            from tetlux.cases.hints import did_you_mean  # noqa: PLC0415
+
+            options = sorted(set(re.findall(r"--[\w-]+", _all_help())))
+            message = f"there is no option {unknown[1]}; {did_you_mean(unknown[1], options)}see --help."
         super().error(message)
+
+
+def _all_help() -> str:
+    """The help of all commands."""
+    actions = [action for action in _parser()._actions if isinstance(action, argparse._SubParsersAction)]
+    return "".join(each.format_help() for action in actions for each in action.choices.values())
 
 
 class _Version(argparse.Action):

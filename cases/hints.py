@@ -6,6 +6,8 @@ from collections.abc import Iterable
 
 from tetlux.cases.synonyms import ALIASES, REMEDIES
 
+# How much a misspelt synonym resembles one: "milimeter" is 0.95 like "millimeter".
+ALIKE = 0.9
 GREEK = {"µ": "mu_", "μ": "mu_", "σ": "sigma_", "η": "eta", "'": "_prime", "’": "_prime", "′": "_prime"}
 
 
@@ -40,7 +42,12 @@ def nearest_word(word: str, known: Iterable[str]) -> str | None:
     if len(abbreviated) == 1:
         return abbreviated[0]
     close = difflib.get_close_matches(normal, words, n=1)
-    return close[0] if close else None
+    if close:
+        return close[0]
+    # A misspelt other name.
+    names = [name for name, keys in ALIASES.items() if any(key in words for key in keys)]
+    other = difflib.get_close_matches(normal, names, n=1, cutoff=ALIKE)
+    return next(key for key in ALIASES[other[0]] if key in words) if other else None
 
 
 def did_you_mean(word: str, known: Iterable[str], meaning: str = "") -> str:

@@ -70,7 +70,7 @@ def _need_of_mesh(case: Case) -> str:
     if case.fluorophores:
         return "what dyes emit is solved for on a mesh"
     if case.fit is not None:
-        return "a fit has meshes"
+        return "a fit is made by finite elements"
     return MODULATED if any(case.frequencies) else ""
 
 

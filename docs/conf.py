@@ -17,6 +17,8 @@ html_static_path = ["_static"]
 html_css_files = ["wide.css"]
 html_show_sourcelink = False
 html_show_sphinx = False
+# Summaries would be fetched, which browsers refuse for pages that are files.
+html_show_search_summary = False
 html_math_renderer = "mathml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

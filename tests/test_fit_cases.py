@@ -156,6 +156,27 @@ def test_fits_and_sensitivities_need_detectors(tmp_path: Path) -> None:
     check_refused(tmp_path, CASE + "outputs: [sensitivity]\npulse: {times: [1e-9]}\n", "no sensitivities beside pulse")
 
 
+def test_what_is_no_light_or_tissue_is_refused(tmp_path: Path) -> None:
+    """What other tests refuse in Python."""
+    tissue = (
+        "{chromophores: {hbo2: 4e-5, water: %s, fat: 0.5}, scattering: {a: 1.2, b: 1.3}, wavelengths: [%s], eta: 1.4}"
+    )
+    medium = "{sigma_a: 0.015, sigma_s_prime: 1.3, eta: 1.4}"
+    words = "medium.wavelengths: hbo2: the wavelength 500 nm is outside the spectrum, 600 to 1000 nm"
+    check_refused(tmp_path, CASE.replace(medium, tissue % (0.2, 500)), words)
+    words = "medium: the fractions of water, fat add up to 1.2; they can be 1 together"
+    check_refused(tmp_path, CASE.replace(medium, tissue % (0.7, 690)), words)
+    check_refused(tmp_path, CASE + "modulation: {frequency: -1e8}\n", "modulation.frequency: frequency is -1e.08")
+    words = "modulation.frequency: frequency is 2e.13 Hz, at which light does not diffuse"
+    check_refused(tmp_path, CASE + "modulation: {frequency: 2e13}\n", words)
+    void = (
+        "regions: [{name: core, surface: {sphere: {radius: 4}}, medium: {sigma_a: 0.01, sigma_s_prime: 0, eta: 1.4}}]\n"
+    )
+    dye = f"fluorescence: {{emission: {medium}, dyes: [{{region: core, absorption: 0.005, quantum_yield: 0.5}}]}}\n"
+    words = "regions.0..medium: the medium does not scatter, and light does not diffuse through a void"
+    check_refused(tmp_path, CASE + void + dye, words)
+
+
 def test_chromophores_of_regions_are_unknowns(tmp_path: Path) -> None:
     """Fractions of the volume stay below 1 however far a fit goes, and modulated readings are complex."""
     tissue = "{chromophores: {hbo2: 4e-5, water: 0.7}, scattering: {a: 1.2, b: 1.3}, wavelengths: [690, 830], eta: 1.4}"

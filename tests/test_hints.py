@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from tetlux.cases.cli import main
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.hints import did_you_mean, nearest_word
 from tetlux.cases.synonyms import ALIASES, REMEDIES
@@ -73,8 +74,12 @@ def test_every_alias_can_be_met() -> None:
         ("surface", "geometry", 'geometry: unknown key; did you mean "surface"?'),
         ("lights", "sources", 'sources: unknown key; did you mean "lights"?'),
         ("surface:", "outputs: [png]\nsurface:", "outputs[0]: did you mean \"picture\"? expected 'surface', "
-         "'volume', 'picture', 'viewer', 'figures', 'glb', 'mitsuba' or 'film', but found 'png'."),
+         "'volume', 'picture', 'viewer', 'figures', 'glb', 'mitsuba', 'film' or 'sensitivity', but found 'png'."),
         ("surface:", "unit: inches\nsurface:", "unit: did you mean \"in\"? expected"),
+        ("surface:", "unit: milimeter\nsurface:", 'unit: did you mean "mm"? expected'),
+        ("surface:", "picture: {colormap: grey}\nsurface:", 'picture.colormap: unknown key; did you mean "map" (the'),
+        ("surface:", "picture: {channel: al}\nsurface:", 'there is no channel "al"; did you mean "all"? the channels'),
+        ("surface:", "up: y\nsurface:", "up: write the axis as a vector, [0, 1, 0], but found 'y'."),
         ("surface:", "unit: leagues\nsurface:", "but found 'leagues'."),
         ("{sphere: {radius: 10}}", "bunny.stl", "but found 'bunny.stl'; write surface: {file: bunny.stl}."),
         ("{sigma_a: 0.01, sigma_s_prime: 1.0, eta: 1.4}", "marble", "write medium: {material: marble}."),
@@ -102,3 +107,9 @@ def test_a_wrong_word_is_answered_with_the_right_one(right: str, wrong: str, sen
 )  # fmt: skip
 def test_a_bad_member_of_a_sweep_is_named_by_its_values(sweep: str, sentence: str, tmp_path: Path) -> None:
     assert sentence in refusal(CASE + f"sweep: {{{sweep}}}\n", tmp_path)
+
+
+def test_a_misspelt_option_is_answered_with_the_right_one(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "hare", "--quit"])
+    assert 'there is no option --quit; did you mean "--quiet"? see --help.' in capsys.readouterr().err

@@ -7,6 +7,7 @@ import numpy as np
 from tetlux.cases.file.documents.document import Document
 from tetlux.cases.file.schema.case import CaseSpec
 from tetlux.cases.file.schema.pictures import CutSpec, PictureSpec, file_names
+from tetlux.cases.hints import did_you_mean
 from tetlux.cases.picture.view import toward_camera
 from tetlux.fem.inputs import unit_vector
 from tetlux.meshing.errors import InputError
@@ -48,7 +49,8 @@ def check_pictures(
 def _check_parts(picture: PictureSpec, channels: Sequence[str], lights: Sequence[str]) -> None:
     for kind, name, known in (("channel", picture.channel, channels), ("light", picture.light, lights)):
         if name is not None and name not in known:
-            raise InputError(f'there is no {kind} "{name}"; the {kind}s are {", ".join(known)}.')
+            hint = did_you_mean(name, known)
+            raise InputError(f'there is no {kind} "{name}"; {hint}the {kind}s are {", ".join(known)}.')
 
 
 def _check_field(picture: PictureSpec, spec: CaseSpec, channels: Sequence[str]) -> None:

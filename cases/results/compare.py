@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from tetlux.cases.hints import did_you_mean
 from tetlux.cases.picture.draw import PictureScene, canvas_of, replacing, scene_stage
 from tetlux.cases.picture.scale import Scale, scale_of
 from tetlux.cases.results.load import RunResult, load_result
@@ -126,8 +127,9 @@ def field_values(result: RunResult, field: str) -> FloatArray:
     if result.points is None:
         raise InputError(f"{result.folder} holds no surface; run its case with outputs: [surface].")
     if field not in result.values:
-        names = ", ".join(name for name, values in result.values.items() if np.asarray(values).ndim == 1)
-        raise InputError(f'{result.folder} has no field "{field}"; its fields are {names}.')
+        names = [name for name, values in result.values.items() if np.asarray(values).ndim == 1]
+        hint = did_you_mean(field, names)
+        raise InputError(f'{result.folder} has no field "{field}"; {hint}its fields are {", ".join(names)}.')
     return np.asarray(result.values[field], dtype=float)
 
 

@@ -163,7 +163,7 @@ PANELS = (
     ),
     Panel(
         "frequency and mesh",
-        "modulated light of a point in a ball, on a given mesh of edges h; the colour is that of the worst reading",
+        "modulated light, ball, given mesh",
         Axis("|k| h", (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 3.0)),
         Axis("ω/(v σ_a)", (0.1, 1.0, 10.0), (10.0,)),
         of_modes.modulated_by_wave_number_and_ratio,
@@ -171,7 +171,7 @@ PANELS = (
     ),
     Panel(
         "frequency and place",
-        "modulated light of a point in a ball of radius 10; the colour is that of the worst reading",
+        "modulated light, ball of radius 10",
         Axis("ω/(v σ_t')", (0.001, 0.01, 0.1, 0.3), (0.1,)),
         Axis("", tuple(of_modes.PLACES), ("near", "behind")),
         of_modes.modulated_by_frequency_and_place,
@@ -179,7 +179,7 @@ PANELS = (
     ),
     Panel(
         "time",
-        "light of a point in a ball after a pulse, at three times; the colour is that of the worst reading",
+        "a point in a ball, after a pulse",
         Axis("radius (mean free paths)", (5.0, 10.0, 30.0), (10.0,)),
         Axis("", tuple(of_modes.TIMES)),
         of_modes.pulse_by_radius_and_time,
@@ -187,7 +187,7 @@ PANELS = (
     ),
     Panel(
         "sensitivities",
-        "derivatives of readings to both coefficients of a ball of radius 10; the colour is that of the worst",
+        "of readings, ball of radius 10",
         Axis("reduced albedo", (0.5, 0.9, 0.99, 0.9999), (0.5, 0.9999)),
         Axis("", tuple(of_modes.PLACES), ("near", "behind")),
         of_modes.sensitivity_by_albedo_and_place,

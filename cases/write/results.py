@@ -18,7 +18,7 @@ from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.fem.planner.solve import AnySolution
 from tetlux.fem.transient.transient import Transient
-from tetlux.meshing.arrays import FloatArray, NumberArray
+from tetlux.meshing.arrays import FloatArray, NumberArray, freeze
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.notes import add_prefix
 from tetlux.meshing.surface.surface import Surface
@@ -158,7 +158,9 @@ def _shows_surface(case: Case) -> bool:
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
     first = solutions[0].surface
-    points = np.vstack([extreme_places(solution) for solution in solutions])
+    points, *others = [extreme_places(solution) for solution in solutions]
+    if others:
+        points = freeze(np.vstack([points, *others]))
     total = sum(modulus(each.exitance_on(points)) for each in solutions)
     return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
 

@@ -1,6 +1,5 @@
 """Surfaces with values at their vertices as VTP, whose values VTK, PyVista and ParaView show."""
 
-import sys
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -8,16 +7,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from tetlux.meshing.files.vtk_xml import data_array, text_array, write_vtk_xml
 from tetlux.meshing.surface.surface import Surface
-
-# VTK's names of the types of values.
-TYPES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
 
 
 def write_vtp(
     surface: Surface, path: Path, values: Mapping[str, npt.NDArray[np.generic]], notes: Mapping[str, str]
 ) -> None:
-    """Write a triangle mesh as VTK PolyData: XML with raw appended binary data.
+    """Write a triangle mesh as VTK PolyData.
 
     Parameters
     ----------
@@ -29,49 +26,21 @@ def write_vtp(
         Text that is stored as field data.
     """
     triangles = surface.faces.astype(np.int64)
-    arrays: list[npt.NDArray[np.generic]] = []
-
-    def array(name: str, numbers: npt.NDArray[np.generic]) -> str:
-        """Append the numbers of an array, and return the XML element that refers to them."""
-        offset = sum(8 + kept.nbytes for kept in arrays)
-        arrays.append(np.ascontiguousarray(numbers))
-        kind = TYPES[numbers.dtype.str[1:]]
-        parts = f' NumberOfComponents="{numbers.shape[1]}"' if numbers.ndim > 1 else ""
-        return f'<DataArray type="{kind}" Name="{escape(name)}"{parts} format="appended" offset="{offset}"/>'
-
-    head = [
-        f'<VTKFile type="PolyData" version="1.0" byte_order="{_BYTE_ORDER}" header_type="UInt64">',
-        "<PolyData>",
+    content = [
         "<FieldData>",
-        *(_text(name, note) for name, note in notes.items()),
+        *(text_array(name, note) for name, note in notes.items()),
         "</FieldData>",
         f'<Piece NumberOfPoints="{len(surface.points)}" NumberOfPolys="{len(triangles)}">',
         f'<PointData Scalars="{escape(next(iter(values)))}">',
-        *(array(name, column) for name, column in values.items()),
+        *(data_array(name, column) for name, column in values.items()),
         "</PointData>",
         "<Points>",
-        array("Points", surface.points),
+        data_array("Points", surface.points),
         "</Points>",
         "<Polys>",
-        array("connectivity", triangles.reshape(-1)),
-        array("offsets", 3 * np.arange(1, len(triangles) + 1, dtype=np.int64)),
+        data_array("connectivity", triangles.reshape(-1)),
+        data_array("offsets", 3 * np.arange(1, len(triangles) + 1, dtype=np.int64)),
         "</Polys>",
         "</Piece>",
-        "</PolyData>",
-        '<AppendedData encoding="raw">',
     ]
-    with path.open("wb") as file:
-        file.write(("\n".join(head) + "\n_").encode())
-        for numbers in arrays:
-            file.write(np.uint64(numbers.nbytes).tobytes())
-            file.write(numbers.tobytes())
-        file.write(b"\n</AppendedData>\n</VTKFile>\n")
-
-
-_BYTE_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
-
-
-def _text(name: str, text: str) -> str:
-    """A text as VTK stores it: the codes of its bytes, ending in zero."""
-    codes = " ".join(map(str, (*text.encode(), 0)))
-    return f'<DataArray type="String" Name="{escape(name)}" NumberOfTuples="1" format="ascii">{codes}</DataArray>'
+    write_vtk_xml(path, "PolyData", content)

@@ -30,6 +30,11 @@ class ChargeField:
     strengths: NumberArray
     closest: float = 0.0
 
+    @property
+    def is_complex(self) -> bool:
+        """Whether the fluence is complex."""
+        return np.result_type(self.equation.dtype, self.strengths) == np.complex128
+
     def fluence(self, points: FloatArray) -> NumberArray:
         """Fluence at points (n, 3), (n, ...), W/unit²."""
         return self.equation.fluence(points, self.positions, self.strengths, self.closest)
@@ -37,6 +42,15 @@ class ChargeField:
     def fluence_and_gradient(self, points: FloatArray) -> tuple[NumberArray, NumberArray]:
         """Fluence (n,), W/unit², and its gradient (n, 3), W/unit³, of one light."""
         return self.equation.fluence_and_gradient(points, self.positions, self.strengths, self.closest)
+
+    def potential(self, points: FloatArray) -> NumberArray:
+        """D times the fluence at points (n, 3), whose slope is the flux, (n, ...), W/unit."""
+        return np.asarray(self.equation.diffusion * self.fluence(points))
+
+    def fluence_and_flux(self, points: FloatArray) -> tuple[NumberArray, NumberArray]:
+        """Fluence (n,), W/unit², and D times its gradient (n, 3), W/unit², of one light."""
+        fluence, gradient = self.fluence_and_gradient(points)
+        return fluence, self.equation.diffusion * gradient
 
     def exitance(self, points: FloatArray) -> NumberArray:
         """``phi/(2A)`` at points (n, 3) of the surface, (n, ...), W/unit²."""

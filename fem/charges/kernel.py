@@ -59,7 +59,7 @@ class Equation:
         def work(rows: slice) -> None:
             fluence[rows], flux[rows] = self._unit_traces(points[rows], normals[rows], positions)
 
-        run_in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), rows_per_block(positions))
         return fluence, flux
 
     def residual_of_each(self, points: FloatArray, normals: FloatArray, positions: FloatArray) -> NumberArray:
@@ -72,7 +72,7 @@ class Equation:
             flux += fluence
             matrix[rows] = flux
 
-        run_in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), rows_per_block(positions))
         return matrix
 
     def fluence(
@@ -85,9 +85,9 @@ class Equation:
         sums = np.empty((len(points), *strengths.shape[1:]), dtype=np.result_type(self.dtype, strengths))
 
         def work(rows: slice) -> None:
-            sums[rows] = self._unit_fluence(_distances(points[rows], positions, closest)) @ strengths
+            sums[rows] = self.unit_fluence(distances_between(points[rows], positions, closest)) @ strengths
 
-        run_in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), rows_per_block(positions))
         return sums
 
     def fluence_and_gradient(
@@ -100,13 +100,13 @@ class Equation:
         charges = positions - positions[0]
 
         def work(rows: slice) -> None:
-            distance = _distances(points[rows], positions, closest)
-            each = self._unit_fluence(distance) * strengths
+            distance = distances_between(points[rows], positions, closest)
+            each = self.unit_fluence(distance) * strengths
             fluence[rows] = each.sum(axis=1)
             each *= (self.wave_number + 1.0 / distance) / distance
             gradient[rows] = each @ charges - each.sum(axis=1)[:, None] * (points[rows] - positions[0])
 
-        run_in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), rows_per_block(positions))
         return fluence, gradient
 
     def traces(
@@ -120,10 +120,11 @@ class Equation:
             value, slope = self._unit_traces(points[rows], normals[rows], positions)
             fluence[rows], flux[rows] = value @ strengths, slope @ strengths
 
-        run_in_blocks(work, len(points), _rows(positions))
+        run_in_blocks(work, len(points), rows_per_block(positions))
         return fluence, flux
 
-    def _unit_fluence(self, distance: FloatArray) -> NumberArray:
+    def unit_fluence(self, distance: FloatArray) -> NumberArray:
+        """Fluence of a unit charge at distances, W/unit²."""
         value: NumberArray = np.exp(-self.wave_number * distance)
         value /= 4.0 * np.pi * self.diffusion * distance
         return value
@@ -131,8 +132,8 @@ class Equation:
     def _unit_traces(
         self, points: FloatArray, normals: FloatArray, positions: FloatArray
     ) -> tuple[NumberArray, NumberArray]:
-        distance = _distances(points, positions)
-        fluence = self._unit_fluence(distance)
+        distance = distances_between(points, positions)
+        fluence = self.unit_fluence(distance)
         # Coordinates relative to a nearby point lose fewer digits.
         origin = points[0]
         height = np.einsum("ij,ij->i", points - origin, normals)[:, None] - normals @ (positions - origin).T
@@ -143,7 +144,7 @@ class Equation:
         return fluence, flux
 
 
-def _distances(points: FloatArray, positions: FloatArray, closest: float = 0.0) -> FloatArray:
+def distances_between(points: FloatArray, positions: FloatArray, closest: float = 0.0) -> FloatArray:
     """Distances between points (n, 3) and positions (c, 3), at least `closest`, (n, c)."""
     # |x - p|² from |x|² + |p|² - 2 x.p would lose digits close to a charge.
     square: FloatArray = np.square(points[:, :1] - positions[:, 0])
@@ -153,7 +154,8 @@ def _distances(points: FloatArray, positions: FloatArray, closest: float = 0.0) 
     return square if closest == 0.0 else np.maximum(square, closest, out=square)
 
 
-def _rows(positions: FloatArray) -> int:
+def rows_per_block(positions: FloatArray) -> int:
+    """Number of points that are evaluated at once with charges at positions (c, 3)."""
     return max(1, PAIRS_PER_BLOCK // max(1, len(positions)))
 
 

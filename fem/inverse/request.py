@@ -96,7 +96,7 @@ def _with_unit(start: Starts, unit: str) -> Starts:
                 f"start has the unit {start['unit']}, and the body is in {unit}; leave unit out.", field="start"
             )
         return {**start, "unit": unit}
-    if isinstance(start, Medium):
+    if isinstance(start, Medium) or not isinstance(start, Sequence):
         return start
     return [_with_unit(each, unit) if isinstance(each, Mapping) else each for each in start]  # type: ignore[misc]
 
@@ -112,12 +112,15 @@ def _bounds(unknowns: Unknowns, given: Bounds) -> FloatArray:
                 field="bounds",
             )
         number = unknowns.names.index(name)
-        low, high = map(float, limits)
-        if not (0 < low < high < np.inf):
-            raise InputError(
-                f"bounds of {name} are {low:g} and {high:g}; give two values greater than 0, the lower one first.",
-                field="bounds",
+        pair = np.asarray(limits)
+        if pair.shape != (2,) or pair.dtype.kind not in "if" or not 0 < pair[0] < pair[1] < np.inf:
+            shown = (
+                " and ".join(f"{value:g}" for value in pair) if pair.dtype.kind in "if" and pair.ndim else f"{limits}"
             )
+            raise InputError(
+                f"bounds of {name} are {shown}; give two values greater than 0, the lower one first.", field="bounds"
+            )
+        low, high = pair.tolist()
         if not low <= start[number] <= high:
             raise InputError(
                 f"{name} begins at {start[number]:g}, outside of its bounds {low:g} and {high:g}; begin within them.",
@@ -190,11 +193,13 @@ def _as_array(rows: Any) -> NumberArray | None:
 
 def _noise(noise: npt.ArrayLike | None, measured: NumberArray) -> FloatArray:
     """Relative standard deviations as an array (c, l, d)."""
-    given = np.asarray(1.0 if noise is None else noise, dtype=float)
+    given = np.asarray(1.0 if noise is None else noise)
+    if given.dtype.kind not in "if":
+        raise InputError(f"noise is {noise!r}; give a relative standard deviation of readings.", field="noise")
     if given.size not in (1, measured.size):
         raise InputError(f"noise has shape {given.shape}; give one number, or one for each reading.", field="noise")
     shape = measured.shape
-    full = np.full(shape, given.item()) if given.size == 1 else given.reshape(shape)
+    full = np.full(shape, float(given.item())) if given.size == 1 else given.reshape(shape).astype(float)
     of_readings = full[~np.isnan(measured)]
     if not (np.isfinite(of_readings).all() and (of_readings > 0).all()):
         raise InputError("noise is a relative standard deviation of readings, greater than 0.", field="noise")

@@ -22,8 +22,9 @@ FRACTIONS = ("water", "fat")
 GAIN = "gain"
 # What a part of the body begins with: coefficients, or the arguments of `tissue`.
 Start = Medium | Mapping[str, Any]
-# What `tissue` needs.
+# What `tissue` needs, and all that it takes.
 NEEDED = ("wavelengths", "a", "b", "eta")
+ARGUMENTS = (*NEEDED, "hbo2", "hhb", "water", "fat", "others", "unit", "boundary")
 # Step of central differences of media by unknowns, as a share of these.
 STEP = 1e-4
 
@@ -181,6 +182,9 @@ def _parts(start: Start | Sequence[Start | Sequence[Medium]], regions: Sequence[
     """What the body and each region begin with."""
     if isinstance(start, Medium | Mapping):
         return [start, *(region.medium for region in regions)]
+    given: object = start
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise InputError(f"start is {start!r}; give a Medium, or the arguments of tissue.", field="start")
     if len(start) != 1 + len(regions):
         raise InputError(
             f"start has {len(start)} entries; give one for the body and one for each of the {len(regions)} regions.",
@@ -203,7 +207,12 @@ def _channels(of_tissue: Sequence[Mapping[str, Any]]) -> int:
     for part in of_tissue:
         missing = [name for name in NEEDED if name not in part]
         if missing:
-            raise InputError(f"{' and '.join(missing)} is missing in start; give it, as to tissue.", field="start")
+            raise InputError(f"start lacks {', '.join(missing)}; give what tissue needs.", field="start")
+        unknown = [name for name in part if name not in ARGUMENTS]
+        if unknown:
+            raise InputError(
+                f'start has "{unknown[0]}"; the arguments of tissue are {", ".join(ARGUMENTS)}.', field="start"
+            )
     return len(wavelengths[0])
 
 

@@ -139,9 +139,11 @@ class PencilBeam:
     def _beams_close_enough(self, body: Body) -> "_ThinBeams":
         """Thin beams half a mean free path apart, or nearer, as far as their number is limited."""
         beams = self._thin_beams(body, 1 if self.radius == 0 else BEAMS[0])
+        if self.radius == 0:
+            return beams
         spacing = 0.5 * shallowest_depth(beams.inside, body)
         wanted = int(np.clip(np.pi * (self.radius / spacing) ** 2, *BEAMS))
-        return self._thin_beams(body, wanted) if self.radius > 0 and wanted > beams.count else beams
+        return self._thin_beams(body, wanted) if wanted > beams.count else beams
 
     def _thin_beams(self, body: Body, count: int) -> "_ThinBeams":
         """Thin beams that represent this one, and where they enter the body."""

@@ -20,6 +20,8 @@ ITERATIONS = 1000
 # Right-hand sides that share one iteration, where there are as many for every core: each pass over the matrix then
 # serves all of them. Fewer are quicker one by one, since SciPy's products with two or three columns are slow.
 GROUP = 8
+# Entries of a vector that are worked on at once.
+ENTRIES_IN_CACHE = 1 << 15
 # Below these many entries a second thread costs more than it brings.
 ENTRIES_FOR_THREADS = 1_000_000
 
@@ -143,8 +145,8 @@ def conjugate_gradients(product: Product, precondition: Preconditioner, loads: N
         image = product(direction)
         # A dot product is 0 in a column that is solved, or where COCG breaks down.
         length = divide_or_zero(product_of_residuals, dots(direction, image))
-        solution += length * direction
-        residuals -= length * image
+        add_scaled(solution, direction, length)
+        add_scaled(residuals, image, -length)
         if norms(residuals).max(initial=0.0) <= 0.5 * STOP_RESIDUAL:
             break
         corrections = apply_to_parts(precondition, residuals)
@@ -152,6 +154,14 @@ def conjugate_gradients(product: Product, precondition: Preconditioner, loads: N
         direction *= divide_or_zero(product_of_residuals, before)
         direction += corrections
     return solution, iterations
+
+
+def add_scaled(columns: NumberArray, others: NumberArray, factors: NumberArray) -> None:
+    """Add other columns (n, k) times factors (k,) to columns (n, k), in place; block by block in the cache."""
+    rows = max(1, ENTRIES_IN_CACHE // columns.shape[1])
+    for start in range(0, len(columns), rows):
+        some = slice(start, start + rows)
+        columns[some] += factors * others[some]
 
 
 def dots(a: NumberArray, b: NumberArray) -> NumberArray:

@@ -10,6 +10,7 @@ from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray, freeze, perpendicular_axes
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides
+from tetlux.meshing.tets.mesh import TetMesh
 
 # The brightest peaks, from which the largest value is climbed to, and how dim they may be beside the brightest, since a
 # coarse mesh may miss most of a peak; directions of a step; and lengths that are tried at once, each half of the one
@@ -21,11 +22,11 @@ DIMMEST = 16
 # A step that gains less than this share is the last.
 LEAST_GAIN, MOST_STEPS = 1e-3, 40
 
-# Vertices of a surface; and what was last tried, by the nodes or places that it is around: runs on one mesh mostly try
-# the same. None can be written to, so that the mesh keeps which of its facets they are on.
+# Vertices of a surface, and the last points of the surface that were tried for a mesh: runs on one mesh mostly try the
+# same. None can be written to, so that the mesh keeps which of its facets they are on.
 MOST_KEPT = 64
 _VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
-_KEPT: WeakKeyDictionary[Surface, dict[bytes, FloatArray]] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Surface, dict[bytes, FloatArray]]] = WeakKeyDictionary()
 
 
 def extreme_places(solution: Solution) -> FloatArray:
@@ -42,15 +43,20 @@ def extreme_places(solution: Solution) -> FloatArray:
         brightest nodes leads to. The largest value there is within 1 %, the least within 10 % of that at the vertices
         of `surface_exitance`.
     """
-    vertices = _vertices_of(solution.surface)
     mesh = solution.mesh
-    dim = np.zeros(len(mesh.points), dtype=bool)
-    dimmest = mesh.boundary_nodes[np.argsort(modulus(solution.exitance))[:DIMMEST]]
-    dim[dimmest] = True
-    near = dim[mesh.boundary_faces[mesh.closest_boundary(vertices)[1]]].any(axis=1)
-    nodes = mesh.points[dimmest]
-    places = _kept(solution.surface, nodes.tobytes(), lambda: solution.surface.project(nodes)[0])
-    return np.vstack([places, vertices[near], _climb(solution)])
+    dimmest = np.sort(mesh.boundary_nodes[np.argsort(modulus(solution.exitance))[:DIMMEST]])
+    dim = _kept(solution, dimmest, lambda: _around_nodes(solution, dimmest))
+    points = np.vstack([dim, _climb(solution)])
+    return _kept(solution, points, lambda: points)
+
+
+def _around_nodes(solution: Solution, nodes: IntArray) -> FloatArray:
+    """Projections of nodes on the surface, and the vertices of the surface on the facets around them, (q, 3)."""
+    mesh, vertices = solution.mesh, _vertices_of(solution.surface)
+    chosen = np.zeros(len(mesh.points), dtype=bool)
+    chosen[nodes] = True
+    near = chosen[mesh.boundary_faces[mesh.closest_boundary(vertices)[1]]].any(axis=1)
+    return np.vstack([solution.surface.project(mesh.points[nodes])[0], vertices[near]])
 
 
 def _vertices_of(surface: Surface) -> FloatArray:
@@ -60,12 +66,13 @@ def _vertices_of(surface: Surface) -> FloatArray:
     return _VERTICES[surface]
 
 
-def _kept(surface: Surface, key: bytes, make: Callable[[], FloatArray]) -> FloatArray:
-    """Points of a surface that are made only if they are not among the last that were asked for."""
-    kept = _KEPT.setdefault(surface, {})
+def _kept(solution: Solution, key: IntArray | FloatArray, make: Callable[[], FloatArray]) -> FloatArray:
+    """Points of the surface that are made only if they are not among the last for a mesh and a key."""
+    kept = _KEPT.setdefault(solution.mesh, WeakKeyDictionary()).setdefault(solution.surface, {})
+    content = key.tobytes()
     # The last that was used is the last that is forgotten.
-    points = kept.pop(key, None)
-    kept[key] = points = freeze(make()) if points is None else points
+    points = kept.pop(content, None)
+    kept[content] = points = freeze(make()) if points is None else points
     while len(kept) > MOST_KEPT:
         del kept[next(iter(kept))]
     return points
@@ -85,7 +92,7 @@ def _peaks(solution: Solution) -> IntArray:
 
 def _climb(solution: Solution) -> FloatArray:
     """Climb from the brightest nodes to places (p, 3) of the surface that none around is brighter than."""
-    mesh, surface = solution.mesh, solution.surface
+    mesh = solution.mesh
     sides = np.zeros(len(mesh.points))
     facets = mesh.boundary_faces
     np.maximum.at(sides, facets.ravel(), np.repeat(longest_sides(mesh.points[facets]), 3))
@@ -93,23 +100,23 @@ def _climb(solution: Solution) -> FloatArray:
     places, steps = mesh.points[brightest], sides[brightest]
     climbing = np.arange(len(brightest))
     for _ in range(MOST_STEPS):
-        tried = _around(surface, places[climbing], steps[climbing])
+        tried = _around(solution, places[climbing], steps[climbing])
         bright = modulus(solution.exitance_on(tried)).reshape(len(climbing), -1)
-        best = bright.argmax(axis=1)
-        places[climbing] = tried.reshape(len(climbing), -1, 3)[np.arange(len(climbing)), best]
-        # The first place is where it is. The next steps begin with the length that led farthest.
+        # The first of the places tried is where it is.
         better = bright.max(axis=1) - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
+        best = np.where(better, bright.argmax(axis=1), 0)
+        places[climbing] = tried.reshape(len(climbing), -1, 3)[np.arange(len(climbing)), best]
         climbing, best = climbing[better], best[better]
         if len(climbing) == 0:
             break
+        # The next steps begin with the length that led farthest.
         steps[climbing] *= SHORTER[(best - 1) // DIRECTIONS]
     return places
 
 
-def _around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:
+def _around(solution: Solution, places: FloatArray, steps: FloatArray) -> FloatArray:
     """For each of places (p, 3) its projection on the surface, and others around it within steps (p,), (p t, 3)."""
-    key = places.tobytes() + steps.tobytes()
-    return _kept(surface, key, lambda: _points_around(surface, places, steps))
+    return _kept(solution, np.column_stack([places, steps]), lambda: _points_around(solution.surface, places, steps))
 
 
 def _points_around(surface: Surface, places: FloatArray, steps: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ BLOCK = 2048
 
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: NumberArray) -> csr_array:
     """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
-    faces = space.faces(space.mesh.boundary_faces)
+    faces = space.boundary_faces
     boundary_matrices = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
     return csr_array(assemble(space, elements) + _assemble(faces, boundary_matrices, space.size))
 

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from tetlux.fem.models.boundary import boundary_condition_of
-from tetlux.fem.quadratic.loads import QuadraticPatch
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement, Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
+from tetlux.fem.quadratic.patches import QuadraticPatch
 from tetlux.fem.quadratic.reading_error import ReadingError
 from tetlux.fem.quadratic.recovered_gradient import recovered_gradient_difference
 from tetlux.fem.quadratic.scene import QuadraticScene

@@ -57,6 +57,11 @@ class QuadraticSpace:
         return np.hstack([self.mesh.tetrahedra, edges])
 
     @cached_property
+    def boundary_faces(self) -> IntArray:
+        """DOF numbers of the mesh's boundary triangles, (f, 6)."""
+        return self.faces(self.mesh.boundary_faces)
+
+    @cached_property
     def curved(self) -> IntArray:
         """The tetrahedra that have bent edges."""
         return np.flatnonzero(self.bent[self.mesh.tetrahedron_edges].any(axis=1))
@@ -82,8 +87,13 @@ class QuadraticSpace:
         """DOF numbers of triangles given by nodes (f, 3), (f, 6)."""
         nodes = len(self.mesh.points)
         pairs = np.sort(corners[:, TRIANGLE_EDGES], axis=2)
+        return np.hstack([corners, nodes + np.searchsorted(self._edge_keys, pairs[..., 0] * nodes + pairs[..., 1])])
+
+    @cached_property
+    def _edge_keys(self) -> IntArray:
+        """Numbers by which edges are found, ascending, (e,)."""
         low, high = self.mesh.edges.T
-        return np.hstack([corners, nodes + np.searchsorted(low * nodes + high, pairs[..., 0] * nodes + pairs[..., 1])])
+        return np.asarray(low.astype(np.int64) * len(self.mesh.points) + high)
 
     def corners_and_bends(self, dofs: IntArray) -> FloatArray:
         """Coordinates of nodes and bends of edges by DOF numbers (...), (..., 3)."""

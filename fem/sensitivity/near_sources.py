@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.quadratic.elements import cell_rule, shape_derivatives, shape_functions
-from tetlux.fem.quadratic.loads import QuadraticPatch
+from tetlux.fem.quadratic.patches import QuadraticPatch
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.simplex_rules import triangle_rule
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray

@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 
 from tetlux.fem.quadratic.assembly import element_matrices
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import run_in_blocks
 
@@ -85,6 +85,42 @@ def multiply(
     run_in_blocks(work, len(every), BLOCK)
     shape = fluences.shape[1], duals.shape[1]
     return Sums(mass.reshape(-1, *shape), stiffness.reshape(-1, *shape), of_media.reshape(-1, *shape))
+
+
+def multiply_on(
+    space: QuadraticSpace, functions: NumberArray, within: BoolArray, duals: NumberArray, factors: FloatArray
+) -> tuple[NumberArray, NumberArray]:
+    """Multiply functions, each on some tetrahedra alone, by dual solutions.
+
+    Parameters
+    ----------
+    space : QuadraticSpace
+    functions, duals : (size, k), (size, d) ndarray
+    within : (m, k) ndarray of bool
+        Whether each tetrahedron counts for each function.
+    factors : (m,) ndarray
+        ``3 D²`` of each tetrahedron, unit².
+
+    Returns
+    -------
+    mass, stiffness : (k, d) ndarray
+        ``∫ u z`` and ``∫ 3 D² grad u . grad z``.
+    """
+    found, lock = np.zeros((2, functions.shape[1], duals.shape[1]), np.result_type(functions, duals)), Lock()
+    every = np.flatnonzero(within.any(axis=1))
+
+    def work(block: slice) -> None:
+        cells = every[block]
+        dofs = space.cells[cells]
+        lit, dual = functions[dofs] * within[cells, None], duals[dofs].reshape(-1, duals.shape[1])
+        for target, (diffusion, sigma) in enumerate(((0.0, 1.0), (factors[cells], 0.0))):
+            images = (element_matrices(space, diffusion, sigma, cells) @ lit).reshape(-1, functions.shape[1])
+            products = images.T @ dual
+            with lock:
+                found[target] += products
+
+    run_in_blocks(work, len(every), BLOCK)
+    return found[0], found[1]
 
 
 def _used_columns(part: csr_array) -> tuple[IntArray, csr_array]:

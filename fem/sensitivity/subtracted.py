@@ -1,7 +1,8 @@
 """What readings change by because loads and subtracted charges depend on the coefficients.
 
-With the dual solution z of a reading fixed, the reading depends on them through ``z.b + G(detector) - d.I G``. This is
-smooth, and is differentiated by central differences: no system is solved for that.
+With the dual solution z of a reading fixed, the reading depends on them through ``z.b + G(detector) - d.I G``. Places
+and strengths of charges are differentiated by central differences, their fields in closed form
+(`tetlux.fem.charges.derivative`). No system is solved for that.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
+from tetlux.fem.charges.derivative import ChargeDerivative
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.kept_fits import fits_of
 from tetlux.fem.known.patch import Patch
@@ -19,18 +21,12 @@ from tetlux.fem.known.split import SplitLights, Subtract, split_lights
 from tetlux.fem.media.coefficients import AnyMedium, at_cells, by_label
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
-from tetlux.fem.quadratic.assembly import element_matrices
-from tetlux.fem.quadratic.loads import (
-    InnerFaces,
-    QuadraticPatch,
-    inner_faces,
-    line_load,
-    patch_by_elements,
-    quadratic_load,
-)
+from tetlux.fem.quadratic.loads import line_load, point_load, quadratic_load
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
+from tetlux.fem.quadratic.patches import QuadraticPatch, field_load, interpolant_of
 from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.quadratic.solution import QuadraticSolution
+from tetlux.fem.sensitivity.products import multiply_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
@@ -39,12 +35,14 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 
 Coefficient = Literal["sigma_a", "sigma_s_prime"]
-# Step of central differences of four points, as a share of the coefficient. Readings change like exp(-k r): at k r = 20
-# differences are off by 1e-7. Shorter steps are worse: integrals near a charge are cut in other ways as it moves, and
-# jump by some 1e-8.
+# Step of central differences of four points, as a share of the coefficient, and how it is shortened where a charge
+# comes or goes: those of images do at some ratios of coefficients.
 STEP = 2e-3
+SHORTER, SHORTENINGS = 0.1, 3
 # Weights of the values one and two steps to each side (Fornberg 1988).
 WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
+# Positions and strengths that differ by less than this share are the same.
+SAME = 1e-13
 
 
 def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
@@ -70,6 +68,15 @@ def _add(medium: AnyMedium, coefficient: Coefficient, step: float) -> AnyMedium:
 
 
 @dataclass(frozen=True, eq=False)
+class _Nearby:
+    """Lights in a medium that is a little different, one of some, with a weight of the value for differences."""
+
+    weight: float
+    system: System
+    split: SplitLights
+
+
+@dataclass(frozen=True, eq=False)
 class Readout:
     """What readings of some lights need besides the fluence at the nodes.
 
@@ -92,8 +99,8 @@ class Readout:
     scene: QuadraticScene
     measurements: Sequence[DiscreteMeasurement]
     duals: NumberArray
-    _values: dict[int, NumberArray] = field(default_factory=dict)
-    _inner: dict[QuadraticPatch, InnerFaces] = field(default_factory=dict)
+    # Of each label, see `_multiply`.
+    _products: dict[int, dict[QuadraticPatch, tuple[NumberArray, NumberArray]]] = field(default_factory=dict)
 
     def readings(self) -> NumberArray:
         """What each detector reads of each light, (l, d), W/unit²."""
@@ -116,15 +123,35 @@ class Readout:
         if step == 0:
             # Where nothing is absorbed a charge has no derivative, while readings do: that of the mesh is left.
             return found
-        before = self._split(self.system)
-        for steps, weight in WEIGHTS.items():
-            changed = change_medium(self.system, label, coefficient, steps * step)
-            split = self._split(changed)
-            differing = [light for light in range(len(self.lights)) if _differ(before, split, light)]
-            values = map_in_threads(lambda light: self._changed_value(changed, before, split, light), differing)  # noqa: B023
-            for light, value in zip(differing, values, strict=True):
-                found[light] += weight * value
-        return found / step
+        nearby = self._nearby(label, coefficient, step)
+        if label not in self._products:
+            self._products[label] = self._multiply(label)
+        of_matrix = self._products[label]
+
+        def work(light: int) -> None:
+            found[light] = self._of_load(nearby, light)
+            for number, known in enumerate(self.scene.patches[light]):
+                charges = [_charges_of(each.split, light)[number] for each in nearby]
+                found[light] += self._of_charges(known, nearby, charges, label, coefficient)
+                if known in of_matrix:
+                    mass, stiffness = of_matrix[known]
+                    found[light] += mass - stiffness if coefficient == "sigma_a" else -stiffness
+
+        map_in_threads(work, range(len(self.lights)))
+        return found
+
+    def _nearby(self, label: int, coefficient: Coefficient, step: float) -> list[_Nearby]:
+        """The lights with a coefficient a few steps away on both sides, as near as no charge comes or goes."""
+        for _ in range(SHORTENINGS):
+            found = []
+            for steps, weight in WEIGHTS.items():
+                changed = change_medium(self.system, label, coefficient, steps * step)
+                found.append(_Nearby(weight / step, changed, self._split(changed)))
+            counts = {tuple(len(each.positions) for each in _every_charges(one.split)) for one in found}
+            if len(counts) == 1:
+                break
+            step *= SHORTER
+        return found
 
     def _least(self, label: int, coefficient: Coefficient) -> float:
         """The least coefficient of a medium, 1/unit."""
@@ -144,53 +171,80 @@ class Readout:
     def _body(self, system: System) -> Body:
         return Body(system.true_surface, system.media, MeshPartition(system.mesh))
 
-    def _changed_value(self, system: System, before: SplitLights, after: SplitLights, light: int) -> NumberArray:
-        """`_value` after a change; where it changed the power alone, of points that are subtracted, it is linear."""
-        power = _common_power(before, after, light)
-        if power is None:
-            return self._value(system, after, light)
-        if light not in self._values:
-            self._values[light] = self._value(self.system, before, light)
-        return np.asarray(power * self._values[light])
+    def _of_load(self, nearby: Sequence[_Nearby], light: int) -> NumberArray:
+        """Derivative of ``z.b`` of what is not subtracted of a light, (d,)."""
+        rest = [each.split.remaining[light] for each in nearby]
+        if not any(len(one.terms.points) or len(one.terms.segments) or one.on_mesh is not None for one in rest):
+            return np.zeros(len(self.measurements))
+        space, load = self.scene.operator.space, np.zeros(self.scene.operator.space.size)
+        for each, remaining in zip(nearby, rest, strict=True):
+            system = each.system
+            deposit = remaining.evaluate_on(system.mesh, system.true_surface, system.coefficients)
+            lines = line_load(space, system.coefficients, deposit.terms.segments)
+            load = load + each.weight * quadratic_load(space, system.coefficients, deposit.terms, lines)
+        return np.asarray(load @ self.duals)
 
-    def _value(self, system: System, split: SplitLights, light: int) -> NumberArray:
-        """``z.b + G(detector) - d.I G`` of each detector, (d,)."""
-        space, coefficients = self.scene.operator.space, system.coefficients
-        deposit = split.remaining[light].evaluate_on(system.mesh, system.true_surface, coefficients)
-        lines = line_load(space, coefficients, deposit.terms.segments)
-        load: NumberArray = quadratic_load(space, coefficients, deposit.terms, lines)
-        value = np.zeros(len(self.measurements), self.scene.fluence.dtype)
-        for charges, known in zip(_charges_of(split, light), self.scene.patches[light], strict=True):
-            patch = self._patch(system, charges, known)
-            load = load + patch.load
-            value += [_read_missing(patch, each) for each in self.measurements]
-        return np.asarray(value + load @ self.duals)
+    def _of_charges(
+        self,
+        known: QuadraticPatch,
+        nearby: Sequence[_Nearby],
+        charges: Sequence[Charges],
+        label: int,
+        coefficient: Coefficient,
+    ) -> NumberArray:
+        """Derivative of ``z.b + G(detector) - d.I G`` of the charges of a patch, (d,)."""
+        patch, operator = known.patch, self.scene.operator
+        weights = [each.weight for each in nearby]
+        if not patch.cells.any():
+            points = [(each.positions[: each.sources], each.strengths[: each.sources].real) for each in charges]
+            loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
+            return np.asarray(np.sum(loads, axis=0) @ self.duals)
+        own = coefficient if _is_in(patch, label) else None
+        if own is None and (change := _power_change(patch.charges, charges, weights)) is not None:
+            value = known.load @ self.duals
+            value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
+            return np.asarray(change * value)
+        derived = _differentiate(patch.charges, charges, weights, own)
+        nodes = np.unique(self.system.mesh.tetrahedra[patch.cells])
+        at_nodes = np.zeros(len(self.system.mesh.points), patch.charges.equation.dtype)
+        at_nodes[nodes] = derived.fluence(self.system.mesh.points[nodes])
+        interpolant = interpolant_of(operator.space, patch, derived, at_nodes)
+        diffusion = patch.charges.equation.diffusion
+        of_potential = diffusion * interpolant + derived.diffusion * known.interpolant
+        load = field_load(operator, patch, derived, interpolant, of_potential, self.scene.inner_faces)
+        missing = [_read_missing(patch, derived, interpolant, each) for each in self.measurements]
+        return np.asarray(missing + load @ self.duals)
 
-    def _patch(self, system: System, charges: Charges, known: QuadraticPatch) -> QuadraticPatch:
-        """Charges on the tetrahedra that others had."""
-        cells, space = known.patch.cells, self.scene.operator.space
-        inside = np.flatnonzero(cells)
-        at_nodes = np.zeros(len(system.mesh.points), charges.equation.dtype)
-        nodes = np.unique(system.mesh.tetrahedra[inside])
-        at_nodes[nodes] = charges.fluence(system.mesh.points[nodes])
-        coefficients = system.coefficients
-        diffusion, sigma = (at_cells(value, inside) for value in (coefficients.diffusion, coefficients.sigma))
-        elements = element_matrices(space, diffusion, sigma, inside)
-        if known not in self._inner:
-            self._inner[known] = inner_faces(space, known.patch)
-        return patch_by_elements(space, Patch(system.mesh, charges, cells, at_nodes), elements, self._inner[known])
+    def _multiply(self, label: int) -> dict[QuadraticPatch, tuple[NumberArray, NumberArray]]:
+        """Products of the interpolants of charges in a medium with the duals on their patches, two (d,) for each."""
+        patches = [each for own in self.scene.patches for each in own if _is_in(each.patch, label)]
+        patches = [each for each in patches if each.patch.cells.any()]
+        if not patches:
+            return {}
+        operator = self.scene.operator
+        functions = np.column_stack([each.interpolant for each in patches])
+        within = np.column_stack([each.patch.cells for each in patches])
+        factors = np.broadcast_to(3.0 * np.square(operator.coefficients.diffusion), len(within))
+        products = multiply_on(operator.space, functions, within, self.duals, factors)
+        return dict(zip(patches, zip(*products, strict=True), strict=True))
 
     __repr__ = one_line
 
 
-def _read_missing(patch: QuadraticPatch, discrete: DiscreteMeasurement) -> Number:
-    """What a detector reads of charges less their interpolant."""
-    inside = np.flatnonzero(patch.patch.cells[discrete.cells])
+def _is_in(patch: Patch, label: int) -> bool:
+    """Whether the charges of a patch are those of a medium."""
+    return patch.charges.region is None or patch.charges.region == label
+
+
+def _read_missing(
+    patch: Patch, field: Charges | ChargeDerivative, interpolant: NumberArray, discrete: DiscreteMeasurement
+) -> Number:
+    """What a detector reads of a field on a patch less its interpolant (size,)."""
+    inside = np.flatnonzero(patch.cells[discrete.cells])
     if len(inside) == 0:
         return 0.0
     points, weights = discrete.measurement.points[inside], discrete.measurement.weights[inside]
-    missing = patch.patch.charges.fluence(points) - discrete.values(patch.interpolant)[inside]
-    return discrete.scale * (weights @ missing).item()
+    return discrete.scale * (weights @ (field.fluence(points) - discrete.values(interpolant)[inside])).item()
 
 
 def _charges_of(split: SplitLights, light: int) -> list[Charges]:
@@ -199,36 +253,38 @@ def _charges_of(split: SplitLights, light: int) -> list[Charges]:
     return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
 
 
-def _common_power(before: SplitLights, after: SplitLights, light: int) -> float | None:
-    """The factor of the power of a light's charges, if nothing else of the light differs; None if anything does."""
-    deposit = before.remaining[light]
-    if (
-        len(deposit.terms.segments)
-        or len(deposit.terms.points)
-        or deposit.on_mesh is not None
-        or light in before.fitted
-    ):
-        return None
-    ours, theirs = _facts(before, light), _facts(after, light)
-    power = float(np.real(theirs[3][0] / ours[3][0])) if len(ours) > 3 else 1.0
-    scaled = [power * facts if number >= 2 and number % 3 == 0 else facts for number, facts in enumerate(ours)]
-    return power if all(np.allclose(a, b, rtol=1e-14, atol=0.0) for a, b in zip(scaled, theirs, strict=True)) else None
+def _every_charges(split: SplitLights) -> list[Charges]:
+    return [*split.charges, *(each.charges for each in split.fitted.values())]
 
 
-def _differ(before: SplitLights, after: SplitLights, light: int) -> bool:
-    """Whether anything of a light that goes into loads differs between two splits."""
-    deposit = before.remaining[light]
-    if len(deposit.terms.segments) or deposit.on_mesh is not None:
-        return True
-    first, second = (_facts(split, light) for split in (before, after))
-    return any(not np.array_equal(one, other) for one, other in zip(first, second, strict=True))
+def _differentiate(
+    known: Charges, nearby: Sequence[Charges], weights: Sequence[float], coefficient: Coefficient | None
+) -> ChargeDerivative:
+    """The derivative of charges to a coefficient of their medium, or to one of another medium if it is None."""
+    positions, strengths, closest = (
+        sum(weight * getattr(each, name) for weight, each in zip(weights, nearby, strict=True))
+        for name in ("positions", "strengths", "closest")
+    )
+    k, diffusion = known.equation.wave_number, known.equation.diffusion
+    of_diffusion, of_wave_number = 0.0, 0.0 * k
+    if coefficient is not None:
+        # k² = sigma_a/D, and D = 1/(3 sigma_t').
+        of_diffusion = -3.0 * diffusion**2
+        of_wave_number = -0.5 * k * of_diffusion / diffusion
+    if coefficient == "sigma_a":
+        of_wave_number += 0.5 / (k * diffusion)
+    return ChargeDerivative(known, positions, strengths, of_wave_number, of_diffusion, closest)
 
 
-def _facts(split: SplitLights, light: int) -> list[NumberArray]:
-    """What charges and points of a light are."""
-    terms = split.remaining[light].terms
-    facts: list[NumberArray] = [terms.points, terms.powers]
-    for charges in _charges_of(split, light):
-        equation = np.array([charges.equation.wave_number, charges.equation.diffusion])
-        facts += [charges.positions, charges.strengths, equation]
-    return facts
+def _power_change(known: Charges, nearby: Sequence[Charges], weights: Sequence[float]) -> float | None:
+    """The relative derivative of power where nothing else of charges changes; None if anything does."""
+    change = 0.0
+    for weight, each in zip(weights, nearby, strict=True):
+        power = (each.strengths[0] / known.strengths[0]).item()
+        change += weight * power
+        if not (
+            np.allclose(each.positions, known.positions, rtol=SAME, atol=0.0)
+            and np.allclose(each.strengths, power * known.strengths, rtol=SAME, atol=0.0)
+        ):
+            return None
+    return change

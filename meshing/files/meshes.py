@@ -17,6 +17,7 @@ from tetlux.meshing.files.gmsh_write import write_gmsh
 from tetlux.meshing.files.labels import REGION, labels_of
 from tetlux.meshing.files.raw import STRAIGHTENED, RawMesh
 from tetlux.meshing.files.second_order import straighten
+from tetlux.meshing.files.vtu import write_vtu
 from tetlux.meshing.host.filesystem import exists, is_file, is_folder
 from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.tets.given import Given, make_checked_mesh
@@ -206,11 +207,4 @@ def write_mesh(mesh: TetMesh, path: str | Path, values: Mapping[str, FloatArray]
     if suffix == ".msh":
         write_gmsh(mesh, path, values or {})
         return
-    import meshio  # noqa: PLC0415
-
-    meshio.Mesh(
-        mesh.points,
-        [("tetra", mesh.tetrahedra)],
-        point_data=dict(values or {}),
-        cell_data={REGION: [mesh.regions.astype(np.int32)]} if mesh.regions.any() else {},
-    ).write(path, file_format="vtu")
+    write_vtu(mesh, path, values or {}, {REGION: mesh.regions.astype(np.int32)} if mesh.regions.any() else {})

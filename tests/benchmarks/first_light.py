@@ -1,9 +1,10 @@
 """From a command to its results: ``python -m tests.benchmarks.first_light [--times N] [SURFACE [SCALE]]``.
 
 Each row is a command in a process of its own, and the least of N times (3): wall clock, CPU seconds with those of its
-child processes, and both until the last line that says "solved". Cold: no mesh is remembered; warm: it is. On a
-machine that does other things too, compare CPU seconds. A surface, scaled to some 35 mm, is lit in marble by sun and
-sky, with all outputs. To compare with another commit, run this file in its worktree as well.
+child processes, and both until the last line that says "solved". Cold: no mesh is remembered; warm: it is. Modules are
+compiled, as those of an installed package are. On a machine that does other things too, compare CPU seconds. A
+surface, scaled to some 35 mm, is lit in marble by sun and sky, with all outputs. To compare with another commit, run
+this file in its worktree as well.
 """
 
 import argparse
@@ -18,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.benchmarks.compiled import compile_modules
 from tests.benchmarks.surfaces import refined
 from tetlux.cases.picture.draw import PictureScene, Ray, draw_picture
 from tetlux.cases.shipped import library_folder
@@ -103,6 +105,7 @@ def main() -> None:
     parser.add_argument("scale", nargs="?", type=float, default=20.0)
     parser.add_argument("--times", type=int, default=3)
     options = parser.parse_args()
+    compile_modules()
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "sphere.yaml").write_text(SPHERE)

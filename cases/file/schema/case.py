@@ -12,7 +12,7 @@ from tetlux.cases.file.schema.fit import FitSpec, refuse_beside_fit, refuse_with
 from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Each, Label, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, Direction, Each, Label, Number, Section, shape_of
 from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
 from tetlux.cases.file.schema.pulse import PulseSpec, refuse_beside_pulse
 from tetlux.cases.file.schema.sweep import SweepSpec
@@ -97,7 +97,7 @@ class CaseSpec(Section):
     )
     detectors: list[DetectorSpec] = Field([])
     camera: CameraSpec | None = Field(None, description="where the picture is taken from; default: chosen by the light")
-    up: Vector3 = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
+    up: Direction = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
     picture: Pictures | None = Field(None, description="what the picture shows, or a list for several pictures")
     outputs: list[Output] = Field(
         ["surface", "volume", "picture"],

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from tetlux.cases.hints import did_you_mean, nearest_word
@@ -11,6 +11,17 @@ from tetlux.cases.hints import did_you_mean, nearest_word
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Length = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0)]
 Vector3 = tuple[Number, Number, Number]
+
+
+def _no_letter(value: object) -> object:
+    if isinstance(value, str) and value.lower() in AXES:
+        raise PydanticCustomError("axis", "write the axis as a vector, {vector}", {"vector": AXES[value.lower()]})
+    return value
+
+
+AXES = {"x": "[1, 0, 0]", "y": "[0, 1, 0]", "z": "[0, 0, 1]"}
+# A vector that some would write as the name of an axis.
+Direction = Annotated[Vector3, BeforeValidator(_no_letter)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
 # The name of a channel, light, region or detector, which becomes part of the names of arrays in files.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=60)]
