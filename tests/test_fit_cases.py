@@ -156,6 +156,12 @@ def test_fits_and_sensitivities_need_detectors(tmp_path: Path) -> None:
     check_refused(tmp_path, CASE + "outputs: [sensitivity]\npulse: {times: [1e-9]}\n", "no sensitivities beside pulse")
 
 
+def test_other_words_are_understood(tmp_path: Path) -> None:
+    check_refused(tmp_path, CASE + FIT.replace("fit:", "inversion:"), 'inversion: unknown key; did you mean "fit"')
+    check_refused(tmp_path, CASE + FIT.replace("readings:", "measurements:"), 'did you mean "readings"')
+    check_refused(tmp_path, CASE + "outputs: [jacobian]\n", 'did you mean "sensitivity"')
+
+
 def test_what_is_no_light_or_tissue_is_refused(tmp_path: Path) -> None:
     """What other tests refuse in Python."""
     tissue = (

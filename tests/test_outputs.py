@@ -19,7 +19,7 @@ from tetlux.cases.file.detectors import read_detectors
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.run import run_case
 from tetlux.cases.write.results import Results, collect_results
-from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, read, solve
+from tetlux.fem import Medium, PencilBeam, PointDetector, PointSource, System, read, solve
 from tetlux.fem.outcome.extremes import extreme_places
 from tetlux.fem.outcome.radiance import radiance
 from tetlux.fem.outcome.solution import Solution
@@ -28,6 +28,7 @@ from tetlux.fem.solve_scenes import solve_each
 from tetlux.fem.sources.light import Light
 from tetlux.meshing import Surface, box, sphere, torus
 from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.tets.mesh import TetMesh
 
 COLOURS = """\
 surface: {box: {size: [8, 8, 8]}}
@@ -322,3 +323,17 @@ def test_the_extremes_without_vertices_are_those_of_the_surface_written(kind: st
     everywhere = surface_exitance(solution)[1]
     assert values.max() == pytest.approx(everywhere.max(), rel=0.01)
     assert values.min() == pytest.approx(everywhere.min(), rel=0.1)
+
+
+def test_the_extremes_of_a_run_do_not_depend_on_those_before_it() -> None:
+    """Places that were tried for one light on a mesh are kept, and none of them is taken for another light's."""
+    medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    ball = sphere(10.0)
+    first = solve(ball, medium, [PencilBeam((0.0, 0.0, 20.0), (0.2, 0.1, -1.0))], tolerance=0.1)
+    extreme_places(first)
+    same = TetMesh(first.mesh.points, first.mesh.tetrahedra, first.mesh.unit, first.mesh.regions)
+    for position in ((3.0, 0.0, -7.0), (-8.0, 0.0, 0.0)):
+        found = [
+            extreme_places(System(mesh, medium, ball).solve([PointSource(position)])) for mesh in (first.mesh, same)
+        ]
+        np.testing.assert_allclose(found[0], found[1], rtol=1e-12, atol=1e-12)

@@ -85,7 +85,7 @@ def test_the_types_and_the_cases_ship() -> None:
         assert package.__file__ is not None
         assert Path(package.__file__).with_name("py.typed").is_file()
     shipped = {path.name for path in library_folder().iterdir()}
-    assert {"hare.stl", "hare.yaml", "slab.yaml", "sphere.yaml", "torus.yaml"} <= shipped
+    assert {"finger-fit.csv", "hare.stl", "hare.yaml", "slab.yaml", "sphere.yaml", "torus.yaml"} <= shipped
 
 
 def test_dependencies_run_one_way() -> None:

@@ -229,7 +229,7 @@ BLOCKS = {
     "docs/cluster.md": {"yaml": 1},
     "docs/how-to.md": {"python": 1, "yaml": 3},
     "docs/layers.md": {"yaml": 2},
-    "docs/pictures.md": {"python": 1, "yaml": 3},
+    "docs/pictures.md": {"python": 1, "yaml": 4},
     "docs/python.md": {"python": 3},
     "docs/rendering.md": {"yaml": 1},
     "docs/scan.md": {"yaml": 1},

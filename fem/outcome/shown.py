@@ -127,6 +127,8 @@ class Shown:
                 "label_font_size": 14,
             },
         )
+        # Or the title covers the uppermost label.
+        plotter.scalar_bar.SetVerticalTitleSeparation(8)
         axes: Any = plotter.add_axes  # its types are those of an unbound method
         axes()
         if show or screenshot:
