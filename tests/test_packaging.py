@@ -238,3 +238,10 @@ def test_the_module_is_the_command() -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("sphere: ok: 5,120 triangles, 20 x 20 x 20 mm")
+
+
+def test_the_reference_has_all_that_loads_results() -> None:
+    """These are imported when they are asked for, so that the page has to name each of them."""
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    for name in cases.__all__:
+        assert f"tetlux.cases.{name}\n" in page
