@@ -1,6 +1,5 @@
 """`measure`: solve a scenario with a variant of the solver, and compute what it is judged by."""
 
-import math
 import time
 from dataclasses import dataclass, replace
 
@@ -8,19 +7,18 @@ import numpy as np
 
 from tetlux.cases.chart.samples import relative_error
 from tetlux.cases.stress.panels import Variant
-from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Readout, Scenario, Truth
-from tetlux.fem import ChargeSolution, ClosedFormSolution, PointDetector
+from tetlux.cases.stress.scenes.readout import MOST_TETRAHEDRA, Readout, bars_of
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Scenario, Truth
+from tetlux.fem import ChargeSolution, ClosedFormSolution
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.solve import solve
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.mesher.api import tetrahedralize
 
-# Limit of the adaptive runs, low since the map shows failures and not how fine a mesh can get.
-MOST_TETRAHEDRA = 30_000
 AnySolution = Solution | ChargeSolution | ClosedFormSolution
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Diagnostics:
     """What a solution is judged by.
 
@@ -59,19 +57,19 @@ class Diagnostics:
         Whether error and estimate are those of a reading.
     """
 
-    lowest: float | None
-    overshoot: float | None
-    ledger: float | None
-    residual: float | None
-    iterations: int
+    lowest: float | None = None
+    overshoot: float | None = None
+    ledger: float | None = None
+    residual: float | None = None
+    iterations: int = 0
     estimate: float
-    error: float | None
-    scaling: float | None
+    error: float | None = None
+    scaling: float | None = None
     finite: bool
-    may_be_negative: bool
+    may_be_negative: bool = False
     nodes: int
-    seconds: float
-    warnings: tuple[str, ...]
+    seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
     bound: float | None = None
     of_readings: bool = False
 
@@ -105,31 +103,16 @@ def _of_mesh(solution: Solution, scenario: Scenario) -> Diagnostics:
         residual=solution.residual,
         iterations=solution.iterations,
         estimate=solution.error_estimate,
-        error=None,
-        scaling=None,
         finite=bool(np.isfinite(solution.fluence).all() and np.isfinite(solution.exitance).all()),
-        may_be_negative=False,
         nodes=len(solution.mesh.points),
-        seconds=0.0,
-        warnings=(),
     )
 
 
 def _without_mesh(solution: ChargeSolution | ClosedFormSolution) -> Diagnostics:
     return Diagnostics(
-        lowest=None,
-        overshoot=None,
-        ledger=None,
-        residual=None,
-        iterations=0,
         estimate=solution.error_estimate,
-        error=None,
-        scaling=None,
         finite=bool(np.isfinite(solution.exitance).all()),
-        may_be_negative=False,
         nodes=solution.charges if isinstance(solution, ChargeSolution) else 0,
-        seconds=0.0,
-        warnings=(),
         bound=solution.error_bound if np.isfinite(solution.error_bound) else None,
     )
 
@@ -137,27 +120,19 @@ def _without_mesh(solution: ChargeSolution | ClosedFormSolution) -> Diagnostics:
 def _of_readout(readout: Readout, truth: NumberArray) -> Diagnostics:
     error, bar = _worst_reading(readout.values, readout.bars, truth)
     return Diagnostics(
-        lowest=None,
-        overshoot=None,
-        ledger=None,
-        residual=None,
-        iterations=0,
         estimate=bar,
         error=error,
-        scaling=None,
         finite=bool(np.isfinite(readout.values).all()),
         may_be_negative=True,
         nodes=readout.nodes,
-        seconds=0.0,
         warnings=readout.warnings,
         of_readings=True,
     )
 
 
 def _readings_of(solution: AnySolution) -> tuple[FloatArray, FloatArray]:
-    """What the detectors read, and its bars; a missing bar allows any error."""
-    bars = np.array([math.inf if each.relative_error is None else each.relative_error for each in solution.readings])
-    return np.array([reading.exitance for reading in solution.readings]), bars
+    """What the detectors read, and its bars."""
+    return np.array([reading.exitance for reading in solution.readings]), bars_of(solution.readings)
 
 
 def _worst_reading(values: NumberArray, bars: FloatArray, truth: NumberArray) -> tuple[float, float]:
@@ -168,8 +143,7 @@ def _worst_reading(values: NumberArray, bars: FloatArray, truth: NumberArray) ->
 
 
 def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
-    places = [] if scenario.readings is None else scenario.readings[0].tolist()
-    detectors = [PointDetector((x, y, z)) for x, y, z in places]
+    detectors = scenario.detectors
     options = {"model": "full", **variant.options}
     mesh = scenario.mesh
     if mesh is None and not variant.adaptive:

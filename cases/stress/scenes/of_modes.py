@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Readout, Scenario, medium_of_albedo, mesh_of_unit_edges
-from tetlux.fem import Medium, PointDetector, PointSource, Solution, System, sensitivity, solve
+from tetlux.cases.stress.scenes.readout import MOST_TETRAHEDRA, Readout, bars_of
+from tetlux.cases.stress.scenes.scenarios import TOLERANCE, Scenario, medium_of_albedo, mesh_of_unit_edges
+from tetlux.fem import Medium, PointSource, System, sensitivity, solve
 from tetlux.fem.exact.modulated.sphere import point_exitance, pulse_exitance
 from tetlux.fem.models.modulation import seconds_per_length
 from tetlux.meshing import shapes
@@ -24,7 +25,6 @@ RADIUS, DEPTH, ALBEDO = 10.0, 1.0, 0.99
 # Step of the differences of closed forms, as a share of a coefficient.
 STEP = 1e-4
 UNIT = "mm"
-MOST_TETRAHEDRA = 30_000
 
 
 def modulated_by_wave_number_and_ratio(decay: float, ratio: float) -> Scenario:
@@ -63,7 +63,7 @@ def pulse_by_radius_and_time(radius: float, times: str) -> Scenario:
             [scenario.light],
             times=(seconds * paths).tolist(),
             tolerance=None,
-            detectors=_detectors(scenario),
+            detectors=scenario.detectors,
             detector_tolerance=TOLERANCE,
             most_tetrahedra=MOST_TETRAHEDRA,
         )
@@ -82,7 +82,7 @@ def sensitivity_by_albedo_and_place(albedo: float, place: str) -> Scenario:
     truth = np.concatenate([_slopes(medium, name, angles) for name in ("sigma_a", "sigma_s_prime")])
 
     def read(scenario: Scenario) -> Readout:
-        detectors = _detectors(scenario)
+        detectors = scenario.detectors
         solution = solve(
             scenario.surface,
             scenario.medium,
@@ -94,10 +94,9 @@ def sensitivity_by_albedo_and_place(albedo: float, place: str) -> Scenario:
         )
         found = sensitivity(System(solution.mesh, scenario.medium, scenario.surface), [scenario.light], detectors)
         values = np.concatenate([each[0].sum(axis=1) for each in found.derivatives.values()])
-        bars = np.array(
-            [math.inf if each.relative_error is None else each.relative_error for each in solution.readings]
+        return Readout(
+            values, np.tile(bars_of(solution.readings), 2), len(solution.mesh.points), tuple(solution.warnings)
         )
-        return Readout(values, np.tile(bars, 2), len(solution.mesh.points), tuple(solution.warnings))
 
     return _scenario(medium, RADIUS, DEPTH, angles, truth, read)
 
@@ -107,20 +106,19 @@ def _modulated(medium: Medium, radius: float, depth: float, shift: float, angles
     truth = point_exitance(medium, radius=radius, source_radius=radius - depth, gamma=angles, shift=1j * shift)
 
     def read(scenario: Scenario) -> Readout:
-        detectors = _detectors(scenario)
         found = solve(
             scenario.surface,
             scenario.medium,
             [scenario.light],
             mesh=scenario.mesh,
             tolerance=None,
-            detectors=detectors,
+            detectors=scenario.detectors,
             detector_tolerance=TOLERANCE,
             frequency=shift / (2.0 * math.pi * seconds_per_length(medium, UNIT)),
             most_tetrahedra=MOST_TETRAHEDRA,
         )
         values = np.array([reading.exitance for reading in found.readings])
-        return Readout(values, _bars(found), len(found.mesh.points), tuple(found.warnings))
+        return Readout(values, bars_of(found.readings), len(found.mesh.points), tuple(found.warnings))
 
     return _scenario(medium, radius, depth, angles, truth, read)
 
@@ -136,17 +134,6 @@ def _scenario(
     places = radius * np.column_stack([np.sin(angles), np.zeros(len(angles)), np.cos(angles)])
     light = PointSource((0.0, 0.0, radius - depth))
     return Scenario(shapes.sphere(radius), medium, light, readings=(places, truth), read=read)
-
-
-def _detectors(scenario: Scenario) -> list[PointDetector]:
-    assert scenario.readings is not None
-    return [PointDetector((x, y, z)) for x, y, z in scenario.readings[0].tolist()]
-
-
-def _bars(solution: Solution) -> FloatArray:
-    """The relative errors of readings; a missing one allows any."""
-    found = [math.inf if each.relative_error is None else each.relative_error for each in solution.readings]
-    return np.array(found)
 
 
 def _slopes(medium: Medium, name: str, angles: tuple[float, ...]) -> FloatArray:

@@ -8,11 +8,13 @@ import numpy as np
 from tetlux.cases.chart.samples import Samples, project_to_sphere, surface_samples
 from tetlux.cases.stress.scenes.bodies import BODIES
 from tetlux.cases.stress.scenes.meshes import degrade, layered_ball
+from tetlux.cases.stress.scenes.readout import Readout
 from tetlux.fem import CollimatedBeam, DiffuseLight, Emission, Light, Medium, PencilBeam, PointSource, Region
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import concentric, slab, sphere_light
 from tetlux.fem.exact.registry import closed_forms
 from tetlux.fem.grading import places_to_resolve
+from tetlux.fem.outcome.detector_kinds import PointDetector
 from tetlux.meshing import shapes
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.solids import Sphere
@@ -28,16 +30,6 @@ OFF_NODES = 0.5
 
 # Samples of the true surface, and the exitance there in closed form, W/unit².
 Truth = tuple[Samples, FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class Readout:
-    """Values (n,) that are held against a closed form, their relative error bars (n,), and how they were found."""
-
-    values: NumberArray
-    bars: FloatArray
-    nodes: int
-    warnings: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +69,12 @@ class Scenario:
     unit_scale: "Scenario | None" = None
     readings: tuple[FloatArray, NumberArray] | None = None
     read: "Callable[[Scenario], Readout] | None" = None
+
+    @property
+    def detectors(self) -> list[PointDetector]:
+        """The detectors whose readings are known."""
+        places = [] if self.readings is None else self.readings[0].tolist()
+        return [PointDetector((x, y, z)) for x, y, z in places]
 
 
 def medium_of_albedo(albedo: float, eta: float = INDEX, free_path: float = 1.0) -> Medium:
