@@ -6,14 +6,13 @@ import contextlib
 import functools
 import os
 import re
-import signal
 import sys
-import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
 from tetlux.cases import commands as does
+from tetlux.cases.interrupts import treat_signals_as_interrupts
 from tetlux.cases.start import mark_start
 
 # Modules that need numpy take half a second to import, so they are imported where they are used: --help, list and show
@@ -35,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     mark_start()
     try:
-        _treat_signals_as_interrupts()
+        treat_signals_as_interrupts()
         return _main(arguments)
     except KeyboardInterrupt:
         return _report("interrupted; finished cases are kept.", 130)
@@ -81,15 +80,6 @@ def _report(sentence: str, code: int) -> int:
     """Print a sentence and return the exit code that it explains."""
     print(f"tetlux: {sentence}", file=sys.stderr)
     return code
-
-
-def _treat_signals_as_interrupts() -> None:
-    """Make SIGTERM (a scheduler) and SIGHUP (a closing terminal) end a run as Ctrl-C does, with clean-up."""
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
-            # nohup ignores SIGHUP, which must stay so.
-            if signal.getsignal(number) is signal.SIG_DFL:
-                signal.signal(number, signal.default_int_handler)
 
 
 class _Parser(argparse.ArgumentParser):

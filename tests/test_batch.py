@@ -1,6 +1,7 @@
 """Batches as users run them: shared meshes, worker processes that die, resumption, and Ctrl-C."""
 
 import errno
+import glob
 import json
 import os
 import signal
@@ -20,6 +21,7 @@ from tetlux.cases.batch.launch import Launcher, seem_many
 from tetlux.cases.batch.requests import load_all
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
+from tetlux.cases.results.batch_tables import BatchTables
 from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
 from tetlux.fem.solve_scenes import solve_each
@@ -212,7 +214,7 @@ def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
     read(tmp_path, BALL.replace("0.02]", f"{', '.join(str(0.02 + 0.001 * i) for i in range(60))}]"))
     command = [sys.executable, "-m", "tetlux", "run", "ball.yaml", "--jobs", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as batch:
-        while not summaries(tmp_path / "results") and batch.poll() is None:
+        while not glob.glob(f"{tmp_path}/results/*/*/summary.json") and batch.poll() is None:  # noqa: PTH207 - folders vanish
             time.sleep(0.05)
         batch.send_signal(signal.SIGINT)
         _, messages = batch.communicate(timeout=60)
@@ -220,6 +222,26 @@ def test_interrupting_workers_keeps_the_runs_in_flight(tmp_path: Path) -> None:
     assert b"finished cases are kept" in messages
     assert 1 <= len(summaries(tmp_path / "results")) < 60
     assert not list((tmp_path / "results").glob(".partial*"))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals of POSIX")
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupt_while_a_row_is_written_leaves_whole_tables(tmp_path: Path, jobs: int) -> None:
+    def interrupt(event: Event) -> None:
+        if isinstance(event, RunFinished) and not ended:
+            os.kill(os.getpid(), signal.SIGINT)
+        if isinstance(event, RunFinished | BatchEnded):
+            ended.append(event)
+
+    ended: list[Event] = []
+    with pytest.raises(KeyboardInterrupt):
+        run_batch(read(tmp_path), tmp_path, jobs=jobs, listeners=[interrupt, BatchTables()])
+    finished = [event.name for event in ended if isinstance(event, RunFinished)]
+    assert 1 <= len(finished) < 6
+    assert isinstance(ended[-1], BatchEnded)
+    assert (ended[-1].finished, ended[-1].left, ended[-1].how) == (len(finished), 6 - len(finished), "interrupted")
+    rows = (tmp_path / "results.csv").read_text().splitlines()
+    assert sorted(row.split(",")[0] for row in rows[1:]) == sorted(finished)
 
 
 def test_prepared_workers_are_used_or_ended() -> None:

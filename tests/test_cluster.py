@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,8 @@ SWEEP = "sweep: {medium.sigma_a: [0.01, 0.011, 0.012, 0.013, 0.014, 0.015, 0.016
 
 
 def channels(out: Path) -> dict[str, Any]:
-    return {path.parent.name: json.loads(path.read_text())["channels"] for path in out.glob("*/*/summary.json")}
+    paths = map(Path, glob(f"{out}/*/*/summary.json"))  # noqa: PTH207 - folders vanish
+    return {path.parent.name: json.loads(path.read_text())["channels"] for path in paths}
 
 
 def start(*arguments: str) -> "subprocess.Popen[bytes]":

@@ -17,6 +17,7 @@ from tetlux.cases.batch.processes import run_in_processes
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.batch.workshop import Workshop
 from tetlux.cases.file.case import Case
+from tetlux.cases.interrupts import uninterrupted
 from tetlux.cases.planning import plan_models
 from tetlux.cases.run import SUMMARY
 from tetlux.cases.write.content import content_of
@@ -165,13 +166,15 @@ class _Track:
         self.must_stop = False
 
     def __call__(self, event: Event) -> None:
-        if isinstance(event, RunFinished):
-            self._counts["kept" if event.kept else "finished"] += 1
-        elif isinstance(event, RunFailed):
-            self._counts["failed"] += 1
-            self.must_stop = self.must_stop or event.ends_batch
-        for listener in self._listeners:
-            listener(event)
+        # By all or by none: an interrupt in between would leave a table locked, or a row out.
+        with uninterrupted():
+            if isinstance(event, RunFinished):
+                self._counts["kept" if event.kept else "finished"] += 1
+            elif isinstance(event, RunFailed):
+                self._counts["failed"] += 1
+                self.must_stop = self.must_stop or event.ends_batch
+            for listener in self._listeners:
+                listener(event)
 
     @property
     def left(self) -> int:

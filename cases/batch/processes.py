@@ -69,7 +69,7 @@ class _Pool:
         self._schedule, self._listener, self._count = Schedule(batch), listener, count
         self._launcher = launcher
         launcher.prepare(count)
-        self._answers: queue.Queue[tuple[_Worker, Any]] = queue.Queue()
+        self._answers: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._deaths_at_start = 0
         self._stopping = self._interrupted = False
