@@ -76,6 +76,10 @@ class Page:
     def shown(self) -> FloatArray:
         """The canvas of the body at rest, red, green and blue from 0 to 255."""
         self.do(AT_REST)
+        return self.screenshot()
+
+    def screenshot(self) -> FloatArray:
+        """The canvas as it is."""
         box = self.do("(({left, top, width, height}) => [left, top, width, height])(view.getBoundingClientRect())")
         clip = dict(zip(("x", "y", "width", "height"), box, strict=True))
         with Image.open(io.BytesIO(self.page.screenshot(clip=clip))) as image:
@@ -259,6 +263,27 @@ def test_it_is_drawn_coarsely_in_motion_and_finely_at_rest(wide: Page) -> None:
     assert moving == 0.5
     wide.do(RESTED)
     assert wide.do(width) == 2
+
+
+def test_a_slow_machine_turns_fewer_triangles_and_shows_all_at_rest(wide: Page) -> None:
+    drawn = "tetlux.renderer.info.render.triangles"
+    wide.change("lights: false, regions: false, edges: true")
+    whole = wide.do(drawn)
+    frames = wide.do("tetlux.frames")
+    # A small body keeps all of its triangles in motion.
+    assert wide.do("tetlux.sharpness.slow = true, tetlux.render(false), " + drawn) == whole
+    wide.do("tetlux.body.most = 300, tetlux.body.kept = 100, tetlux.sharpness.slow = true")
+    assert 50 < wide.do("tetlux.render(false), " + drawn) < whole / 2
+    wide.page.mouse.move(250, 250)
+    wide.page.mouse.down()
+    wide.page.mouse.move(350, 230, steps=4)
+    wide.page.mouse.up()
+    wide.do(RESTED.replace("tetlux.sharpness.resting", f"tetlux.frames > {frames + 3} && tetlux.sharpness.resting"))
+    assert wide.do(drawn) == whole
+    seen = wide.screenshot()
+    # As if all had been drawn finely all the time.
+    wide.do("tetlux.body.most = 1e6, tetlux.sharpness.slow = false, tetlux.sharpness.moving = 2, tetlux.render(false)")
+    assert np.array_equal(wide.screenshot(), seen)
 
 
 def test_keys_turn_zoom_and_switch(wide: Page) -> None:

@@ -2,10 +2,14 @@
 
 import { BufferAttribute, BufferGeometry, Mesh } from "three";
 import { cornerNormals } from "./normals.js";
-import { UNKNOWN, colourMaterial } from "./shaders.js";
+import { coarser } from "./coarser.js";
+import { UNKNOWN, colourMaterial, compileWith } from "./shaders.js";
 
 // Cosine of the angle, .8 degrees, between normals that count as one.
 const ALIKE = 1 - 1e-4;
+// More triangles are not drawn in motion by what is slow, but those between about so many vertices.
+const MOST = 20_000;
+const KEPT = 8000;
 
 // Corners of triangles whose vertex and normal are the same become one: `corners` has one of each, `index` (3 m,) says
 // which it is.
@@ -46,12 +50,14 @@ export class Body {
     const { corners, index } = weld(triangles, normals);
     this.vertices = Uint32Array.from(corners, (corner) => triangles[corner]);
     this.shared = new BufferGeometry();
-    this.shared.setIndex(new BufferAttribute(index, 1));
+    this.all = new BufferAttribute(index, 1);
+    this.shared.setIndex(this.all);
+    this.most = MOST;
+    this.kept = KEPT;
     this.set("position", rowsOf(points, 3, this.vertices), 3);
     this.set("normal", rowsOf(normals, 3, corners), 3);
     this.mesh = new Mesh(this.shared, colourMaterial());
     this.mesh.frustumCulled = false;
-    this.edges = false;
   }
 
   set(name, numbers, width, normalized = false) {
@@ -67,13 +73,32 @@ export class Body {
     this.set("colour", rowsOf(colours, 3, this.vertices), 3, true);
   }
 
-  // Edges are found by marks at the corners of each triangle, so that triangles share none then.
-  show(edges) {
-    if (edges === this.edges && !(edges && this.stale)) return;
-    if (this.edges) this.mesh.geometry.dispose();
-    this.mesh.geometry = edges ? withCorners(this.shared.toNonIndexed()) : this.shared;
-    this.edges = edges;
-    this.stale = false;
+  // Draw what is asked for, parts of the shaders by name, or what is quicker: no edges, and fewer of many triangles.
+  show(parts, coarsely) {
+    const edges = parts.EDGES && !coarsely;
+    this.shared.setIndex(coarsely && this.isLarge ? this.few : this.all);
+    this.mesh.geometry = edges ? this.apart : this.shared;
+    compileWith(this.mesh.material, { ...parts, EDGES: edges });
+  }
+
+  get isLarge() {
+    return this.all.count > 3 * this.most;
+  }
+
+  get few() {
+    const [points, normals] = ["position", "normal"].map((name) => this.shared.getAttribute(name).array);
+    const index = () => coarser(points, normals, this.vertices, this.all.array, this.kept);
+    return (this.fewer ??= new BufferAttribute(index(), 1));
+  }
+
+  // Edges are found by marks at the corners of each triangle, so that triangles share none.
+  get apart() {
+    if (this.stale) {
+      this.separate?.dispose();
+      this.separate = withCorners(this.shared.toNonIndexed());
+      this.stale = false;
+    }
+    return this.separate;
   }
 }
 

@@ -12,14 +12,17 @@ function flatNormals(points, triangles) {
     const a = 3 * triangles[3 * t];
     const b = 3 * triangles[3 * t + 1];
     const c = 3 * triangles[3 * t + 2];
-    const [ux, uy, uz] = [points[b] - points[a], points[b + 1] - points[a + 1], points[b + 2] - points[a + 2]];
-    const [vx, vy, vz] = [points[c] - points[a], points[c + 1] - points[a + 1], points[c + 2] - points[a + 2]];
-    const normal = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
-    const length = Math.hypot(...normal) || 1;
-    for (let k = 0; k < 3; k += 1) {
-      weighted[3 * t + k] = normal[k];
-      flat[3 * t + k] = normal[k] / length;
-    }
+    const ux = points[b] - points[a];
+    const uy = points[b + 1] - points[a + 1];
+    const uz = points[b + 2] - points[a + 2];
+    const vx = points[c] - points[a];
+    const vy = points[c + 1] - points[a + 1];
+    const vz = points[c + 2] - points[a + 2];
+    weighted[3 * t] = uy * vz - uz * vy;
+    weighted[3 * t + 1] = uz * vx - ux * vz;
+    weighted[3 * t + 2] = ux * vy - uy * vx;
+    const length = Math.sqrt(weighted[3 * t] ** 2 + weighted[3 * t + 1] ** 2 + weighted[3 * t + 2] ** 2) || 1;
+    for (let k = 3 * t; k < 3 * t + 3; k += 1) flat[k] = weighted[k] / length;
   }
   return { weighted, flat };
 }
@@ -44,9 +47,13 @@ export function cornerNormals(points, triangles) {
   const normals = new Float32Array(3 * triangles.length);
   for (let i = 0; i < triangles.length; i += 1) {
     const own = 3 * Math.floor(i / 3);
-    const [first, last] = [start[triangles[i]], start[triangles[i] + 1]];
-    let [x, y, z] = [0, 0, 0];
-    for (let n = first; n < last && last - first <= MOST_NEIGHBOURS; n += 1) {
+    const first = start[triangles[i]];
+    const last = start[triangles[i] + 1];
+    const end = last - first <= MOST_NEIGHBOURS ? last : first;
+    let x = 0;
+    let y = 0;
+    let z = 0;
+    for (let n = first; n < end; n += 1) {
       const other = 3 * around[n];
       const cosine = flat[own] * flat[other] + flat[own + 1] * flat[other + 1] + flat[own + 2] * flat[other + 2];
       if (cosine > SHARP) {
@@ -55,7 +62,7 @@ export function cornerNormals(points, triangles) {
         z += weighted[other + 2];
       }
     }
-    const length = Math.hypot(x, y, z);
+    const length = Math.sqrt(x * x + y * y + z * z);
     normals[3 * i] = length ? x / length : flat[own];
     normals[3 * i + 1] = length ? y / length : flat[own + 1];
     normals[3 * i + 2] = length ? z / length : flat[own + 2];

@@ -1,5 +1,5 @@
-// `Sharpness`: how many pixels are drawn for each one of the page. At rest they are averaged, which smooths edges;
-// while something moves, as few as it takes to be quick.
+// `Sharpness`: how many pixels are drawn for each one of the page, and whether all triangles are. At rest pixels are
+// averaged, which smooths edges; while something moves, fewer triangles and then fewer pixels are drawn if that is slow.
 
 // Most of a frame's seconds times 1000: to be drawn as finely in motion as at rest, and in motion before it is coarser.
 const QUICK = 25;
@@ -12,7 +12,13 @@ export class Sharpness {
     const own = window.devicePixelRatio || 1;
     this.fine = Math.min(own < 2 ? 2 * own : own, 3);
     this.moving = Math.min(own, 2);
+    // Until it is known to be quick, so that the first frame comes soon.
+    this.slow = true;
     this.resting = false;
+  }
+
+  get fewer() {
+    return this.slow && !this.resting;
   }
 
   set(resting) {
@@ -21,11 +27,11 @@ export class Sharpness {
     if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
   }
 
-  // Learn from how long the frame takes that was just asked for.
-  async learn() {
+  // Learn from how long the frame takes that was just asked for, which fewer triangles may make quicker or not.
+  async learn(helps) {
     if (this.waiting) return;
     this.waiting = true;
-    const { resting } = this;
+    const { resting, fewer } = this;
     const gl = this.renderer.getContext();
     const started = performance.now();
     const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -34,8 +40,11 @@ export class Sharpness {
     while (!gl.isContextLost() && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED);
     gl.deleteSync(fence);
     const taken = performance.now() - started;
-    if (resting && taken < QUICK) this.moving = this.fine;
-    if (!resting && taken > SLOW) this.moving = Math.max(this.moving / 2, COARSEST);
+    if (resting && taken < QUICK) [this.moving, this.slow] = [this.fine, false];
+    if (!resting && taken > SLOW) {
+      if (helps && !fewer) this.slow = true;
+      else this.moving = Math.max(this.moving / 2, COARSEST);
+    }
     this.waiting = false;
   }
 }

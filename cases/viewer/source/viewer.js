@@ -6,7 +6,6 @@ import { Body } from "./body.js";
 import { View } from "./camera.js";
 import { label, tableOf, textureOf } from "./colours.js";
 import { Fields, rangeOf, ALL } from "./fields.js";
-import { compileWith } from "./shaders.js";
 import { Sharpness } from "./sharpness.js";
 import { drawAxes, drawBar, drawNothing, drawScale, drawWhite, pen } from "./legend.js";
 import { Labels, hideEndOn, makeArrows, makeRegion } from "./marks.js";
@@ -122,9 +121,6 @@ class Viewer {
     uniforms.high.value = range[1] / factor;
     uniforms.logarithmic.value = this.logarithmic ? 1 : 0;
     uniforms.map.value = this.textures[state.map];
-    body.show(state.edges);
-    const own = state.quantity === "preview";
-    compileWith(material, { OWN_COLOURS: own, EDGES: state.edges, CUT: state.cut !== "off" });
     this.section.colour(state, this.textures[state.map]);
     this.arrows.visible = state.lights;
     for (const { group } of this.regions) group.visible = state.regions;
@@ -166,21 +162,22 @@ class Viewer {
   // Draw before the next frame of the screen, once however often it is asked, and finely when nothing moves any more.
   draw() {
     if (this.asked || !this.shown) return;
-    this.asked = requestAnimationFrame(() => {
-      this.asked = null;
-      this.render(false);
-    });
+    this.asked = requestAnimationFrame(() => this.render(false));
   }
 
   render(resting) {
     const { view } = this;
     clearTimeout(this.rest);
+    cancelAnimationFrame(this.asked);
+    this.asked = null;
     this.sharpness.set(resting);
+    const { quantity, edges, cut } = this.state;
+    this.body.show({ OWN_COLOURS: quantity === "preview", EDGES: edges, CUT: cut !== "off" }, this.sharpness.fewer);
     const plane = this.plane;
     if (plane) this.body.mesh.material.uniforms.plane.value.set(...plane.normal, plane.offset);
     hideEndOn(this.arrows, this.rings, view.toward);
     this.renderer.render(this.scene, view.camera);
-    this.sharpness.learn();
+    this.sharpness.learn(this.body.isLarge || edges);
     this.labels.place(view.camera, ...this.size, { ...this.state, picked: this.picked !== null });
     this.drawOver();
     this.frames += 1;
