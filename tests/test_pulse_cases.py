@@ -82,6 +82,17 @@ def test_the_viewer_has_a_field_for_each_time_on_one_scale(finished: Path) -> No
         low, high = moment["ends"]
         assert high == pytest.approx(1e4 * low)
     assert high == pytest.approx(np.nanmax(surface.point_data["exitance_100ps"]))
+    # And with what detectors read then, of both channels.
+    with (finished / "pulse.csv").open(encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if row["light"] == "all"]
+    for moment in moments:
+        assert set(moment["readings"]) == {"side", "far"}
+        for name, value in moment["readings"].items():
+            parts = [row for row in rows if row["name"] == name and float(row["time [s]"]) == moment["time"]]
+            known = [float(row["exitance [W/mm² per J]"] or "nan") for row in parts]
+            assert len(known) == 2
+            assert value == (None if np.isnan(known).all() else pytest.approx(np.nansum(known), rel=1e-8))
+    assert moments[-1]["readings"]["side"] > 0
 
 
 def test_the_film_has_a_frame_for_each_time(finished: Path) -> None:

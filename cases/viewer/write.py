@@ -129,13 +129,15 @@ def _field(field: Field) -> dict[str, Any]:
 
 
 def _in_time(pulse: PulseResults | None, unit: str) -> dict[str, Any]:
-    """The exitance at times after a pulse, if there is one, all on one scale."""
+    """The exitance at times after a pulse, if there is one, all on one scale, with what detectors read then."""
     if pulse is None:
         return {}
-    some = pulse.some(max(2, MOST_IN_TIME // pulse.exitance.shape[1]))
-    fields = [
-        {**_field(Field("pulse", values, f"W/{unit}²/J")), "ends": pulse.ends(), "time": time} for time, values in some
-    ]
+    most = max(2, MOST_IN_TIME // pulse.exitance.shape[1])
+    fields = []
+    for (time, values), readings in zip(pulse.some(most), pulse.some_readings(most), strict=True):
+        field = _field(Field("pulse", values, f"W/{unit}²/J"))
+        known = {name: finite(value) for name, value in readings.items()}
+        fields.append({**field, "ends": pulse.ends(), "time": time, "readings": known})
     return {"inTime": fields}
 
 

@@ -1,6 +1,7 @@
 """Light in time: ``pulse.csv``, arrays of the surface at each time, and the film of the surface as a pulse spreads."""
 
 import csv
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -40,8 +41,12 @@ class PulseResults:
     def exitance(self) -> FloatArray:
         """Exitance at the vertices, of all channels, (t, v), W/unit² per J; nan where it is not resolved in any."""
         points = self.results.surface.points
-        each = np.array([transient.exitance_at(points) for transient in self.results.transients])
-        return np.where(np.isfinite(each).any(axis=0), np.nansum(each, axis=0), np.nan)
+        return _sum([transient.exitance_at(points) for transient in self.results.transients])
+
+    @cached_property
+    def readings(self) -> FloatArray:
+        """What detectors read of all channels, (t, d), W/unit² per J; nan where it is not resolved in any."""
+        return _sum([transient.readings for transient in self.results.transients])
 
     @property
     def times(self) -> FloatArray:
@@ -55,6 +60,12 @@ class PulseResults:
     def some(self, most: int) -> list[tuple[float, FloatArray]]:
         """Times, s, and the exitance then, (v,): all of them, or every second, third, ... of too many."""
         return [(float(self.times[i]), self.exitance[i]) for i in _spread(len(self.times), most)]
+
+    def some_readings(self, most: int) -> list[dict[str, float]]:
+        """What each detector reads, by its name, at the times of `some`."""
+        names = [detector.name for detector in self.results.case.detectors]
+        rows = self.readings if names else np.empty((len(self.times), 0))
+        return [dict(zip(names, rows[i].tolist(), strict=True)) for i in _spread(len(self.times), most)]
 
     def ends(self) -> tuple[float, float] | None:
         """The ends of one logarithmic scale for all times; None if no light leaves."""
@@ -111,6 +122,12 @@ class PulseResults:
 def picoseconds(time: float) -> str:
     """A time in the name of an array."""
     return f"{time * 1e12:.6g}ps"
+
+
+def _sum(each: Sequence[FloatArray]) -> FloatArray:
+    """The sum over channels, (channel, ...); nan where none is known."""
+    values = np.array(each)
+    return np.where(np.isfinite(values).any(axis=0), np.nansum(values, axis=0), np.nan)
 
 
 def _spread(count: int, most: int) -> list[int]:

@@ -24,8 +24,9 @@ export function drawBar(context, x, { quantity, unit, bottom, top, logarithmic, 
   context.fillStyle = ink;
   context.textAlign = "left";
   context.textBaseline = "bottom";
-  context.fillText(quantity, x, high - 22);
-  context.fillText(unit, x, high - 6);
+  // Above the tick of the largest value.
+  context.fillText(quantity, x, high - 26);
+  context.fillText(unit, x, high - 10);
   const end = low - (below ? POINTER : 0);
   const steps = table.length / 4;
   const colour = (step) => `rgb(${table.slice(4 * step, 4 * step + 3).join(",")})`;
@@ -57,7 +58,7 @@ export function drawWhite(context, x, y, white, unit, ink) {
   context.fillStyle = ink;
   context.textAlign = "left";
   context.textBaseline = "top";
-  ["white is", "exitance of", label(white, 3), unit].forEach((line, i) => context.fillText(line, x, y + 48 + 17 * i));
+  ["white is", "exitance", `of ${label(white, 3)}`, unit].forEach((line, i) => context.fillText(line, x, y + 48 + 17 * i));
 }
 
 // In place of a bar where no light leaves the body.

@@ -23,6 +23,8 @@ const ARROW_RADIUS = 0.0042;
 const END_ON = 0.94;
 // Edges of regions at which faces meet at a larger angle, degrees.
 const EDGE = 30;
+// Places of the name of a region, of which one is taken that covers no other: at its top, below or above, pixels.
+const SHIFTS = [0, 17, -17];
 
 function arrow([tail, tip], radius, material) {
   const [start, end] = [new Vector3(...tail), new Vector3(...tip)];
@@ -112,7 +114,7 @@ export class Labels {
     return element;
   }
 
-  // Put them where the camera sees them; names that would cover an earlier one are left out.
+  // Put them where the camera sees them; names that would cover an earlier one are left out, or moved.
   place(camera, width, height, shown) {
     const taken = [];
     for (const { kind, place, element } of this.labels) {
@@ -126,9 +128,13 @@ export class Labels {
       name.hidden = false;
       const wide = 7 * name.textContent.length;
       const start = kind === "regions" ? left - wide / 2 : left + 10;
-      const box = [start, top - 9, start + wide, top + 9];
-      name.hidden = taken.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
-      if (!name.hidden) taken.push(box);
+      const boxAt = (shift) => [start, top + shift - 8, start + wide, top + shift + 8];
+      const free = (box) => !taken.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
+      const shift = (kind === "regions" ? SHIFTS : [0]).find((each) => free(boxAt(each)));
+      name.hidden = shift === undefined;
+      if (name.hidden) continue;
+      name.style.marginTop = `${shift}px`;
+      taken.push(boxAt(shift));
     }
   }
 }

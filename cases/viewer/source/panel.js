@@ -10,6 +10,8 @@ function fill(select, names, chosen, text = (name) => name) {
   select.closest("label").hidden = names.length < 2;
 }
 
+const TITLES = { preview: "colours", pulse: "exitance after a pulse" };
+
 // Names of all switches, and the keys that turn them.
 export const SWITCHES = { edges: "e", lights: "g", detectors: "d", regions: "r" };
 
@@ -34,10 +36,10 @@ export class Panel {
     element("whole").addEventListener("click", () => change({ bottom: null, top: null }));
   }
 
-  follow(state, fields, range) {
+  follow(state, fields, field, range) {
     const { scene } = this;
     const quantities = [...(scene.colours ? ["preview"] : []), ...fields.quantities];
-    fill(element("quantity"), quantities, state.quantity, (name) => (name === "preview" ? "colours" : name));
+    fill(element("quantity"), quantities, state.quantity, (name) => TITLES[name] ?? name);
     for (const kind of ["channel", "light"]) {
       fill(element(kind), fields.names(state.quantity, kind), state[kind], (name) => (name === ALL ? "sum of all" : name));
     }
@@ -47,9 +49,12 @@ export class Panel {
     element("moment").value = state.moment;
     element("time").textContent = times.length ? timeText(times[Math.min(state.moment, times.length - 1)]) : "";
     fill(element("map"), Object.keys(scene.maps), state.map);
+    const preview = state.quantity === "preview";
+    if (preview && state.cut === "off") element("map").closest("label").hidden = true;
     element("log").checked = state.logarithmic;
     element("linear").checked = !state.logarithmic;
-    element("scales").hidden = element("ranges").hidden = state.quantity === "preview";
+    element("ranges").hidden = preview;
+    element("scales").hidden = preview || !field.logarithmic;
     for (const [i, end] of ["bottom", "top"].entries()) {
       const input = element(end);
       input.value = shortText(range[i]);

@@ -8,8 +8,9 @@ import { label, tableOf, textureOf } from "./colours.js";
 import { Fields, rangeOf, ALL } from "./fields.js";
 import { Sharpness } from "./sharpness.js";
 import { drawAxes, drawBar, drawNothing, drawScale, drawWhite, pen } from "./legend.js";
+import { listenToKeys, listenToPicks } from "./listen.js";
 import { Labels, hideEndOn, makeArrows, makeRegion } from "./marks.js";
-import { Panel, SWITCHES, element } from "./panel.js";
+import { Panel, element } from "./panel.js";
 import { firstHit } from "./pick.js";
 import { readPoint } from "./reading.js";
 import { Section } from "./section.js";
@@ -104,7 +105,7 @@ class Viewer {
     }
     this.show(await this.fields.values(this.field));
     await this.section.cut(this.state, this.plane);
-    this.panel.follow(this.state, this.fields, this.range);
+    this.panel.follow(this.state, this.fields, this.field, this.range);
     await this.read();
     this.draw();
   }
@@ -149,6 +150,12 @@ class Viewer {
     const offset = low + position * (high - low);
     const side = axis.dot(this.view.toward) < 0 ? -1 : 1;
     return { normal: axis.clone().multiplyScalar(side).toArray(), offset: side * offset };
+  }
+
+  // Whether the cut leaves a place.
+  get keeps() {
+    const { plane } = this;
+    return ([x, y, z]) => !plane || x * plane.normal[0] + y * plane.normal[1] + z * plane.normal[2] <= plane.offset;
   }
 
   resize() {
@@ -218,10 +225,11 @@ class Viewer {
   // Pale marks of detectors that the body hides, found when the camera rests.
   hideBehind() {
     const along = this.view.toward;
+    const { keeps } = this;
     for (const { kind, place, element: mark } of this.labels.labels) {
       if (kind !== "detectors" && kind !== "picked") continue;
       const start = place.clone().addScaledVector(along, 2e-3 * this.view.diagonal).toArray();
-      const hit = firstHit(this.points, this.triangles, start, along.toArray(), () => true, 0);
+      const hit = firstHit(this.points, this.triangles, start, along.toArray(), keeps, 0);
       mark.classList.toggle("behind", hit !== null);
     }
   }
@@ -230,11 +238,8 @@ class Viewer {
   async pick(x, y) {
     const [width, height] = this.size;
     const { start, along } = this.view.ray((2 * x) / width - 1, 1 - (2 * y) / height);
-    const plane = this.plane;
-    const keeps = ([px, py, pz]) =>
-      !plane || px * plane.normal[0] + py * plane.normal[1] + pz * plane.normal[2] <= plane.offset;
-    const outside = firstHit(this.points, this.triangles, start, along, keeps, -Infinity);
-    const inside = plane ? this.section.hit(start, along) : null;
+    const outside = firstHit(this.points, this.triangles, start, along, this.keeps, -Infinity);
+    const inside = this.plane ? this.section.hit(start, along) : null;
     this.picked = inside && (!outside || inside.distance < outside.distance) ? inside : outside;
     return this.read();
   }
@@ -247,37 +252,6 @@ class Viewer {
     this.draw();
     return Object.fromEntries(lines);
   }
-}
-
-// A click or a tap, not the end of a turn.
-function listenToPicks(viewer, canvas) {
-  let down = null;
-  canvas.addEventListener("pointerdown", (event) => {
-    down = [event.clientX, event.clientY];
-    canvas.focus();
-  });
-  canvas.addEventListener("pointerup", (event) => {
-    const { left, top } = canvas.getBoundingClientRect();
-    const near = down && Math.hypot(event.clientX - down[0], event.clientY - down[1]) < 5;
-    if (near) viewer.pick(event.clientX - left, event.clientY - top);
-  });
-}
-
-function listenToKeys(viewer) {
-  const switches = Object.fromEntries(Object.entries(SWITCHES).map(([name, key]) => [key, name]));
-  window.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT)$/.test(event.target.tagName)) return;
-    const { state, size } = viewer;
-    const name = switches[event.key];
-    if (name) viewer.change({ [name]: !state[name] });
-    else if (event.key === "l") viewer.change({ logarithmic: !state.logarithmic });
-    else if (event.key === "c") {
-      const kinds = ["off", "x", "y", "z", "view"];
-      viewer.change({ cut: kinds[(kinds.indexOf(state.cut) + 1) % kinds.length] });
-    } else if (event.key === "Enter" && event.target.tagName !== "BUTTON") viewer.pick(size[0] / 2, size[1] / 2);
-    else if (!viewer.view.key(event.key)) return;
-    event.preventDefault();
-  });
 }
 
 export async function start(data) {
