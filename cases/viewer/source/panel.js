@@ -10,7 +10,7 @@ function fill(select, names, chosen, text = (name) => name) {
   select.closest("label").hidden = names.length < 2;
 }
 
-const TITLES = { preview: "colours", pulse: "exitance after a pulse" };
+const TITLES = { preview: "colours", pulse: "after a pulse" };
 
 // Names of all switches, and the keys that turn them.
 export const SWITCHES = { edges: "e", lights: "g", detectors: "d", regions: "r" };
