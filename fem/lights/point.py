@@ -25,7 +25,7 @@ FINEST_MEAN_FREE_PATH, FINEST_DIAGONAL = 0.1, 0.02
 
 @dataclass(frozen=True)
 class PointSource:
-    """An isotropic point source: ``Q0 = power delta(x - position)``, ``Q1 = 0`` (CS667 notes, eqs. 4 and 7).
+    """An isotropic point source: ``Q0 = power delta(x - position)``, ``Q1 = 0`` (CS667 notes, equations 4 and 7).
 
     Parameters
     ----------

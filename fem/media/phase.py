@@ -149,6 +149,14 @@ def two_term(g1: float, g2: float, share: float) -> Lobes:
     ------
     InputError
         If an argument is out of range.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium
+    >>> lobes = two_term(0.9, -0.2, share=0.95)
+    >>> round(lobes.mean_cosine, 3)
+    0.845
+    >>> tissue = Medium(sigma_a=0.01, sigma_s=10.0, phase=lobes, eta=1.4)
     """
     _check_cosine("g1", g1)
     _check_cosine("g2", g2)
@@ -179,6 +187,11 @@ def table(angles: npt.ArrayLike, values: npt.ArrayLike) -> Table:
     InputError
         If the angles do not ascend from 0 to 180, a value is negative or not finite, or the integral over all
         directions, ``2 pi ∫ p sin(theta) dtheta``, is off 1 by more than 2 %.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> isotropic = table([0, 90, 180], [1 / (4 * pi)] * 3)
     """
     theta, p = np.asarray(angles, dtype=float), np.asarray(values, dtype=float)
     if theta.ndim != 1 or theta.shape != p.shape or len(theta) < 2:

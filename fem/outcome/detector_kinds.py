@@ -21,6 +21,10 @@ class PointDetector:
     ------
     InputError
         If a coordinate is not finite.
+
+    Examples
+    --------
+    >>> spot = PointDetector((10.0, 0.0, 3.0))
     """
 
     position: Vector
@@ -44,6 +48,10 @@ class DiscDetector:
     ------
     InputError
         If a coordinate is not finite or the radius not greater than 0.
+
+    Examples
+    --------
+    >>> disc = DiscDetector(center=(10.0, 0.0, 0.0), radius=0.5)
     """
 
     center: Vector
@@ -72,6 +80,10 @@ class FibreDetector(DiscDetector):
     ------
     InputError
         If a coordinate is not finite, the radius not greater than 0 or the aperture out of range.
+
+    Examples
+    --------
+    >>> fibre = FibreDetector(center=(10.0, 0.0, 0.0), radius=0.3, numerical_aperture=0.37)
     """
 
     numerical_aperture: float

@@ -59,6 +59,16 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
     InputError
         If a point is farther from the surface than 5 % of the body's diagonal, or a disc's center farther than its
         radius; or if the surface is not flat enough for the disc, or ends under it.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointDetector, PointSource, solve
+    >>> from tetlux.meshing import sphere
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> solution = solve(sphere(radius=10.0), medium, [PointSource((0, 0, 0))], model="closed-form")
+    >>> reading = read(PointDetector((10.0, 0.0, 0.0)), solution)
+    >>> bool(0 < reading.exitance < 1 / (4 * 3.14 * 10**2))  # W/mm², less than without absorption
+    True
     """
     return read_all([detector], solution)[0]
 

@@ -38,6 +38,16 @@ def radiance(solution: ExitanceField, points: npt.ArrayLike, viewer: npt.ArrayLi
     ------
     InputError
         If coordinates are not finite or do not go together.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointSource, solve
+    >>> from tetlux.meshing import sphere
+    >>> medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> solution = solve(sphere(radius=10.0), medium, [PointSource((0, 0, 0))], model="closed-form")
+    >>> seen = radiance(solution, [[0, 0, 10], [0, 0, -10]], viewer=(0, 0, 100))
+    >>> seen.shape, bool(seen[0] > 0), float(seen[1])  # the other side faces away
+    ((2,), True, 0.0)
     """
     wanted, eye = np.asarray(points, dtype=float), np.asarray(viewer, dtype=float)
     if wanted.ndim != 2 or wanted.shape[1] != 3 or not np.isfinite(wanted).all():

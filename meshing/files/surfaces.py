@@ -53,6 +53,10 @@ def read_surface(path: str | Path, *, unit: str = "mm", scale: float = 1.0, hole
     ------
     InputError
         If the file is missing, unreadable, no mesh, or bounds no body.
+
+    Examples
+    --------
+    >>> scan = read_surface("scan.obj", unit="mm", scale=1000, holes="close")  # doctest: +SKIP
     """
     path = Path(path)
     if not np.isfinite(scale) or scale <= 0:
