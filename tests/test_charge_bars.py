@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from tests.benchmarks.reading_scenes import random_scene
+from tests.benchmarks.readings import TOLERANCE, measure
 from tests.conftest import TISSUE
 from tetlux.fem import DiffuseLight, DiscDetector, Medium, PencilBeam, PointDetector, PointSource, Region, read, solve
 from tetlux.fem.exact import layered_ball
@@ -72,3 +74,14 @@ def test_corners_and_discs_have_bars_too() -> None:
         assert abs(coarse.exitance / better.exitance - 1.0) < 3.0 * (coarse.relative_error + better.relative_error)
         assert better.relative_error < coarse.relative_error < 0.5
     assert read(detectors[1], fine).relative_error == pytest.approx(fine.readings[1].relative_error, rel=1e-6)
+
+
+def test_bars_of_readings_are_about_as_large_as_their_errors() -> None:
+    """Plates of which the residual far from a detector counts: two or more lie beyond where its sum is left out."""
+    errors, bars = np.zeros(0), np.zeros(0)
+    for number in (7, 13, 31):
+        error, bar, _, _ = measure(random_scene(number), TOLERANCE, charges=True)
+        errors, bars = np.append(errors, error), np.append(bars, bar)
+    assert (errors <= TOLERANCE).all()
+    assert (errors <= 2.0 * bars).all()
+    assert 0.7 <= np.median(bars / errors) <= 4.0

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tests.benchmarks.reading_scenes import places_on_ball
+from tests.benchmarks.reading_scenes import places_on_ball, random_scene
+from tests.benchmarks.readings import TOLERANCE, measure
 from tests.conftest import TISSUE
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder
@@ -83,6 +84,14 @@ def test_readings_along_a_rod_are_those_of_its_series() -> None:
     truth = exact_cylinder.point_exitance(TISSUE, radius=6.0, source_radius=5.0, theta=theta, z=z)
     _, read, bars = read_by_charges(cylinder(6.0, 120.0), TISSUE, [PointSource((5.0, 0.0, 0.0))], places, 0.01)
     assert (np.abs(read / truth - 1.0) <= np.minimum(2.0 * bars, 0.01)).all()
+
+
+def test_a_long_rod_takes_no_more_charges_than_others() -> None:
+    """Charges closest together on ways that are narrow beside the rod were 4,600 in place of 100."""
+    errors, bars, _, size = measure(random_scene(6021), TOLERANCE, charges=True)
+    assert int(size.split()[0]) < 400
+    assert errors.max() < TOLERANCE
+    assert (errors <= 2.0 * bars).all()
 
 
 def test_few_and_many_charges_read_within_their_bars_on_the_far_side_of_a_torus() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.field import ChargeField
+from tetlux.fem.charges.kernel import Equation
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.readings import ReadingGoal, ripple_errors
@@ -19,8 +20,8 @@ from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 
-# Relative error that is always added, for that of the smooth surface that triangles stand for.
-LEAST_RELATIVE_ERROR = 1e-5
+# Relative error that is always added: rounding of large strengths of charges.
+LEAST_RELATIVE_ERROR = 1e-6
 
 
 def reading_errors(
@@ -59,7 +60,25 @@ def reading_errors(
     _, residual = field.exitance_and_residual(checked.points, checked.normals)
     violation, apart = residual - boundary_source, spacing[tree.query(checked.points)[1]]
     if goal is not None:
-        return goal.at(points).relative_errors(checked, apart, violation, exitance) + LEAST_RELATIVE_ERROR
-    with np.errstate(divide="ignore", invalid="ignore"):
-        errors = ripple_errors(field.equation, checked, apart, violation, points) / np.abs(exitance)
-    return np.asarray(errors + LEAST_RELATIVE_ERROR)
+        errors = goal.at(points).relative_errors(checked, apart, violation, exitance)
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            errors = ripple_errors(field.equation, checked, apart, violation, points) / np.abs(exitance)
+    return np.asarray(
+        np.hypot(errors, _errors_of_smooth_surface(surface, field.equation, points)) + LEAST_RELATIVE_ERROR
+    )
+
+
+def _errors_of_smooth_surface(surface: Surface, equation: Equation, points: FloatArray) -> FloatArray:
+    """Relative errors of the exitance at points (d, 3), as the smooth surface lies beside the true one, (d,).
+
+    Over a triangle of side h on a ball of radius R the smooth surface rises by s = h²/(6R), and lies about s²/R, which
+    is 6s³/h², off the ball: 2.6e-5 with 5,120 triangles and a radius of 28.8, where the root mean square is 2.6e-5.
+    """
+    faces = surface.closest(points)[1]
+    corners = surface.points[surface.faces[faces]]
+    middles = corners.mean(axis=1)
+    rise = np.linalg.norm(surface.on_curve(faces, middles)[0] - middles, axis=1)
+    sides = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).mean(axis=1)
+    zb = 2.0 * equation.boundary_factor * equation.diffusion
+    return np.asarray(6.0 * rise**3 / sides * (1.0 / zb + abs(equation.wave_number)))
