@@ -65,7 +65,9 @@ def test_points_and_beams_are_not_fitted(coarse: TetMesh, light: Light, monkeypa
     assert abs(found.power.balance_error) < 1e-12
     monkeypatch.setattr("tetlux.fem.system.fitting_of", lambda *_: None)
     plain = System(coarse, medium, sphere(10.0)).solve([light, DiffuseLight(1.0)])
-    np.testing.assert_allclose(found.of_lights[0].fluence, plain.of_lights[0].fluence, rtol=1e-12)
+    # Up to rounding, which shows where the fluence is far below its maximum.
+    fluence = plain.of_lights[0].fluence
+    np.testing.assert_allclose(found.of_lights[0].fluence, fluence, rtol=1e-12, atol=1e-15 * fluence.max())
     assert not np.allclose(found.of_lights[1].fluence, plain.of_lights[1].fluence, rtol=0.1)
 
 
