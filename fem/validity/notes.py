@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium
@@ -156,7 +154,7 @@ def _albedo_notes(validity: Validity) -> list[str]:
 def _distance_notes(validity: Validity) -> list[str]:
     found: list[str] = []
     middles = validity.middles
-    distances, near = validity.distances(middles), validity.near_errors(middles)
+    distances, near = validity.distances(middles), validity.facet_near_errors
     close = distances < NEAR
     if (near[close] > NOTABLE_ERROR).any():
         error = validity.mean(near * close) / validity.mean(close)
@@ -172,7 +170,7 @@ def _distance_notes(validity: Validity) -> list[str]:
                 value=error,
             )
         )
-    dim = validity.far_errors(middles, np.arange(len(middles))) > NOTABLE_FAR_ERROR
+    dim = validity.facet_far_errors > NOTABLE_FAR_ERROR
     if validity.mean(dim) > NEGLIGIBLE_SHARE:
         found.append(
             Note(
