@@ -34,9 +34,6 @@ BYTES_PER_TETRAHEDRON_GIVEN, BYTES_PER_TETRAHEDRON_REFINED = 1000.0, 1600.0
 # quadratic elements, where detectors are read (measured on 74,000 tetrahedra).
 BYTES_PER_MATRIX, BYTES_PER_LIGHT, BYTES_OF_READINGS = 120.0, 20.0, 3750.0
 
-# What a control group of version 1 without a limit has is near 2**63.
-UNLIMITED = 2**60
-
 
 def estimate_memory(
     tetrahedra: int, matrices: int = 1, lights: int = 1, *, refined: bool = False, reading: bool = False
@@ -158,9 +155,8 @@ def _left_by_groups(root: Path) -> Iterator[float]:
             group = base / path.lstrip("/")
             for folder in (group, *group.parents):
                 with suppress(OSError, ValueError):
-                    most = int((folder / limit).read_text())
-                    if most < UNLIMITED:
-                        yield float(most - int((folder / usage).read_text()) + _reclaimable_cache(folder))
+                    left = int((folder / limit).read_text()) - int((folder / usage).read_text())
+                    yield float(left + _reclaimable_cache(folder))
                 if folder == base:
                     break
 

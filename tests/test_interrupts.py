@@ -1,7 +1,6 @@
 """Interrupts and full disks in the middle of a batch: nothing is lost, and nothing is half-written."""
 
 import os
-import resource
 import signal
 import sys
 from pathlib import Path
@@ -82,6 +81,8 @@ def test_a_run_whose_files_are_there_has_its_row(tmp_path: Path, monkeypatch: py
 
 
 def test_a_full_disk_leaves_no_half_row_and_no_half_log(tmp_path: Path) -> None:
+    import resource  # noqa: PLC0415 - not on Windows
+
     table, log = TableFile(tmp_path / "results.csv", ("run",), ("power",)), tmp_path / "logs" / "ball" / "b.log"
     table.replace([{"run": "ball/a", "power": 1.0}])
     before, size = table.path.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -89,7 +90,7 @@ def test_a_full_disk_leaves_no_half_row_and_no_half_log(tmp_path: Path) -> None:
     logs(BatchStarted(("ball/a", "ball/b"), tmp_path, 1))
     resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 5, size[1]))
     try:
-        with pytest.raises(OSError, match="No space left|too large"):
+        with pytest.raises(OSError, match=r"No space left|too large"):
             table.append([{"run": "ball/b", "power": 2.0}])
         logs(RunFailed(1, "ball/b", "no luck.", 1.0))
     finally:

@@ -44,9 +44,7 @@ class _Interrupted:
     """The user wants the batch to stop. As an answer among the others it loses none of them."""
 
 
-def run_in_processes(
-    batch: Batch, count: int, listener: Listener, launcher: Launcher, interrupts: Interrupts
-) -> None:
+def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Launcher, interrupts: Interrupts) -> None:
     """Do a batch in worker processes.
 
     Parameters

@@ -1,7 +1,7 @@
 """`Entry`: where one light enters a body, and the expected errors of diffusion near there."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -10,7 +10,7 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.validity.facet_media import LocalMedia, media_in
 from tetlux.fem.validity.tables import NEAR_LIMIT, Spread, near_error, near_rows
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.tets.mesh import TetMesh
 
 
@@ -37,7 +37,6 @@ class Entry:
     radius: float
     near: FloatArray
     by_cosine: bool = False
-    _last: list[tuple[FloatArray, tuple[FloatArray, IntArray]]] = field(default_factory=list, repr=False)
 
     @property
     def spread(self) -> Spread:
@@ -48,20 +47,20 @@ class Entry:
 
     def lengths(self, points: FloatArray) -> FloatArray:
         """Distances of points (q, 3) from the nearest place, (q,), unit; 0 for light everywhere."""
-        return np.zeros(len(points)) if self.places is None else self._nearest(points)[0]
+        return np.zeros(len(points)) if self.places is None else np.asarray(self.places.query(points)[0])
 
     def distances(self, points: FloatArray) -> FloatArray:
         """The same in transport mean free paths at that place."""
         if self.places is None:
             return np.zeros(len(points))
-        lengths, nearest = self._nearest(points)
+        lengths, nearest = self.places.query(points)
         return np.asarray(lengths / self.media.mean_free_path[nearest])
 
     def lacks_cosine(self, points: FloatArray) -> BoolArray:
         """Whether the errors at points (q, 3) depend on a mean cosine that is unknown, (q,)."""
         if self.places is None or not self.by_cosine:
             return np.zeros(len(points), dtype=bool)
-        return np.asarray(self.media.cosine_assumed[self._nearest(points)[1]])
+        return np.asarray(self.media.cosine_assumed[self.places.query(points)[1]])
 
     def errors(self, points: FloatArray) -> FloatArray:
         """Expected errors at points (q, 3) from being near the light, (q,)."""
@@ -69,23 +68,8 @@ class Entry:
             return np.zeros(len(points))
         # The errors of thin beams have either sign and cancel within a beam of some radius: see the last table of
         # `tests.tables.validity`. The rim of a wide beam is neglected.
-        lengths, nearest = self._nearest(points)
-        return near_error(self.near[nearest], np.hypot(lengths, self.radius) / self.media.mean_free_path[nearest])
-
-    def _nearest(self, points: FloatArray) -> tuple[FloatArray, IntArray]:
-        """Distances of points (q, 3) from the nearest place, (q,), unit, and which that is, (q,).
-
-        Those of the last points that cannot be written to are kept: middles of facets are asked for many times.
-        """
-        assert self.places is not None
-        for last, found in self._last:
-            if last is points:
-                return found
         lengths, nearest = self.places.query(points)
-        at_points = np.asarray(lengths), np.asarray(nearest)
-        if not points.flags.writeable:
-            self._last[:] = [(points, at_points)]
-        return at_points
+        return near_error(self.near[nearest], np.hypot(lengths, self.radius) / self.media.mean_free_path[nearest])
 
 
 def entry_of(deposit: Deposit, mesh: TetMesh, coefficients: Coefficients, below: LocalMedia) -> Entry:

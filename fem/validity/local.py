@@ -13,7 +13,7 @@ from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.validity.entry import Entry, entry_of
 from tetlux.fem.validity.facet_media import LocalMedia, media_under_facets
 from tetlux.fem.validity.tables import far_error, thin_error, wide_error
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, freeze
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -74,12 +74,10 @@ class Validity:
         (q,) ndarray
             The largest of the errors by each cause.
         """
-        return self._largest(facets, self.far_errors(points, facets), self.near_errors(points))
-
-    def _largest(self, facets: IntArray, far: FloatArray, near: FloatArray) -> FloatArray:
-        """The largest of the errors by each cause, (q,), at points on given boundary facets (q,)."""
-        wide = wide_error(self.below.albedo[facets], self.coefficients.outer.eta)
-        return np.asarray(np.max([wide, self.thin_errors[facets], far, near], axis=0))
+        below = self.below[facets]
+        causes = [wide_error(below.albedo, self.coefficients.outer.eta), self.thin_errors[facets]]
+        causes += [self.far_errors(points, facets), self.near_errors(points)]
+        return np.asarray(np.max(causes, axis=0))
 
     def distances(self, points: FloatArray) -> FloatArray:
         """Distances of points (q, 3) from the nearest light, (q,), in transport mean free paths where it enters.
@@ -150,22 +148,12 @@ class Validity:
     @cached_property
     def middles(self) -> FloatArray:
         """Centroids of the boundary facets, (f, 3)."""
-        return freeze(self.mesh.points[self.mesh.boundary_faces].mean(axis=1))
-
-    @cached_property
-    def facet_near_errors(self) -> FloatArray:
-        """`near_errors` at the centroids of the boundary facets, (f,)."""
-        return self.near_errors(self.middles)
-
-    @cached_property
-    def facet_far_errors(self) -> FloatArray:
-        """`far_errors` at the centroids of the boundary facets, (f,)."""
-        return self.far_errors(self.middles, np.arange(len(self.middles)))
+        return np.asarray(self.mesh.points[self.mesh.boundary_faces].mean(axis=1))
 
     @cached_property
     def facet_errors(self) -> FloatArray:
         """Expected errors at the centroids of the boundary facets, (f,)."""
-        return self._largest(np.arange(len(self.middles)), self.facet_far_errors, self.facet_near_errors)
+        return self.errors(self.middles, np.arange(len(self.middles)))
 
     def mean(self, values: npt.NDArray[np.float64 | np.bool_]) -> float:
         """Mean over the surface of values of the boundary facets (f,)."""

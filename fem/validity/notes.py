@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium
@@ -154,7 +156,7 @@ def _albedo_notes(validity: Validity) -> list[str]:
 def _distance_notes(validity: Validity) -> list[str]:
     found: list[str] = []
     middles = validity.middles
-    distances, near = validity.distances(middles), validity.facet_near_errors
+    distances, near = validity.distances(middles), validity.near_errors(middles)
     close = distances < NEAR
     if (near[close] > NOTABLE_ERROR).any():
         error = validity.mean(near * close) / validity.mean(close)
@@ -170,7 +172,7 @@ def _distance_notes(validity: Validity) -> list[str]:
                 value=error,
             )
         )
-    dim = validity.facet_far_errors > NOTABLE_FAR_ERROR
+    dim = validity.far_errors(middles, np.arange(len(middles))) > NOTABLE_FAR_ERROR
     if validity.mean(dim) > NEGLIGIBLE_SHARE:
         found.append(
             Note(
