@@ -175,7 +175,7 @@ def test_a_fault_while_writing_leaves_no_half_result(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(run, "write_mesh", full)
-    with pytest.raises(RunError, match="No space left on device; choose another folder"):
+    with pytest.raises(RunError, match="No space left on device; make room, or choose another folder"):
         run_case(case, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
 

@@ -3,12 +3,12 @@
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, Listener, RunFailed, RunFinished
+from tetlux.cases.batch.events import BatchEnded, BatchStarted, Event, Listener, RunFailed, RunFinished, RunStarted
 from tetlux.cases.batch.grouping import make_plan
 from tetlux.cases.batch.jobs import MeshJob
 from tetlux.cases.batch.launch import Launcher
@@ -17,7 +17,7 @@ from tetlux.cases.batch.processes import run_in_processes
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.batch.workshop import Workshop
 from tetlux.cases.file.case import Case
-from tetlux.cases.interrupts import uninterrupted
+from tetlux.cases.interrupts import Interrupts
 from tetlux.cases.planning import plan_models
 from tetlux.cases.run import SUMMARY
 from tetlux.cases.write.content import content_of
@@ -80,18 +80,23 @@ def run_batch(
     """
     check_writable(out)
     contents = [content_of(case) for case in cases]
-    kept = _finished(cases, out, contents) if resume else {}
+    kept = _finished(cases, out, contents, range(len(cases))) if resume else {}
     cases = plan_models(cases)
     plan = make_plan(cases)
     batch = Batch(plan, cases, frozenset(kept), str(out.absolute()), cache, MeshStore(out, plan, contents))
-    with _workers(scheduler, worker_count(jobs, len(cases) - len(kept)), launcher) as (workers, run_on):
-        track = _Track(len(cases), listeners)
+    count = worker_count(jobs, len(cases) - len(kept))
+    with _workers(scheduler, count, launcher) as (workers, run_on), Interrupts() as interrupts:
+        track = _Track(len(cases), listeners, interrupts)
         track(BatchStarted(plan.names, out, workers, tuple(str(case.source) for case in cases)))
         for run, summary in kept.items():
             track(RunFinished(run, plan.names[run], out / plan.names[run], summary, 0.0, kept=True))
         try:
             run_on(batch, track)
         except BaseException as error:
+            # Their files may be there although nobody has said so.
+            for run, summary in _finished(cases, out, contents, track.in_flight).items():
+                folder, seconds = out / plan.names[run], summary["seconds"]["total"]
+                track(RunFinished(run, plan.names[run], folder, summary, seconds, notes=tuple(summary["warnings"])))
             track.end("interrupted" if isinstance(error, KeyboardInterrupt) else "stopped")
             raise
         ended = track.end("stopped" if track.left else "complete")
@@ -112,7 +117,7 @@ def _workers(
             yield len(client.nthreads()), lambda batch, track: run_on_cluster(batch, client, track)
     elif count > 1:
         with launcher or Launcher() as used:
-            yield count, lambda batch, track: run_in_processes(batch, count, track, used)
+            yield count, lambda batch, track: run_in_processes(batch, count, track, used, track.interrupts)
     else:
         yield 1, _run_here
 
@@ -144,15 +149,17 @@ def _run_here(batch: Batch, track: "_Track") -> None:
             workshop.solve(job)
 
 
-def _finished(cases: Sequence[Case], out: Path, contents: Sequence[str]) -> dict[int, dict[str, Any]]:
-    """The summaries of runs that an earlier batch has finished, by number."""
+def _finished(
+    cases: Sequence[Case], out: Path, contents: Sequence[str], runs: Iterable[int]
+) -> dict[int, dict[str, Any]]:
+    """The summaries of those runs, by number, that are finished, now or by an earlier batch."""
     found = {}
-    for number, (case, content) in enumerate(zip(cases, contents, strict=True)):
+    for number in runs:
         try:
-            summary = json.loads((out / case.name / SUMMARY).read_text(encoding="utf-8"))
+            summary = json.loads((out / cases[number].name / SUMMARY).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             continue
-        if isinstance(summary, dict) and summary.get("content") == content:
+        if isinstance(summary, dict) and summary.get("content") == contents[number]:
             found[number] = summary
     return found
 
@@ -160,14 +167,20 @@ def _finished(cases: Sequence[Case], out: Path, contents: Sequence[str]) -> dict
 class _Track:
     """Counts runs by outcome, and passes events on."""
 
-    def __init__(self, runs: int, listeners: Sequence[Listener]) -> None:
+    def __init__(self, runs: int, listeners: Sequence[Listener], interrupts: Interrupts) -> None:
         self._runs, self._listeners, self._counts = runs, listeners, Counter[str]()
+        self.interrupts = interrupts
         self._started = time.perf_counter()
         self.must_stop = False
+        self.in_flight: set[int] = set()
 
     def __call__(self, event: Event) -> None:
         # By all or by none: an interrupt in between would leave a table locked, or a row out.
-        with uninterrupted():
+        with self.interrupts.wait():
+            if isinstance(event, RunStarted):
+                self.in_flight.add(event.run)
+            elif isinstance(event, RunFinished | RunFailed):
+                self.in_flight.discard(event.run)
             if isinstance(event, RunFinished):
                 self._counts["kept" if event.kept else "finished"] += 1
             elif isinstance(event, RunFailed):

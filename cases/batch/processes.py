@@ -13,6 +13,7 @@ from tetlux.cases.batch.jobs import Job, JobEnded, MeshJob, MeshMade, MeshNotMad
 from tetlux.cases.batch.launch import Launcher, worker_names
 from tetlux.cases.batch.schedule import Batch, Schedule
 from tetlux.cases.batch.wire import Sender, receive
+from tetlux.cases.interrupts import Interrupts
 from tetlux.meshing.errors import RunError
 
 # Workers that die before they have answered anything: there is something wrong with the machine, not with a run.
@@ -38,7 +39,12 @@ class _Gone:
     """A worker's answers have ended."""
 
 
-def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Launcher) -> None:
+@dataclass(frozen=True)
+class _Interrupted:
+    """The user wants the batch to stop. As an answer among the others it loses none of them."""
+
+
+def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Launcher, interrupts: Interrupts) -> None:
     """Do a batch in worker processes.
 
     Parameters
@@ -49,6 +55,7 @@ def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Lau
     listener : callable
         Is called with each event, in this thread.
     launcher : Launcher
+    interrupts : Interrupts
 
     Raises
     ------
@@ -59,7 +66,7 @@ def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Lau
     """
     pool = _Pool(batch, count, listener, launcher)
     try:
-        pool.work()
+        pool.work(interrupts)
     finally:
         pool.kill()
 
@@ -69,24 +76,20 @@ class _Pool:
         self._schedule, self._listener, self._count = Schedule(batch), listener, count
         self._launcher = launcher
         launcher.prepare(count)
-        self._answers: queue.SimpleQueue[tuple[_Worker, Any]] = queue.SimpleQueue()
+        self._answers: queue.SimpleQueue[tuple[_Worker | None, Any]] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._deaths_at_start = 0
         self._stopping = self._interrupted = False
 
-    def work(self) -> None:
+    def work(self, interrupts: Interrupts) -> None:
         """Hand out jobs until all are done."""
-        while True:
-            try:
+        # Putting into a `SimpleQueue` is safe anywhere, also within getting from it.
+        with interrupts.tell(lambda: self._answers.put((None, _Interrupted()))):
+            while True:
                 self._hand_out()
                 if not any(worker.job for worker in self._workers):
                     break
                 self._take(*self._answers.get())
-            except KeyboardInterrupt:
-                if self._interrupted:
-                    raise
-                self._interrupted = True
-                self._stop()
         if self._interrupted:
             raise KeyboardInterrupt
 
@@ -141,8 +144,12 @@ class _Pool:
                 self._answers.put((worker, answer))
         self._answers.put((worker, _Gone()))
 
-    def _take(self, worker: _Worker, answer: object) -> None:
-        """Take an answer of a worker."""
+    def _take(self, worker: _Worker | None, answer: object) -> None:
+        """Take an answer of a worker, or an interrupt."""
+        if worker is None:
+            self._interrupted = True
+            self._stop()
+            return
         worker.has_answered = True
         if isinstance(answer, _Gone):
             self._replace(worker)

@@ -1,6 +1,7 @@
 """`TableFile`: a CSV file that grows row by row and is replaced as a whole when its columns change."""
 
 import csv
+import errno
 import io
 import os
 import re
@@ -82,8 +83,12 @@ class TableFile:
         if not columns or any(name not in columns for row in rows for name in row):
             self.replace([*self.read(), *rows])
             return
-        with self.path.open("ab") as file:
-            file.write(_lines(rows, columns).encode("utf-8", "replace"))
+        with self.path.open("ab", buffering=0) as file:
+            end, lines = file.tell(), _lines(rows, columns).encode("utf-8", "replace")
+            if file.write(lines) < len(lines):
+                # A full disk takes a part of it.
+                file.truncate(end)
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def replace(self, rows: Sequence[Row]) -> list[str]:
         """Write the whole table, all or nothing, and return its columns.

@@ -13,6 +13,8 @@ from tetlux.meshing.errors import InputError, RunError
 
 # Errors of file systems that do not support locks.
 WITHOUT_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.EBADF)
+# Errors of disks without room.
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 @contextmanager
@@ -115,9 +117,11 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
     OSError
         If a file cannot be removed or moved.
     """
-    for name in reversed(names):
-        (target / name).unlink(missing_ok=True)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        for name in reversed(names):
+            (target / name).unlink(missing_ok=True)
+    else:
+        target.parent.mkdir(parents=True, exist_ok=True)
     try:
         # In one step, unless the target exists and is not empty.
         folder.rename(target)
@@ -175,11 +179,12 @@ def check_writable(out: Path) -> None:
 
 def disk_is_full(error: BaseException) -> bool:
     """Whether results cannot be written because there is no room."""
-    return isinstance(error.__cause__, OSError) and error.__cause__.errno in (errno.ENOSPC, errno.EDQUOT)
+    return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
 
 
 def write_error(target: Path, error: OSError) -> RunError:
     """The error to raise when results cannot be written."""
+    room = "make room, or " if error.errno in FULL else ""
     return RunError(
-        f"results cannot be written to {target}: {error.strerror or error}; choose another folder with --out."
+        f"results cannot be written to {target}: {error.strerror or error}; {room}choose another folder with --out."
     )

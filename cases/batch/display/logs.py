@@ -45,9 +45,13 @@ class RunLogs:
     def _write(self, run: int) -> None:
         lines = self._lines.pop(run)
         path = self._out / FOLDER / f"{self._names[run]}.log"
-        with suppress(OSError):
+        try:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
+        except OSError:
+            # What a full disk leaves of it is of no use.
+            with suppress(OSError):
+                path.unlink()
 
 
 def _line(seconds: float, text: str) -> str:
