@@ -117,11 +117,9 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
     OSError
         If a file cannot be removed or moved.
     """
-    if target.exists():
-        for name in reversed(names):
-            (target / name).unlink(missing_ok=True)
-    else:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    for name in reversed(names):
+        (target / name).unlink(missing_ok=True)
+    target.parent.mkdir(parents=True, exist_ok=True)
     try:
         # In one step, unless the target exists and is not empty.
         folder.rename(target)
