@@ -39,11 +39,6 @@ class _Gone:
     """A worker's answers have ended."""
 
 
-@dataclass(frozen=True)
-class _Interrupted:
-    """The user wants the batch to stop. As an answer among the others it loses none of them."""
-
-
 def run_in_processes(batch: Batch, count: int, listener: Listener, launcher: Launcher, interrupts: Interrupts) -> None:
     """Do a batch in worker processes.
 
@@ -76,7 +71,8 @@ class _Pool:
         self._schedule, self._listener, self._count = Schedule(batch), listener, count
         self._launcher = launcher
         launcher.prepare(count)
-        self._answers: queue.SimpleQueue[tuple[_Worker | None, Any]] = queue.SimpleQueue()
+        # An interrupt is None: as an answer among the others it loses none of them.
+        self._answers: queue.SimpleQueue[tuple[_Worker, Any] | None] = queue.SimpleQueue()
         self._workers: list[_Worker] = []
         self._deaths_at_start = 0
         self._stopping = self._interrupted = False
@@ -84,12 +80,17 @@ class _Pool:
     def work(self, interrupts: Interrupts) -> None:
         """Hand out jobs until all are done."""
         # Putting into a `SimpleQueue` is safe anywhere, also within getting from it.
-        with interrupts.tell(lambda: self._answers.put((None, _Interrupted()))):
+        with interrupts.tell(lambda: self._answers.put(None)):
             while True:
                 self._hand_out()
                 if not any(worker.job for worker in self._workers):
                     break
-                self._take(*self._answers.get())
+                answer = self._answers.get()
+                if answer is None:
+                    self._interrupted = True
+                    self._stop()
+                else:
+                    self._take(*answer)
         if self._interrupted:
             raise KeyboardInterrupt
 
@@ -144,12 +145,8 @@ class _Pool:
                 self._answers.put((worker, answer))
         self._answers.put((worker, _Gone()))
 
-    def _take(self, worker: _Worker | None, answer: object) -> None:
-        """Take an answer of a worker, or an interrupt."""
-        if worker is None:
-            self._interrupted = True
-            self._stop()
-            return
+    def _take(self, worker: _Worker, answer: object) -> None:
+        """Take an answer of a worker."""
         worker.has_answered = True
         if isinstance(answer, _Gone):
             self._replace(worker)

@@ -147,7 +147,9 @@ class Body:
 
         Parameters
         ----------
-        starts, directions : (r, 3) ndarray
+        starts : (r, 3) ndarray
+            Places on the surface.
+        directions : (r, 3) ndarray
             Unit vectors inwards.
 
         Returns

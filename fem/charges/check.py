@@ -54,8 +54,7 @@ def residual_wave_number(equation: Equation, spacing: FloatArray) -> FloatArray:
 
 def exitance_error(equation: Equation, residual: NumberArray, spacing: FloatArray) -> NumberArray:
     """Errors of the exitance that residuals (n,) of charges a spacing (n,) apart cause, (n,), W/unit²."""
-    zb = 2.0 * equation.boundary_factor * equation.diffusion
-    return np.asarray(residual / (1.0 + zb * residual_wave_number(equation, spacing)))
+    return np.asarray(residual / (1.0 + equation.extrapolation_length * residual_wave_number(equation, spacing)))
 
 
 def estimate_errors(

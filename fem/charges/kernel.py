@@ -45,6 +45,11 @@ class Equation:
         return 0.5 / self.boundary_factor
 
     @property
+    def extrapolation_length(self) -> float:
+        """``zb = 2 A D``, as of a medium, unit."""
+        return 2.0 * self.boundary_factor * self.diffusion
+
+    @property
     def dtype(self) -> npt.DTypeLike:
         """Type of the fluence."""
         return np.complex128 if isinstance(self.wave_number, complex) else np.float64

@@ -86,20 +86,21 @@ class ReadingGoal:
 
     def exitance_of_each(self, points: FloatArray) -> FloatArray:
         """Exitance at the detectors by a source on the surface far from them, at each point (n, 3), (d, n), 1/unit²."""
-        fading, distance, zb = self._fading_and_distance(points, SMOOTHED_SHARE)
-        return np.asarray(zb / (2.0 * np.pi) * fading / distance**3)
+        fading, distance = self._fading_and_distance(points, SMOOTHED_SHARE)
+        return np.asarray(self.equation.extrapolation_length / (2.0 * np.pi) * fading / distance**3)
 
     def _effects(self, points: FloatArray) -> FloatArray:
         """The same also near the detectors."""
-        fading, distance, zb = self._fading_and_distance(points, LESS_SMOOTHED_SHARE)
+        fading, distance = self._fading_and_distance(points, LESS_SMOOTHED_SHARE)
+        zb = self.equation.extrapolation_length
         return np.asarray(zb / (2.0 * np.pi) * fading / (distance * (distance + zb) ** 2))
 
-    def _fading_and_distance(self, points: FloatArray, smoothed: float) -> tuple[FloatArray, FloatArray, float]:
-        """``(1 + k d) e^{-k d}``, the distance d from each detector, both (d, n), and zb."""
+    def _fading_and_distance(self, points: FloatArray, smoothed: float) -> tuple[FloatArray, FloatArray]:
+        """``(1 + k d) e^{-k d}``, and the distance d from each detector, both (d, n)."""
         length = smoothed * spacing_by_fading(self.distance, self.fading)(self.detectors)[:, None]
         distance = np.hypot(cdist(self.detectors, points), length)
         path = self.fading * distance
-        return (1.0 + path) * np.exp(-path), distance, 2.0 * self.equation.boundary_factor * self.equation.diffusion
+        return (1.0 + path) * np.exp(-path), distance
 
     def weight(self) -> Weight:
         """Weights of equations, up to a factor: the largest relative effect on a reading.
@@ -205,7 +206,6 @@ def reading_goal(
     tolerance : float
         Wanted relative error of each reading.
     """
-    zb = 2.0 * equation.boundary_factor * equation.diffusion
     depths = surface.distances(sources) if len(sources) else np.zeros(0)
-    injected = np.abs(powers) * (1.0 + depths / zb)
+    injected = np.abs(powers) * (1.0 + depths / equation.extrapolation_length)
     return ReadingGoal(equation, distance_from(surface, sources), sources, injected, abs(diffuse), detectors, tolerance)

@@ -80,5 +80,5 @@ def _errors_of_smooth_surface(surface: Surface, equation: Equation, points: Floa
     middles = corners.mean(axis=1)
     rise = np.linalg.norm(surface.on_curve(faces, middles)[0] - middles, axis=1)
     sides = np.square(corners - np.roll(corners, 1, axis=1)).sum(axis=2).mean(axis=1)
-    zb = 2.0 * equation.boundary_factor * equation.diffusion
-    return np.asarray(6.0 * rise**3 / sides * (1.0 / zb + abs(equation.wave_number)))
+    fading = 1.0 / equation.extrapolation_length + abs(equation.wave_number)
+    return np.asarray(6.0 * rise**3 / sides * fading)
