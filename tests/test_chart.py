@@ -514,7 +514,7 @@ def test_a_chart_that_cannot_be_written_leaves_the_old_one(
     assert (tmp_path / "chart.csv").read_text() == "old"
     assert capsys.readouterr().err == (
         f"tetlux: sphere failed: results cannot be written to {tmp_path}: No space left on device; "
-        "choose another folder with --out.\n"
+        "make room, or choose another folder with --out.\n"
     )
 
 
