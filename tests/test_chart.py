@@ -27,7 +27,7 @@ from tetlux.cases.chart.peers import PEERS, Peer, run_peer
 from tetlux.cases.chart.picture import STYLES
 from tetlux.cases.chart.planned import PLANNED
 from tetlux.cases.chart.reference import Reference
-from tetlux.cases.chart.runs import LONGEST_RUN, Measurement, exponents, measure_methods
+from tetlux.cases.chart.runs import LONGEST_RUN, SLOW_START, Measurement, exponents, measure_methods
 from tetlux.cases.chart.samples import Samples, relative_error, surface_samples
 from tetlux.cases.chart.statistics import fit_exponent, pareto_front
 from tetlux.cases.cli import main
@@ -299,7 +299,8 @@ def fake(name: str, seconds: list[float], off: list[float], *, comparable: bool 
 
 def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_benchmark: Benchmark) -> None:
     methods = [
-        fake("slow", [1.0, 1.1 * LONGEST_RUN, 1.0], [0.5, 0.1, 0.0]),
+        fake("slow", [5.0, 4.9 + LONGEST_RUN, 5.1 + LONGEST_RUN, 1.0], [0.6, 0.5, 0.1, 0.0]),
+        fake("slow at once", [1.1 * SLOW_START, 1.0], [0.5, 0.0]),
         fake("broken", [1.0, 2.0, 3.0], [0.4, math.nan, 0.2]),
         fake("other model", [1e-3], [0.01], comparable=False),
     ]
@@ -307,15 +308,18 @@ def test_runs_go_from_coarse_to_fine_until_one_is_too_long(ball_benchmark: Bench
     runs = measure_methods(few(ball_benchmark), methods, quick=False, report=lines.append)
     assert [(run.method, run.parameter, run.on_front) for run in runs] == [
         ("slow", "step=0", False),
-        ("slow", "step=1", True),
+        ("slow", "step=1", False),
+        ("slow", "step=2", True),
+        ("slow at once", "step=0", False),
         ("broken", "step=0", True),
         ("broken", "step=2", True),
         ("other model", "step=0", None),
     ]
-    assert [run.error for run in runs] == pytest.approx([0.5, 0.1, 0.4, 0.2, 0.01])
+    assert [run.error for run in runs] == pytest.approx([0.6, 0.5, 0.1, 0.5, 0.4, 0.2, 0.01])
     assert "  broken step=1: failed: the mesher failed." in lines
     assert [run.method for run in measure_methods(few(ball_benchmark), methods, quick=True, report=lines.append)] == [
         "slow",
+        "slow at once",
         "broken",
         "other model",
     ]

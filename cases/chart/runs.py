@@ -9,8 +9,9 @@ from tetlux.cases.chart.methods import Method, Outcome
 from tetlux.cases.chart.statistics import fit_exponent, pareto_front
 from tetlux.meshing.errors import TetluxError
 
-# A method is not run at finer resolutions after a run that took longer than this, seconds.
-LONGEST_RUN = 8.0
+# A method is not run at finer resolutions after a run that took longer than this, and than what its coarsest run took
+# in addition (a mesher's time hardly depends on the resolution), unless that was slow itself; seconds.
+LONGEST_RUN, SLOW_START = 8.0, 30.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,7 @@ def _measure(
 ) -> Iterator[Measurement]:
     """Run one method, from coarse to fine, until a run takes too long."""
     method.warm_up(benchmark)
+    longest: float | None = None
     for value in method.values_for(benchmark, quick=quick):
         name = f"{method.name} {method.label(value)}".strip()
         try:
@@ -91,7 +93,9 @@ def _measure(
         size = "" if outcome.unknowns is None else f", {outcome.unknowns:,} unknowns"
         report(f"  {name}: {outcome.seconds:.3g} s, error {error:.2%}{size}")
         yield _row(benchmark, method, value, outcome, error)
-        if outcome.seconds > LONGEST_RUN:
+        if longest is None:
+            longest = LONGEST_RUN + (outcome.seconds if outcome.seconds < SLOW_START else 0.0)
+        if outcome.seconds > longest:
             break
 
 

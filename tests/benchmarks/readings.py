@@ -80,9 +80,10 @@ def print_scenes(numbers: Iterable[int], tolerance: float, *, charges: bool, eac
     print("| scene | tetrahedra | seconds | median error | largest | largest bar | beyond 2 bars | beyond tolerance |")
     print("|---|---|---|---|---|---|---|---|")
     for number in numbers:
-        scene = random_scene(number)
-        name = f"{number} {scene.name}, albedo {scene.medium.albedo:.4f}"
+        name = str(number)
         try:
+            scene = random_scene(number)
+            name = f"{number} {scene.name}, albedo {scene.medium.albedo:.4f}"
             error, bar, seconds, size = measure(scene, tolerance, charges=charges)
         except TetluxError as failure:
             print(f"| {name} | {failure} |", flush=True)
