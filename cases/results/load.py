@@ -35,7 +35,7 @@ def load_results(folder: str | Path, table: Literal["results", "readings"] = "re
     -------
     pandas.DataFrame
         Swept values under their keys (lists as text). Lengths are in the unit of the column ``unit``, power is in W,
-        exitance and fluence in W/unit², seconds in s; see the table in README.
+        exitance and fluence in W/unit², seconds in s; see docs/results.md.
 
     Raises
     ------

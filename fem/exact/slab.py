@@ -2,7 +2,7 @@
 
 The boundary is either exact (Robin) or extrapolated: fluence vanishes on the planes ``z = -zb`` and ``z = L + zb``.
 These models differ as `half_space` and `dipole` do. All functions return values for unit power of a source at
-(0, 0, depth). For a wide beam see `slab_plane`.
+(0, 0, depth). For a wide beam see `slab_plane`. Symbols are those of `half_space`, and L is the thickness.
 """
 
 import math

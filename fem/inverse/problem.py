@@ -31,7 +31,7 @@ class FitProblem:
     lights : sequence of Light
     detectors : sequence of detectors
     regions : sequence of Region
-        Of which the surfaces count.
+        Only their surfaces are used; `unknowns` holds the media.
     unknowns : Unknowns
     readings : (c, l, d) ndarray
         Measured exitance of each channel, light and detector, W/unit²; nan where there is none.

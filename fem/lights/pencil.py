@@ -52,7 +52,7 @@ class PencilBeam:
         albedo. Across several media that is where the integral of sigma_t' along the beam is 1, and the albedo is
         `OpticalPaths.albedo`. A beam exactly along the interface of two media is taken to lie in one of them, the same
         one whichever of the two is the region. "line" lets the beam decay along its refracted path by delta-Eddington:
-        ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)``.
+        ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)``; symbols as for `CollimatedBeam`.
 
     Raises
     ------

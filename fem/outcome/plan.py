@@ -31,7 +31,7 @@ class Candidate:
     suits : bool
         Whether it can give what is asked for, within the tolerance.
     kind : str
-        What runs are told apart by that others are predicted from.
+        Kind of scene: past runs of the same kind refine predictions.
     learned : tuple of (float, float)
         Factors of past runs, see `tetlux.fem.planner.costs`, on the seconds and the error, which contain them.
     """
