@@ -1,8 +1,12 @@
 """How Sphinx builds these pages: ``python -m sphinx -W docs docs/_build``."""
 
+import re
+from typing import Any
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
+from sphinx.domains.python import PyObject
 from sphinx.writers.html5 import HTML5Translator
 
 project = "tetlux"
@@ -28,9 +32,12 @@ suppress_warnings = ["myst.xref_missing", "image.not_readable", "ref.python"]
 autosummary_generate = False
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
 napoleon_google_docstring = False
 napoleon_use_rtype = False
-default_role = "code"
+napoleon_use_ivar = True
+# Names in docstrings are links where the reference has them.
+default_role = "py:obj"
 # Blocks without a language are no program.
 highlight_language = "text"
 nitpicky = False
@@ -46,6 +53,32 @@ def _math_block(writer: HTML5Translator, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def _keep_first_line(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Keep the first line of a property whole: napoleon takes what is before its colon for a type."""
+    if what == "property":
+        lines[:0] = ["..", ""]
+
+
+def _split_names(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Give each of several attributes on one line a line of its own, as napoleon does for parameters."""
+    text = "\n".join(lines)
+    found = r"^:(ivar|vartype) (\w+), (\w+):(.*(?:\n +.*)*)$"
+    lines[:] = re.sub(found, r":\1 \2:\4\n:\1 \3:\4", text, flags=re.MULTILINE).split("\n")
+
+
+def _readable_signature(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, signature: str | None, returns: str | None
+) -> tuple[str | None, str | None]:
+    """Leave private parameters out, and the marks of defaults that are made anew for each object."""
+    if signature is not None:
+        signature = re.sub(r", _\w+=<factory>", "", signature).replace("=<factory>", "=...")
+    return signature, returns
+
+
 def setup(app: Sphinx) -> None:
-    """Write formulas as MathML, which browsers draw without a script."""
+    """Write formulas as MathML, which browsers draw without a script, and signatures as they are meant."""
     app.add_html_math_renderer("mathml", (_inline_math, None), (_math_block, None))
+    app.connect("autodoc-process-docstring", _keep_first_line, priority=400)
+    app.connect("autodoc-process-docstring", _split_names, priority=600)
+    next(field for field in PyObject.doc_field_types if field.name == "variable").label = "Attributes"
+    app.connect("autodoc-process-signature", _readable_signature)
