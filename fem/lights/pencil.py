@@ -43,7 +43,7 @@ class PencilBeam:
     direction : (3,) floats
         Of any length.
     power : float
-        W.
+        Power of the beam, W.
     radius : float
         Radius of the beam, unit; 0 is a beam without width.
     deposit : {"point", "line"}

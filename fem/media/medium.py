@@ -154,7 +154,7 @@ class Medium:
 
     @property
     def extrapolation_length(self) -> float:
-        """Zb = 2 A D, the distance outside the boundary at which the fluence extrapolates to zero, unit."""
+        """Extrapolation length zb = 2 A D: the fluence extrapolates to zero at this distance outside, unit."""
         return 2.0 * self.boundary_factor * self.diffusion
 
     @property

@@ -53,8 +53,10 @@ class ChargeSolution(Shown):
 
     Attributes
     ----------
-    surface, medium : Surface, Medium
-        Of the body.
+    surface : Surface
+        The surface of the body.
+    medium : Medium
+        The medium of the body, outside of its regions.
     interfaces : tuple of Interface
         The body's surface, then those of its regions.
     fields : tuple of ChargeField

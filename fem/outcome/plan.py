@@ -64,9 +64,11 @@ class Plan:
         The simplest first.
     tolerance : float or None
         Wanted relative L2 error of the exitance.
-    near_error, model_error : float
-        Expected relative errors of diffusion itself, which none of the models reduces: a mean free path from thin
-        beams and points, and elsewhere; see `tetlux.fem.validity.beforehand`.
+    near_error : float
+        Expected relative error of diffusion itself, which none of the models reduces, at one mean free path from thin
+        beams and points; see `tetlux.fem.validity.beforehand`.
+    model_error : float
+        The same elsewhere.
     runs : int
         Number of runs that share the plan.
 

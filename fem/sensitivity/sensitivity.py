@@ -71,9 +71,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of readings with respect to absorption and scattering, by adjoint solutions.
 
-    Each light and each detector takes one solution; the rest is products. The derivative to the coefficients of a
-    region is that of the reading as it is computed on this mesh, with the depths and powers of the lights, what is
-    subtracted and D, so that differences of readings of `System.solve` agree.
+    Each light and each detector takes one solution; the rest is products. The derivative with respect to the
+    coefficients of a region is that of the reading as it is computed on this mesh, including depths and powers of
+    lights, what is subtracted, and D, so that it agrees with differences of readings of `System.solve`.
 
     Parameters
     ----------

@@ -69,8 +69,10 @@ class Transient:
         Contours in the Laplace domain, one for each window of the times.
     scenes : tuple of tuple of QuadraticScene
         The light at each point of each contour.
-    mesh_error, reading_error : MeshError
-        The error that the mesh makes in the exitance of the surface, and in the reading of each detector.
+    mesh_error : MeshError
+        The error that the mesh makes in the exitance of the surface.
+    reading_error : MeshError
+        The error that the mesh makes in the reading of each detector.
     lights : tuple of int
         Numbers of the lights that shine, from 0.
     of_lights : tuple of Transient
