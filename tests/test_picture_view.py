@@ -275,7 +275,7 @@ def _drawn_marks(name: str, region: str, arrows: FloatArray) -> FloatArray:
     canvas = Canvas((200, 240), (1.0, 1.0, 1.0))
     marks = Marks([(region, coverage)], [name], np.array([[100.0, 60.0]]), np.zeros(1, bool), np.empty((0, 2)), arrows)
     draw_marks(canvas, marks, 0, 0)
-    return np.asarray(canvas.image, dtype=float).min(axis=2)
+    return np.asarray(np.asarray(canvas.image, dtype=float).min(axis=2))
 
 
 def test_names_of_detectors_leave_their_rings_free() -> None:
