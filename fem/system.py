@@ -135,7 +135,7 @@ class System:
 
     @cached_property
     def quadratic(self) -> QuadraticOperator:
-        """The operator that detectors are read by, of diffusion."""
+        """The operator of quadratic elements, by which detectors are read; for diffusion only."""
         inner = tuple(region.surface for region in self.regions)
         return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
 

@@ -41,7 +41,7 @@ class PencilBeam:
     origin : (3,) floats
         A point outside the body from which the beam starts, unit.
     direction : (3,) floats
-        Of any length.
+        Direction of travel, of any length.
     power : float
         Power of the beam, W.
     radius : float

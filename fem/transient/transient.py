@@ -99,12 +99,12 @@ class Transient:
 
     @property
     def mesh(self) -> TetMesh:
-        """The mesh."""
+        """The mesh, which is that of `steady`."""
         return self.steady.mesh
 
     @property
     def surface(self) -> Surface:
-        """What the mesh stands for."""
+        """The surface that the mesh approximates."""
         return self.steady.surface
 
     @property
