@@ -206,9 +206,10 @@ def solve(
     frequency : float
         At which the lights are modulated, Hz; 0 for steady light. Fluence, exitance, power and readings of the solution
         then are complex amplitudes, by the convention ``exp(i omega t)``; see its `amplitude_at` and `phase_at`.
-        Beams reach all depths at once: in fact their light lags by ``omega n/c`` times the way from where they enter.
+        The time that a beam takes to reach its depth is left out: ``omega n/c`` times that path, in radians.
     outside_index : float
-        Refractive index of what surrounds the body, to which `eta` is relative: it tells the speed of light inside.
+        Refractive index of what surrounds the body, to which `eta` is relative. The speed of light inside is
+        ``c/(eta outside_index)``.
     times : sequence of float, optional
         s, rising: at these times after a short pulse of the lights, of 1 J for each watt. The solution then is a
         `Transient`, see `tetlux.fem.transient`, for which model is "full" or "auto", both by finite elements.
@@ -219,10 +220,8 @@ def solve(
         arguments it takes `regions`, `tolerance`, `detectors` and, without regions, `detector_tolerance` and a
         `frequency`, and refuses the rest. "closed-form" is the exact series of balls and slabs of one homogeneous
         medium, with points, beams that are points, and in balls diffuse light; it takes `tolerance` and `detectors`.
-        "truncated" solves by finite
-        elements on the part that light reaches, of bodies of any size, see `tetlux.fem.truncated`. "auto" takes the
-        fastest of these that gives what is asked for, see `tetlux.fem.plan`; its other arguments are for finite
-        elements.
+        "truncated" solves by finite elements on the part that light reaches, of bodies of any size, see
+        `tetlux.fem.truncated`. "auto" takes the fastest of these that gives what is asked for, see `tetlux.fem.plan`.
 
     Returns
     -------

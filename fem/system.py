@@ -39,8 +39,7 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import own_volumes
 
-# For each light: its load, one more if its patch shrinks, and two dual loads to estimate the error.
-RIGHT_HAND_SIDES_PER_LIGHT = 4
+RIGHT_HAND_SIDES_PER_LIGHT = 4  # its load, one more if its patch shrinks, and two dual loads to estimate the error
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class MeshSolution:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The media of a body on one mesh.
+    """A body on one mesh: its matrix is assembled once, and solved for as many lights as wanted.
 
     Parameters
     ----------
@@ -64,11 +63,11 @@ class System:
     medium : Medium, VaryingMedium, or mapping of int to these
         Of the body; or the medium of each label of the mesh, that of the outermost first.
     surface : Surface, optional
-        What the mesh stands for; its own boundary if not given.
+        The surface that the mesh approximates; the boundary of the mesh if not given.
     mass : {"lumped", "consistent"}
         Integration of the terms without derivatives, see `tetlux.fem.operators.assembly.system_matrix`.
     expected : int
-        How many lights there will be, roughly: for many it pays to factorise the matrix.
+        Number of lights to come, roughly: for many the matrix is factorised.
     regions : tuple of Region
         The mesh's regions 1, 2, ..., each with one medium.
     assembly : Assembly, optional
@@ -76,10 +75,17 @@ class System:
     limit : bool
         Whether the fluence is limited to be nonnegative, where that of the equation itself is.
     model_of : callable
-        Makes the model of the coefficients. A model other than `Diffusion` is solved for by `solve` with
-        ``subtract="nothing"``, without an estimate of its error and without readings by quadratic elements.
+        Makes the equation from the coefficients. One other than `Diffusion` needs ``subtract="nothing"`` in `solve`.
     shift : complex
-        What is added to sigma_a, 1/unit: see `tetlux.fem.models.model.Model`.
+        Added to sigma_a, 1/unit: ``i omega n/c`` makes it light modulated at omega, see `tetlux.fem.models.model`.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PointSource, System
+    >>> from tetlux.meshing import sphere, tetrahedralize
+    >>> system = System(tetrahedralize(sphere(10.0)), Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4))
+    >>> [round(system.solve([PointSource((0, 0, z))]).power.exited, 1) for z in (0.0, 9.0)]  # of 1 W each, W
+    [0.5, 0.8]
     """
 
     mesh: TetMesh
@@ -95,14 +101,12 @@ class System:
 
     @property
     def media(self) -> MediaByLabel | tuple[AnyMedium, ...]:
-        """Those of the body and of its regions, or those of labels."""
-        if isinstance(self.medium, AnyMedium):
-            return (self.medium, *(only_medium(region) for region in self.regions))
-        return self.medium
+        """The media of the body and of its regions, or of each label."""
+        return (self.medium, *map(only_medium, self.regions)) if isinstance(self.medium, AnyMedium) else self.medium
 
     @cached_property
     def coefficients(self) -> Coefficients:
-        """Those of its tetrahedra."""
+        """The coefficients of each tetrahedron."""
         return replace(coefficients_on(self.mesh, self.media), shift=self.shift)
 
     @cached_property
@@ -112,7 +116,7 @@ class System:
 
     @property
     def true_surface(self) -> Surface:
-        """What the mesh stands for."""
+        """The surface that the mesh approximates."""
         return self.surface or self.mesh.surface
 
     @cached_property
@@ -131,7 +135,7 @@ class System:
 
     @cached_property
     def quadratic(self) -> QuadraticOperator:
-        """The operator that detectors are read by, of diffusion."""
+        """The operator of quadratic elements, by which detectors are read; for diffusion only."""
         inner = tuple(region.surface for region in self.regions)
         return QuadraticOperator(self.mesh, self.true_surface, inner, self.coefficients)
 
@@ -269,11 +273,7 @@ class System:
         return [result]
 
     def _sum(
-        self,
-        of_lights: Sequence[Solution],
-        loads: Sequence[Load],
-        results: Sequence[LinearResult],
-        split: SplitLights,
+        self, of_lights: Sequence[Solution], loads: Sequence[Load], results: Sequence[LinearResult], split: SplitLights
     ) -> Solution:
         """The solution of all lights together, with residual, iterations and notes of the linear solver."""
         solvers = [operator.solver for operator in dict.fromkeys(load.operator for load in loads)]

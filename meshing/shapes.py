@@ -46,9 +46,9 @@ def sphere(radius: float, *, center: Vector = (0.0, 0.0, 0.0), subdivisions: int
     Parameters
     ----------
     radius : float
-        Unit.
+        Radius of the sphere, unit.
     center : (3,) floats
-        Unit.
+        Coordinates of the centre, unit.
     subdivisions : int
         From 1 to 7; each splits every triangle into four. Four give 5,120 triangles, whose volume is 0.3 % too small.
     unit : str
@@ -96,7 +96,7 @@ def box(size: Vector, *, center: Vector = (0.0, 0.0, 0.0), unit: str = "mm") -> 
     size : (3,) floats
         Edge lengths along x, y and z, unit.
     center : (3,) floats
-        Unit.
+        Coordinates of the centre, unit.
     unit : str
         Unit of length: nm, um, mm, cm, m or in.
 
@@ -161,9 +161,9 @@ def cylinder(
     Parameters
     ----------
     radius, height : float
-        Unit.
+        Radius, and length along z, unit.
     center : (3,) floats
-        Unit.
+        Coordinates of the centre, unit.
     segments : int
         Edges around each end, at least 8; the number of rows along z makes the faces nearly square.
     unit : str
@@ -218,7 +218,7 @@ def torus(
     minor : float
         Radius of the tube, less than `major`, unit.
     center : (3,) floats
-        Unit.
+        Coordinates of the centre, unit.
     segments : int
         Edges along the ring, at least 12; the number of rows around the tube makes the faces nearly square.
     unit : str

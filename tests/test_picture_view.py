@@ -11,8 +11,10 @@ from PIL import Image
 from tetlux.cases.file.case import Case
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.picture import draw as picture
+from tetlux.cases.picture.canvas import Canvas
 from tetlux.cases.picture.draw import PictureScene, Ray, RegionOutline, draw_picture
 from tetlux.cases.picture.frame import LEFT, TOP
+from tetlux.cases.picture.marks import Marks, draw_marks
 from tetlux.cases.picture.shading import draw_stage
 from tetlux.cases.picture.stage import (
     ARROW_OPACITY,
@@ -264,3 +266,29 @@ def test_a_run_draws_its_regions_and_detectors(tmp_path: Path, monkeypatch: pyte
     assert [name for name, _ in scene.detectors] == ["top", "side"]
     # On the surface, where it is read.
     np.testing.assert_allclose(scene.detectors[0][1], [0, 0, 10], atol=0.05)
+
+
+def _drawn_marks(name: str, region: str, arrows: FloatArray) -> FloatArray:
+    """A dot at (100, 60) and a round region of 30 pixels radius around (100, 160), with their names, on white."""
+    rows, columns = np.mgrid[:240, :200]
+    coverage = (np.hypot(columns - 100, rows - 160) < 30).astype(float)
+    canvas = Canvas((200, 240), (1.0, 1.0, 1.0))
+    marks = Marks([(region, coverage)], [name], np.array([[100.0, 60.0]]), np.zeros(1, bool), np.empty((0, 2)), arrows)
+    draw_marks(canvas, marks, 0, 0)
+    return np.asarray(np.asarray(canvas.image, dtype=float).min(axis=2))
+
+
+def test_names_of_detectors_leave_their_rings_free() -> None:
+    plain, named = (_drawn_marks(name, "", np.empty((0, 2))) for name in ("", "10mmmm"))
+    changed = np.argwhere(plain != named)[:, ::-1]
+    assert len(changed) > 100
+    assert np.linalg.norm(changed - [100, 60], axis=1).min() > 8.3
+
+
+def test_names_of_regions_keep_off_arrows() -> None:
+    arrow = np.column_stack([np.full(16, 100.0), np.linspace(100, 150, 16)])
+    for arrows, above in ((np.empty((0, 2)), True), (arrow, False)):
+        plain, named = (_drawn_marks("", region, arrows) for region in ("", "core"))
+        rows = np.argwhere(plain != named)[:, 0]
+        assert len(rows) > 50
+        assert (rows.max() < 130) if above else (rows.min() > 190)

@@ -53,7 +53,7 @@ def _draw_exitance(result: ComparisonResult, axes: Axes) -> None:
             linewidth=1.6,
             marker="" if result.single_valued else ".",
             markersize=1.5,
-            label=f"{name}: L2 difference {result.differences[name]['l2']:.1%}",
+            label=f"{name}: L2 difference {result.differences[name]['l2'] * 100:.2g} %",
         )
     axes.set_yscale("log")
     largest = max(float(truth.max()) for truth in result.forms.values())

@@ -12,6 +12,8 @@ from tetlux.meshing.arrays import FloatArray
 
 # Shapes are drawn this many times larger and then averaged, since Pillow's lines have no smooth edges.
 FINER = 4
+# Width of the rim round letters, pixels.
+RIM = 2
 # How hard PNG is compressed: 6, Pillow's own, takes three times as long for files 10 % smaller.
 COMPRESSION = 3
 Point = tuple[float, float]
@@ -68,9 +70,14 @@ class Canvas:
             anchor=anchor,
             align="center",
             spacing=0.35 * size,
-            stroke_width=2 if outline else 0,
+            stroke_width=RIM if outline else 0,
             stroke_fill=outline,
         )
+
+    @staticmethod
+    def text_width(text: str, size: float) -> float:
+        """Width of one line of text with a rim, pixels."""
+        return _font(size).getlength(text) + 2.0 * RIM
 
     def line(self, points: Sequence[Point], width: float, color: str, *, round_ends: bool = False) -> None:
         """Draw a line through points."""

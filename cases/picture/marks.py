@@ -8,15 +8,17 @@ import numpy as np
 from tetlux.cases.picture.canvas import Canvas
 from tetlux.cases.picture.rasterizer import visible_triangles
 from tetlux.cases.picture.shading import place_samples, samples_of
-from tetlux.cases.picture.stage import OVERSAMPLING, is_end_on
+from tetlux.cases.picture.stage import OVERSAMPLING, arrow_ends, is_end_on
 from tetlux.cases.picture.view import Camera, Ray, caster_of, in_view
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Vector
 
 INK, PAPER = "#20242b", "#ffffff"
-# Size of the names: font, line height and mean width of a letter, pixels.
-FONT, LINE, LETTER = 16.0, 18.0, 9.6
+# Size of the names: font and line height, pixels.
+FONT, LINE = 16.0, 18.0
 # Pixels between a dot and its name.
 GAP = 10.0
+# Names keep off arrows: number of places along an arrow, and their distance from it, pixels.
+ALONG_ARROW, OFF_ARROW = 16, 9.0
 # Positions of a name relative to its dot (right, down), the best first.
 SIDES = ((1, 0), (-1, 0), (0, -1), (0, 1), (1, -1), (-1, 1), (1, 1), (-1, -1))
 # Opacity of the tint of a region; length of the dashes and of the gaps of its outline, pixels.
@@ -48,6 +50,8 @@ class Marks:
         Whether the body hides the detector.
     beams : (b, 2) ndarray
         Where light enters along the line of sight and the entry is visible.
+    arrows : (a, 2) ndarray
+        Places along the arrows of lights.
     """
 
     outlines: Sequence[tuple[str, FloatArray]]
@@ -55,6 +59,7 @@ class Marks:
     dots: FloatArray
     hidden: BoolArray
     beams: FloatArray
+    arrows: FloatArray
 
 
 def project_marks(
@@ -86,6 +91,8 @@ def project_marks(
     places = np.array([place for _, place in detectors], dtype=float).reshape(-1, 3)
     entries = [ray.end for ray in lights if not ray.is_point and is_end_on(ray, camera)]
     beams = np.array(entries, dtype=float).reshape(-1, 3)
+    shafts = [arrow_ends(ray, diagonal) for ray in lights if not ray.is_point and not is_end_on(ray, camera)]
+    along = [np.linspace(tail, tip, ALONG_ARROW) for tail, tip in shafts]
     body = caster_of(corners)
     return Marks(
         outlines=[(region.name, _coverage(camera, region)) for region in regions],
@@ -93,6 +100,7 @@ def project_marks(
         dots=camera.project(places)[:, :2],
         hidden=~in_view(body, places, camera.toward, diagonal),
         beams=camera.project(beams[in_view(body, beams, camera.toward, diagonal)])[:, :2],
+        arrows=camera.project(np.concatenate([np.empty((0, 3)), *along]))[:, :2],
     )
 
 
@@ -108,6 +116,7 @@ def draw_marks(canvas: Canvas, marks: Marks, left: int, top: int) -> None:
     """Draw marks on a canvas of pixels, on which the panel begins at `left` and `top`."""
     corner = np.array([left, top])
     boxes: list[tuple[float, float, float, float]] = [(x - 6, y - 6, x + 6, y + 6) for x, y in marks.dots + corner]
+    boxes += [(x - OFF_ARROW, y - OFF_ARROW, x + OFF_ARROW, y + OFF_ARROW) for x, y in marks.arrows + corner]
     _draw_detectors(canvas, marks, corner, boxes)
     for name, coverage in marks.outlines:
         _draw_outline(canvas, name, coverage, corner, boxes)
@@ -131,8 +140,10 @@ def _draw_outline(
     canvas.lines(rings, 4.7, PAPER, opacity=0.75)
     canvas.lines([dash for ring in rings for dash in cut_dashes(ring)], 2.1, INK)
     rows, columns = np.nonzero(coverage > 0.5)
-    place = np.array([columns.mean(), rows.min()]) + corner
-    _write_name(canvas, name, place, boxes, gap=4.0, sides=[(0, -1), (0, 1)])
+    for row, sides in ((rows.min(), [(0, -1), (0, 1)]), (rows.max(), [(0, 1)])):
+        place = np.array([columns.mean(), row]) + corner
+        if _write_name(canvas, name, place, boxes, gap=4.0, sides=sides):
+            return
 
 
 def _draw_detectors(
@@ -166,9 +177,9 @@ def _write_name(
     *,
     gap: float,
     sides: Sequence[tuple[int, int]] = SIDES,
-) -> None:
-    """Write a name beside a place without overlapping other marks; leave it out if there is no room."""
-    width, (x, y) = LETTER * len(name), place
+) -> bool:
+    """Write a name beside a place without overlapping other marks, or return False if there is no room."""
+    width, (x, y) = canvas.text_width(name, FONT), place
     for across, down in sides:
         middle = x + across * (gap + 0.5 * width), y + down * (gap + 0.5 * LINE)
         box = (middle[0] - 0.5 * width, middle[1] - 0.5 * LINE, middle[0] + 0.5 * width, middle[1] + 0.5 * LINE)
@@ -176,4 +187,5 @@ def _write_name(
             continue
         boxes.append(box)
         canvas.text(middle, name, FONT, INK, anchor="mm", outline=PAPER)
-        return
+        return True
+    return False

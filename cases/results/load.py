@@ -35,7 +35,7 @@ def load_results(folder: str | Path, table: Literal["results", "readings"] = "re
     -------
     pandas.DataFrame
         Swept values under their keys (lists as text). Lengths are in the unit of the column ``unit``, power is in W,
-        exitance and fluence in W/unit², seconds in s; see the table in README.
+        exitance and fluence in W/unit², seconds in s; see docs/results.md.
 
     Raises
     ------
@@ -87,7 +87,9 @@ class Volume:
     Attributes
     ----------
     points : (n, 3) ndarray
+        Nodes, in the unit of the run.
     tetrahedra : (m, 4) ndarray
+        Corners, as numbers of nodes.
     values : mapping of str to (n,) ndarray
         ``fluence``, or ``fluence_<channel>``, at each node, W/unit².
     """
@@ -106,6 +108,7 @@ class RunResult:
     Attributes
     ----------
     folder : Path
+        Where the run is.
     summary : mapping
         The content of ``summary.json``.
     readings : list of dict
@@ -113,6 +116,7 @@ class RunResult:
     points : (v, 3) ndarray or None
         Vertices of the surface, in the unit ``summary["unit"]``; None without the output ``surface``.
     triangles : (t, 3) ndarray or None
+        Corners, as numbers of vertices.
     values : mapping of str to (v,) ndarray
         The arrays of ``surface.ply`` at the vertices, such as ``exitance``, W/unit².
     volume : Volume or None

@@ -86,7 +86,10 @@ def _draw_exitance(axes: Axes, results: Results, lit: FloatArray) -> None:
     most = max(float(np.nanmax(values)) for values in means.values())
     if most > 0:
         axes.set_yscale("log")
-        axes.set_ylim(bottom=max(FLOOR * most, 0.5 * min(float(v[v > 0].min(initial=most)) for v in means.values())))
+        bottom = max(FLOOR * most, 0.5 * min(float(v[v > 0].min(initial=most)) for v in means.values()))
+        axes.set_ylim(bottom=bottom)
+        # No empty space beyond the last ring that is drawn.
+        axes.set_xlim(0, 1.05 * distances[np.max([values >= bottom for values in means.values()], axis=0)].max())
     axes.set_xlabel(f"distance from the {'light' if len(lit) else 'brightest place'}, {unit}")
     axes.set_ylabel(f"mean exitance, W/{unit}²")
     if len(means) > 1:

@@ -93,7 +93,7 @@ class Body:
         Returns
         -------
         (q, 3) ndarray
-            `JUST_INSIDE` of the diagonal below the point of the surface nearest to each, unit.
+            The nearest point of the surface to each, moved inwards by a small share of the body's diagonal, unit.
         """
         nearest, faces = self.surface.closest(points)
         return np.asarray(nearest - JUST_INSIDE * self.surface.diagonal * self.surface.normals[faces])

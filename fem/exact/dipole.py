@@ -2,7 +2,7 @@
 
 Fluence vanishes on the plane z = -zb instead of satisfying the Robin boundary condition at z = 0. This model differs
 from `half_space` by a quarter near the source, and agrees with it far away. The factor A in ``zb = 2 A D`` is that of
-the medium: ``Medium(..., boundary="classic")`` gives the published curves.
+the medium: ``Medium(..., boundary="classic")`` gives the published curves. Symbols are those of `half_space`.
 """
 
 import math

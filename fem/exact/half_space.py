@@ -1,7 +1,8 @@
 """The half-space z >= 0 in the diffusion approximation, with the exact (Robin) boundary.
 
 The medium fills z >= 0, so z is depth, and the outward normal of the surface is -z. All functions return values for
-unit power, or unit irradiance. Exitance is ``M = phi/(2A)`` in W/unit².
+unit power, or unit irradiance. Exitance is ``M = phi/(2A)`` in W/unit². In formulas ``k = sigma_tr`` is the effective
+attenuation coefficient, ``zb = 2 A D`` the extrapolation length and alpha' the reduced albedo, all of `Medium`.
 """
 
 import math
@@ -95,7 +96,7 @@ def point_exitance(medium: Medium, *, depth: float, rho: npt.ArrayLike) -> Float
 
 
 def point_total(medium: Medium, *, depth: float) -> float:
-    """Power that leaves through the surface, ``e^{-k z0}/(1 + k zb)``; the rest of 1 W is absorbed.
+    """Power that leaves through the surface, ``e^{-k z0}/(1 + k zb)`` from a depth z0; the rest of 1 W is absorbed.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 The boundary is either exact (Robin) or extrapolated: fluence vanishes on the planes ``z = -zb`` and ``z = L + zb``.
 These models differ as `half_space` and `dipole` do. All functions return values for unit power of a source at
-(0, 0, depth). For a wide beam see `slab_plane`.
+(0, 0, depth). For a wide beam see `slab_plane`. Symbols are those of `half_space`, and L is the thickness.
 """
 
 import math
@@ -57,8 +57,10 @@ def point_exitance(
     ----------
     medium : Medium
         What the slab is made of.
-    thickness, depth : float
-        L, and the depth of the source, unit.
+    thickness : float
+        L, unit.
+    depth : float
+        Depth of the source, between 0 and L, unit.
     rho : (...) array_like
         Distance on the face from the axis through the source, unit.
     face : {"front", "back"}
@@ -96,8 +98,10 @@ def point_total(medium: Medium, *, thickness: float, depth: float, face: Face = 
     ----------
     medium : Medium
         What the slab is made of.
-    thickness, depth : float
-        L, and the depth of the source, unit.
+    thickness : float
+        L, unit.
+    depth : float
+        Depth of the source, between 0 and L, unit.
     face : {"front", "back"}
         The face z = 0, or z = L.
 
@@ -132,8 +136,10 @@ def extrapolated_fluence(medium: Medium, *, thickness: float, depth: float, poin
     ----------
     medium : Medium
         What the slab is made of; ``sigma_a = 0`` is allowed.
-    thickness, depth : float
-        L, and the depth of the source, between 0 and L, unit.
+    thickness : float
+        L, unit.
+    depth : float
+        Depth of the source, between 0 and L, unit.
     points : (n, 3) array_like
         Where to evaluate, z from -zb to L + zb, unit.
 
@@ -166,8 +172,10 @@ def extrapolated_flux(
     ----------
     medium : Medium
         What the slab is made of.
-    thickness, depth : float
-        L, and the depth of the source, unit.
+    thickness : float
+        L, unit.
+    depth : float
+        Depth of the source, between 0 and L, unit.
     rho : (...) array_like
         Distance on the face from the axis through the source, unit.
     face : {"front", "back"}

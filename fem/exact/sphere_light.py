@@ -195,8 +195,8 @@ def beam_total(medium: Medium, *, radius: float, source: Source = "delta-eddingt
 def diffuse_fluence(medium: Medium, *, radius: float, distance: npt.ArrayLike) -> FloatArray:
     """Fluence in a ball in uniform diffuse light of unit transmitted irradiance.
 
-    ``phi = C i_0(k r)`` with ``phi + 2 A D dphi/dr = 4/(1 - 2 C1)`` at the surface. C1 is the first moment of the
-    internal reflectance by Fresnel's law, also if the medium computes A by the classic fit.
+    ``phi = C i_0(k r)``, with the constant C from ``phi + 2 A D dphi/dr = 4/(1 - 2 C1)`` at the surface. C1 is the
+    first moment of the internal reflectance by Fresnel's law, also if the medium computes A by the classic fit.
 
     Parameters
     ----------

@@ -62,7 +62,8 @@ def fit(
     lights : sequence of Light
         At least one; each has readings of its own.
     detectors : sequence of detectors
-    readings : (d,), (l, d) or (c, l, d) array_like, or readings
+        Where the readings were measured.
+    readings : (d,), (l, d) or (c, l, d) array_like, or sequence of Reading
         Measured exitance, W/unit², of each detector, light and wavelength; complex with a frequency; nan where there is
         none.
     unknowns : sequence of str

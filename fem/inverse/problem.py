@@ -29,9 +29,11 @@ class FitProblem:
     surface : Surface
     mesh : TetMesh
     lights : sequence of Light
+        Each has readings of its own.
     detectors : sequence of detectors
+        Where the readings were measured.
     regions : sequence of Region
-        Of which the surfaces count.
+        Only their surfaces are used; `unknowns` holds the media.
     unknowns : Unknowns
     readings : (c, l, d) ndarray
         Measured exitance of each channel, light and detector, W/unit²; nan where there is none.
@@ -71,11 +73,11 @@ class FitProblem:
         return self._counter["evaluations"]
 
     def residuals(self, logarithms: FloatArray) -> FloatArray:
-        """Differences of logarithms of readings over the noise, (n,); of complex ones real and imaginary parts."""
+        """ln(fitted reading/measured reading) over the noise, (n,); real and imaginary parts of complex readings."""
         return self._at(logarithms)[0]
 
     def jacobian(self, logarithms: FloatArray) -> FloatArray:
-        """Derivatives of the residuals to the logarithms of the unknowns, (n, u)."""
+        """Derivatives of the residuals with respect to the logarithms of the unknowns, (n, u)."""
         return self._at(logarithms)[1]
 
     def value_and_gradient(self, logarithms: FloatArray) -> tuple[float, FloatArray]:

@@ -34,10 +34,11 @@ ARROWS = 3
 class CollimatedBeam:
     """Parallel light, with the shadows that the body casts on itself.
 
-    Light that meets the body is refracted, without Fresnel's reflection, and scattered along its path by
-    delta-Eddington, ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)`` (Joseph, Wiscombe &
-    Weinman 1976). At the far side it is reflected inside or leaves, and may enter the body again. Light that is
-    reflected outside is lost.
+    At the surface a part is reflected by Fresnel's law, and the rest, of irradiance E0, is refracted. After a path l it
+    has the irradiance ``E = E0 exp(-sigma_t* l)`` and scatters by delta-Eddington: ``Q0 = sigma_s* E`` and ``Q1 = g*
+    sigma_s* E s``, where s is its direction, sigma_s* and g* are those of `Medium.delta_eddington`, and ``sigma_t* =
+    sigma_a + sigma_s*`` (Joseph, Wiscombe & Weinman 1976). At the far side it is reflected inside or leaves, and may
+    enter the body again. Light that is reflected outside is lost.
 
     Parameters
     ----------

@@ -15,8 +15,9 @@ from tetlux.meshing.errors import InputError
 class DiffuseLight:
     """The same radiance from every direction, on the whole surface.
 
-    With the transmitted irradiance E_t the boundary condition becomes ``phi + 2 A D dphi/dn = 4 E_t/(1 - 2 C1)``. A
-    collimated beam that is modelled as diffuse light is off by 12 % at a reduced albedo of 0.9.
+    With the irradiance E_t that passes the surface, the boundary condition of the fluence phi becomes ``phi + 2 A D
+    dphi/dn = 4 E_t/(1 - 2 C1)``, where C1 is the first moment of the internal reflectance. A collimated beam that is
+    modelled as diffuse light is off by 12 % at a reduced albedo of 0.9.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ class DiffusePatch:
     center : (3,) floats
         Moved to the nearest point of the surface, unit.
     radius : float
-        unit.
+        Radius of the patch, unit.
     irradiance : float
         On the outside of the patch, W/unit².
 

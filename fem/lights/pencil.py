@@ -41,9 +41,9 @@ class PencilBeam:
     origin : (3,) floats
         A point outside the body from which the beam starts, unit.
     direction : (3,) floats
-        Of any length.
+        Direction of travel, of any length.
     power : float
-        W.
+        Power of the beam, W.
     radius : float
         Radius of the beam, unit; 0 is a beam without width.
     deposit : {"point", "line"}
@@ -52,7 +52,7 @@ class PencilBeam:
         albedo. Across several media that is where the integral of sigma_t' along the beam is 1, and the albedo is
         `OpticalPaths.albedo`. A beam exactly along the interface of two media is taken to lie in one of them, the same
         one whichever of the two is the region. "line" lets the beam decay along its refracted path by delta-Eddington:
-        ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)``.
+        ``Q0 = sigma_s* E``, ``Q1 = g* sigma_s* E s`` with ``E = E0 exp(-sigma_t* l)``; symbols as for `CollimatedBeam`.
 
     Raises
     ------

@@ -32,7 +32,7 @@ class PointSource:
     position : (3,) floats
         Inside the body, unit.
     power : float
-        W.
+        Emitted power, W.
 
     Raises
     ------

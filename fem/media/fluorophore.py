@@ -22,8 +22,9 @@ class Fluorophore:
     absorption : float
         Absorption coefficient of the dye at the wavelength of excitation, 1/unit, which adds to that of the medium.
     quantum_yield : float
-        Share of the absorbed photons that are emitted again, above 0 and at most 1. Power is counted as if photons of
-        both wavelengths had one energy; with a yield times the ratio of the wavelengths it is that in W.
+        Share of the absorbed photons that are emitted again, above 0 and at most 1. The ledger counts photons of both
+        wavelengths as equal in energy; for powers in W give the yield times the ratio of the wavelengths, excitation
+        over emission.
     lifetime : float
         Mean time from absorption to emission, s. It matters for modulated light alone.
     region : int or str, optional

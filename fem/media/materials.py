@@ -32,7 +32,7 @@ def material(name: str, *, unit: str = "mm") -> tuple[Medium, Medium, Medium]:
     Parameters
     ----------
     name : str
-        One of `MATERIALS`.
+        apple, chicken1, chicken2, cream, ketchup, marble, potato, skimmilk, skin1, skin2, spectralon or wholemilk.
     unit : str
         Unit of length; coefficients are in 1/unit: nm, um, mm, cm, m or in.
 

@@ -122,7 +122,7 @@ class Medium:
 
     @property
     def sigma_t_prime(self) -> float:
-        """sigma_t' = sigma_a + sigma_s', the reduced transport coefficient (CS667 notes, eq. 8), 1/unit."""
+        """sigma_t' = sigma_a + sigma_s', the reduced extinction coefficient (CS667 notes, eq. 8), 1/unit."""
         return self.sigma_a + self.reduced_scattering
 
     @property
@@ -142,7 +142,7 @@ class Medium:
 
     @property
     def sigma_tr(self) -> float:
-        """Effective transport coefficient sqrt(sigma_a/D), 1/unit."""
+        """Effective attenuation coefficient sqrt(sigma_a/D), 1/unit."""
         return math.sqrt(self.sigma_a / self.diffusion)
 
     @cached_property
@@ -154,7 +154,7 @@ class Medium:
 
     @property
     def extrapolation_length(self) -> float:
-        """Zb = 2 A D, the distance outside the boundary at which the fluence extrapolates to zero, unit."""
+        """Extrapolation length zb = 2 A D: the fluence extrapolates to zero at this distance outside, unit."""
         return 2.0 * self.boundary_factor * self.diffusion
 
     @property

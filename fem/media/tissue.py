@@ -43,7 +43,7 @@ def tissue(
     a : float
         Reduced scattering at 500 nm, 1/mm whatever the unit.
     b : float
-        Its power.
+        Scattering power: the exponent by which scattering falls with the wavelength.
     eta : float
         Refractive index relative to the outside.
     hbo2, hhb : float

@@ -31,7 +31,7 @@ RESOLUTION = 0.5
 
 @dataclass(frozen=True, eq=False)
 class ClosedFormSolution(Shown):
-    """Light in a body by closed forms; what `tetlux.fem.Solution` is with a mesh.
+    """The light in a body by closed forms; it is asked like `tetlux.fem.Solution`, and has no mesh.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class ClosedFormSolution(Shown):
         A ball or a slab.
     medium : Medium
     exact : ExactField
-        Of all lights together.
+        The field of all lights together.
     deposits : tuple of Deposit
         Of each light.
     seconds : dict

@@ -49,12 +49,14 @@ class LightLedger:
 
 @dataclass(frozen=True, eq=False)
 class ChargeSolution(Shown):
-    """Light in one body, as sums of screened charges; what `tetlux.fem.Solution` is with a mesh.
+    """The light in one body as a sum of screened charges; it is asked like `tetlux.fem.Solution`, and has no mesh.
 
     Attributes
     ----------
-    surface, medium : Surface, Medium
-        Of the body.
+    surface : Surface
+        The surface of the body.
+    medium : Medium
+        The medium of the body, outside of its regions.
     interfaces : tuple of Interface
         The body's surface, then those of its regions.
     fields : tuple of ChargeField
@@ -64,9 +66,9 @@ class ChargeSolution(Shown):
     sources : (s,) ndarray
         Power of the point sources of each light, W.
     ledgers : tuple of LightLedger
-        Of each light.
+        The ledger of each light.
     errors : ErrorEstimates
-        Of the sum of all lights.
+        Estimated errors of the sum of all lights.
     seconds : dict
         Seconds spent on surface, solve, and total.
     warnings : list of str

@@ -42,7 +42,7 @@ class DiscDetector:
     center : (3,) floats
         Taken to the nearest point of the surface, unit; the disc is flat and touches the surface there.
     radius : float
-        unit.
+        Radius of the disc, unit.
 
     Raises
     ------

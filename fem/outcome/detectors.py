@@ -39,7 +39,8 @@ def read(detector: Detector, solution: ExitanceField) -> Reading:
 
     The exitance of a disc is a mean over the flat disc that touches the surface, taken at the surface points nearest to
     the points of the disc. A fibre collects radiance up to the angle whose sine is its numerical aperture. The radiance
-    is proportional to ``F_t(eta, theta)``, and its flux is the exitance. Detectors do not change the light in the body.
+    is proportional to Fresnel's transmittance at its angle, and its flux is the exitance. Detectors do not change the
+    light in the body.
 
     Readings of a solution on a mesh come from quadratic elements on the same mesh, which are solved for at the first
     reading: see `tetlux.fem.quadratic`. Far from the light their error is a tenth of that of the linear elements of

@@ -31,7 +31,7 @@ class Candidate:
     suits : bool
         Whether it can give what is asked for, within the tolerance.
     kind : str
-        What runs are told apart by that others are predicted from.
+        Kind of scene: past runs of the same kind refine predictions.
     learned : tuple of (float, float)
         Factors of past runs, see `tetlux.fem.planner.costs`, on the seconds and the error, which contain them.
     """
@@ -64,9 +64,11 @@ class Plan:
         The simplest first.
     tolerance : float or None
         Wanted relative L2 error of the exitance.
-    near_error, model_error : float
-        Expected relative errors of diffusion itself, which none of the models reduces: a mean free path from thin
-        beams and points, and elsewhere; see `tetlux.fem.validity.beforehand`.
+    near_error : float
+        Expected relative error of diffusion itself, which none of the models reduces, at one mean free path from thin
+        beams and points; see `tetlux.fem.validity.beforehand`.
+    model_error : float
+        The same elsewhere.
     runs : int
         Number of runs that share the plan.
 

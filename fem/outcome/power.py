@@ -37,7 +37,7 @@ class Power:
 
     @property
     def balance_error(self) -> Number:
-        """What the ledger lacks, as a share of the incident power."""
+        """Power missing from the ledger, as a share of the incident power."""
         out = self.specular + self.absorbed + self.exited + self.ballistic + self.stored
         return (self.incident - out) / self.incident
 
@@ -49,13 +49,13 @@ class DyePower:
     Attributes
     ----------
     absorbed : float or complex
-        Of the light that excites it, a part of the absorbed power there.
+        Power that the dye absorbs; part of `Power.absorbed` at the wavelength of excitation.
     lost : float or complex
         Turned to heat, for want of quantum yield.
     emitted : float or complex
-        Part of the incident power of the emitted light.
+        Power that the dye emits; part of `Power.incident` at the wavelength of emission.
     stored : float or complex
-        Taken by excited molecules: 0 for steady light.
+        Rate at which excited molecules store energy: 0 for steady light.
     """
 
     absorbed: Number

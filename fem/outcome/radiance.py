@@ -19,7 +19,7 @@ from tetlux.meshing.surface.surface import Surface
 def radiance(solution: ExitanceField, points: npt.ArrayLike, viewer: npt.ArrayLike) -> FloatArray:
     """Radiance that leaves the surface towards a viewer.
 
-    What of the body stands in between is not looked at, nor what the surface reflects.
+    Shadowing by other parts of the body and light that the surface reflects are not included.
 
     Parameters
     ----------

@@ -31,18 +31,19 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class Solution(Shown):
-    """Light in one body, solved.
+    """The light in one body, as `tetlux.fem.solve` finds it on a mesh.
 
     Attributes
     ----------
     mesh : TetMesh
     surface : Surface
-        What the mesh stands for: exitance at points is taken to this.
+        The surface that the mesh approximates; `exitance_at` takes points to it.
     boundary_condition : BoundaryCondition
         How the exitance follows from the fluence: see `tetlux.fem.models.boundary`.
     fluence : (n,) ndarray, real or complex
         Fluence at the nodes of `mesh` (CS667 notes, definition 1.9 i), W/unit².
     power : Power
+        The ledger: where the power went, W.
     patches : tuple of Patch
         Where the fluence is known better than its values at the nodes tell: see `tetlux.fem.known`.
     transmitted_irradiance : float or (b,) ndarray
@@ -68,12 +69,10 @@ class Solution(Shown):
     quadratic : QuadraticSolution, optional
         The same in quadratic elements, which detectors are read by: see `tetlux.fem.quadratic`.
     is_quadratic : bool
-        Whether exitance and fluence are those of quadratic elements too, as under a tolerance of either everywhere:
-        see `tetlux.fem.outcome.fields`. The power is always that of linear elements.
+        Whether exitance and fluence are those of quadratic elements, as under a tolerance everywhere or inside.
     everywhere_error, volume_error : float
-        Relative errors that the exitance is within at some 95 % of the surface, and the fluence inside, in each range
-        of brightness down to a millionth of the largest: see `tetlux.fem.quadratic.field_error`. nan where there is no
-        tolerance of these.
+        Relative error that about 95 % of the surface keep in exitance, and 95 % of the volume in fluence, at each level
+        of brightness: see `tetlux.fem.quadratic.field_error`. nan without such a tolerance.
     plan : Plan, optional
         Why this model was chosen, if it was.
     frequency : float
@@ -84,6 +83,17 @@ class Solution(Shown):
         Of one light, coefficients where its layers are thinner than tetrahedra.
     dyes : tuple of DyePower
         Of emitted light, what became of the power that each fluorophore absorbed: see `tetlux.fem.fluorescence`.
+
+    Examples
+    --------
+    >>> from tetlux.fem import Medium, PencilBeam, solve
+    >>> from tetlux.meshing import sphere
+    >>> tissue = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    >>> solution = solve(sphere(10.0), tissue, [PencilBeam((0, 0, 20), (0, 0, -1))], tolerance=0.05)
+    >>> solution.exitance_at([[0, 0, 10], [0, 10, 0]]).shape, solution.fluence_at([[0, 0, 5]]).shape  # W/mm²
+    ((2,), (1,))
+    >>> round(solution.power.exited, 2), abs(solution.power.balance_error) < 1e-9  # of 1 W, W
+    (0.76, True)
     """
 
     mesh: TetMesh
@@ -143,7 +153,7 @@ class Solution(Shown):
         return np.abs(self.exitance_at(points))
 
     def phase_at(self, points: FloatArray) -> FloatArray:
-        """How far the exitance lags behind the light at points of the surface, (q,), degrees from -30 up to 330."""
+        """Phase by which the exitance lags behind the light at points of the surface, (q,), degrees from -30 to 330."""
         return lag(self.exitance_at(points))
 
     def _at_nearest(self, points: FloatArray, values_on: Callable[[FloatArray], NumberArray]) -> NumberArray:
@@ -181,7 +191,7 @@ class Solution(Shown):
     def resolution(self) -> tuple[FloatArray, FloatArray]:
         """Points of the surface (n, 3), and how much space the exitance needs to change there, (n,), unit.
 
-        Middles of boundary facets and their longest sides, and where charges were fitted, how far these are apart.
+        Middles of boundary facets and their longest sides; and points where charges were fitted, and their spacing.
         """
         facets = self.mesh.points[self.mesh.boundary_faces]
         fitted = [patch.residual.points for patch in self.patches if isinstance(patch, FittedPatch)]
@@ -198,9 +208,8 @@ class Solution(Shown):
         Returns
         -------
         (q,) ndarray
-            1 less the expected relative error of the exitance, not below 0: see `tetlux.fem.validity.local`. It is the
-            error of the model, which no mesh makes smaller; that of the mesh is `error_estimate`. nan at points that
-            are not finite.
+            1 less the expected relative error of diffusion itself, at least 0: see `tetlux.fem.validity.local`. The
+            error by the mesh is `error_estimate`. nan at points that are not finite.
         """
         return self._at_nearest(points, self.valid_on)
 

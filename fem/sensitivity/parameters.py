@@ -23,7 +23,7 @@ class Grid:
     origin : (3,) floats
         The first point, unit.
     spacing : float or (3,) floats
-        unit.
+        Distance between neighbouring points, along each axis or along all, unit.
 
     Raises
     ------

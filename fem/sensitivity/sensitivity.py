@@ -69,11 +69,11 @@ def sensitivity(
     subtract: Subtract = "fitted",
     dtype: npt.DTypeLike = np.float64,
 ) -> Sensitivity:
-    """Derivatives of what detectors read to absorption and scattering, by adjoint solutions.
+    """Derivatives of readings with respect to absorption and scattering, by adjoint solutions.
 
-    Each light and each detector takes one solution; the rest is products. The derivative to the coefficients of a
-    region is that of the reading as it is computed on this mesh, with the depths and powers of the lights, what is
-    subtracted and D, so that differences of readings of `System.solve` agree.
+    Each light and each detector takes one solution; the rest is products. The derivative with respect to the
+    coefficients of a region is that of the reading as it is computed on this mesh, including depths and powers of
+    lights, what is subtracted, and D, so that it agrees with differences of readings of `System.solve`.
 
     Parameters
     ----------
@@ -107,9 +107,9 @@ def sensitivity(
 
     Notes
     -----
-    The forward and adjoint fluences and their products: Arridge 1999, Inverse Problems 15, R41, sec. 4. Where the light
-    enters, what moves its points and changes their power belongs to the tetrahedra on the way; along broad beams it is
-    shared out by length and power.
+    The forward and adjoint fluences and their products: Arridge 1999, Inverse Problems 15, R41, sec. 4. Coefficients
+    along a beam also change the depth and power of its sources; this part goes to the tetrahedra along its path, for
+    broad beams by length and power.
 
     Examples
     --------

@@ -96,7 +96,7 @@ def moments(
 
     Notes
     -----
-    Beams reach all depths at once, as with the `frequency` of `tetlux.fem.solve`.
+    The time that a beam takes to reach its depth is left out, as with the `frequency` of `tetlux.fem.solve`.
 
     Examples
     --------

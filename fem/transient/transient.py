@@ -60,19 +60,21 @@ class Transient:
     Attributes
     ----------
     times : (t,) ndarray
-        s.
+        Times after the pulse, s.
     steady : Solution
-        The same lights shining steadily, W: the integral over time. Its `mesh` and `surface` are those in time.
+        The same lights shining steadily: the integral over time. Light in time has the same `mesh` and `surface`.
     detectors : tuple of PlacedDetector
-        Where detectors are.
+        Where the detectors are.
     contours : tuple of Contour
-        Of windows of the times.
+        Contours in the Laplace domain, one for each window of the times.
     scenes : tuple of tuple of QuadraticScene
         The light at each point of each contour.
-    mesh_error, reading_error : MeshError
-        Of the surface, and of each detector.
+    mesh_error : MeshError
+        The error that the mesh makes in the exitance of the surface.
+    reading_error : MeshError
+        The error that the mesh makes in the reading of each detector.
     lights : tuple of int
-        The numbers of the lights that shine.
+        Numbers of the lights that shine, from 0.
     of_lights : tuple of Transient
         What each light adds, in their order, if there are several.
     seconds : dict
@@ -97,12 +99,12 @@ class Transient:
 
     @property
     def mesh(self) -> TetMesh:
-        """The mesh."""
+        """The mesh, which is that of `steady`."""
         return self.steady.mesh
 
     @property
     def surface(self) -> Surface:
-        """What the mesh stands for."""
+        """The surface that the mesh approximates."""
         return self.steady.surface
 
     @property

@@ -20,11 +20,12 @@ RIM = 0.85
 class TruncatedSolution(Solution):
     """A solution on the part of a body that light reaches; `mesh` is that of the part.
 
-    Beyond the part the exitance is what the field at its rim decays to, which is not modelled, and the fluence is nan.
+    Beyond the part the exitance is that of a field that decays from its rim, and the fluence is nan.
 
     Attributes
     ----------
     part : Part
+        The part that was cut out.
     cut_error : float
         Estimated relative L2 error of the exitance by the cut, which is part of `error_estimate`.
     """
@@ -36,7 +37,7 @@ class TruncatedSolution(Solution):
 
     @property
     def meshed_surface(self) -> Surface:
-        """The surface of the part, which the mesh stands for."""
+        """The surface of the part, which the mesh approximates."""
         assert self.part is not None
         return self.part.surface
 

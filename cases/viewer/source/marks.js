@@ -23,8 +23,10 @@ const ARROW_RADIUS = 0.0042;
 const END_ON = 0.94;
 // Edges of regions at which faces meet at a larger angle, degrees.
 const EDGE = 30;
-// Places of the name of a region, of which one is taken that covers no other: at its top, below or above, pixels.
-const SHIFTS = [0, 17, -17];
+// Places of the name of a region, of which one is taken that covers no other mark: at its top, below or above, pixels.
+const SHIFTS = [0, 17, -17, 34, -34];
+// Half the size of the ring of a detector or light, pixels.
+const RING = 8;
 
 function arrow([tail, tip], radius, material) {
   const [start, end] = [new Vector3(...tail), new Vector3(...tip)];
@@ -117,19 +119,23 @@ export class Labels {
   // Put them where the camera sees them; names that would cover an earlier one are left out, or moved.
   place(camera, width, height, shown) {
     const taken = [];
+    const rings = [];
     for (const { kind, place, element } of this.labels) {
       element.hidden = !shown[kind === "beams" ? "lights" : kind];
       if (element.hidden) continue;
       const { x, y } = place.clone().project(camera);
       const [left, top] = [((x + 1) / 2) * width, ((1 - y) / 2) * height];
       element.style.transform = `translate(${left}px, ${top}px)`;
+      if (kind !== "regions") rings.push([left - RING, top - RING, left + RING, top + RING]);
       const name = element.querySelector("span");
       if (!name) continue;
       name.hidden = false;
       const wide = 7 * name.textContent.length;
       const start = kind === "regions" ? left - wide / 2 : left + 10;
       const boxAt = (shift) => [start, top + shift - 8, start + wide, top + shift + 8];
-      const free = (box) => !taken.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
+      // Regions are the last, and keep off the rings of all others too.
+      const others = kind === "regions" ? [...taken, ...rings] : taken;
+      const free = (box) => !others.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
       const shift = (kind === "regions" ? SHIFTS : [0]).find((each) => free(boxAt(each)));
       name.hidden = shift === undefined;
       if (name.hidden) continue;

@@ -29,12 +29,12 @@ def point_exitance(
     gamma : (n,) array_like
         Angles from the source, radians.
     shift : complex
-        ``i omega n/c`` of light modulated at omega, 1/unit.
+        ``i omega n/c`` for light modulated at the angular frequency omega, in a medium of index n, 1/unit.
 
     Returns
     -------
     (n,) ndarray
-        1/unit².
+        Complex amplitude of the exitance, W/unit².
 
     Examples
     --------

@@ -20,7 +20,7 @@ class Disc(RoundSpot):
     center : (3,) floats
         A point on the beam's axis, unit.
     radius : float
-        unit.
+        Radius of the spot, unit.
 
     Raises
     ------

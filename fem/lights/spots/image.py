@@ -43,7 +43,7 @@ class Image:
     center : (3,) floats
         Middle of the image, on the axis of the beam, unit.
     width : float
-        unit; the height follows from the image.
+        Width of the image, unit; the height follows from its shape.
     pixels : (rows, columns) ndarray
         Brightness from 0 to 1, linear, the upper row first.
     up : (3,) floats

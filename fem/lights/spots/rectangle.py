@@ -19,8 +19,10 @@ class Rectangle:
     ----------
     center : (3,) floats
         A point on the beam's axis, unit.
-    width, height : float
-        Across and along `up`, unit.
+    width : float
+        Length across `up`, unit.
+    height : float
+        Length along `up`, unit.
     up : (3,) floats
         Direction of the height; its component along the beam does not count.
 
