@@ -49,9 +49,9 @@ def measure(scene: Scene, tolerance: float, *, charges: bool = False) -> tuple[F
             lights,
             regions=regions,
             model="charges",
-            tolerance=tolerance if regions else None,
+            tolerance=None,
             detectors=detectors,
-            detector_tolerance=None if regions else tolerance,
+            detector_tolerance=tolerance,
         )
     else:
         solution = solve(
