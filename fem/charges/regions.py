@@ -14,6 +14,7 @@ from tetlux.fem.charges.adapt import COUNT_FACTOR, FEWEST_CHARGES, MOST_CHARGES,
 from tetlux.fem.charges.check import ErrorEstimates, exitance_error, norm, residual_wave_number
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import factorise
+from tetlux.fem.charges.jumps import errors_by_jumps, jumps_of
 from tetlux.fem.charges.kernel import Equation
 from tetlux.fem.charges.placement import (
     EQUATION_REFINEMENT,
@@ -27,6 +28,7 @@ from tetlux.fem.charges.placement import (
     spacing_scale,
     weight_by_distance,
 )
+from tetlux.fem.charges.readings import ReadingGoal
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
@@ -160,10 +162,11 @@ def fit_regions(
     equations: Sequence[Equation],
     light: RegionSources,
     *,
-    tolerance: float,
+    tolerance: float | None,
+    goal: ReadingGoal | None = None,
     most: int = MOST_CHARGES,
 ) -> FittedRegions:
-    """Fit charges until the estimated error of the exitance is within the tolerance, or there are `most` charges.
+    """Fit charges until the estimated errors are within their tolerances, or there are `most` charges.
 
     Parameters
     ----------
@@ -172,20 +175,52 @@ def fit_regions(
     equations : sequence of Equation
         Of region 0, around all others, and of regions 1, 2, ...
     light : RegionSources
-    tolerance : float
+    tolerance : float, optional
         Relative L2 error of the exitance.
+    goal : ReadingGoal, optional
+        Detectors on the body's surface, and the relative error of what each reads.
     most : int
         Approximate number of charges at which fitting ends in any case.
+
+    Returns
+    -------
+    FittedRegions
+        The fit that is nearest to the tolerances.
     """
-    count = min(FEWEST_CHARGES * (2 * len(interfaces) - 1), most)
-    best = fit_regions_at(place_at_interfaces(interfaces, light, count), equations, light)
-    while best.errors.estimate > tolerance and LEAST_LAST_FACTOR * count <= most:
+    count, height = min(FEWEST_CHARGES * (2 * len(interfaces) - 1), most), HEIGHT_ROUGH
+    best, least = None, np.inf
+    while True:
+        fitted = fit_regions_at(place_at_interfaces(interfaces, light, count, height), equations, light)
+        excess = _excess(fitted, tolerance, goal)
+        if best is None or excess < least:
+            best, least = fitted, excess
+        if least <= 1.0 or LEAST_LAST_FACTOR * count > most:
+            return best
         count = min(round(COUNT_FACTOR * count), most)
         height = HEIGHT_SMOOTH if best.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
-        fitted = fit_regions_at(place_at_interfaces(interfaces, light, count, height), equations, light)
-        if fitted.errors.estimate < best.errors.estimate:
-            best = fitted
-    return best
+
+
+def _excess(fitted: FittedRegions, tolerance: float | None, goal: ReadingGoal | None) -> float:
+    """The largest estimated error over its tolerance."""
+    excess = 0.0 if tolerance is None else fitted.errors.estimate / tolerance
+    if goal is None:
+        return excess
+    fields = [replace(field, strengths=field.strengths.sum(axis=1)) for field in fitted.fields]
+    body, *others = fitted.placements
+    checked, spacing = body.placement.checked, EQUATION_REFINEMENT * body.placement.checked.spacing
+    residual = fields[0].exitance_and_residual(checked.points, checked.normals)[1]
+    exitance = fields[0].exitance(goal.detectors)
+    jumps = []
+    for each in others:
+        assert each.interface.outside is not None
+        points = each.placement.checked
+        own = fields[each.interface.inside], fields[each.interface.outside]
+        jumps.append(jumps_of(*own, points, EQUATION_REFINEMENT * points.spacing))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_jumps = errors_by_jumps(body.interface.surface, goal, jumps) / np.abs(exitance)
+    worst = float(np.hypot(goal.relative_errors(checked, spacing, residual, exitance), by_jumps).max())
+    # Not a number where nothing is read.
+    return max(excess, worst / goal.tolerance if np.isfinite(worst) else np.inf)
 
 
 def fit_regions_at(

@@ -56,7 +56,7 @@ def charge_solution(
     tolerance : float, optional
         Wanted relative L2 error of the exitance.
     readings : (d, 3) ndarray and float, optional
-        Points that are read and wanted relative error of each reading, in a body without regions.
+        Points that are read and wanted relative error of each reading.
     most : int
         Approximate number of charges at which fitting ends in any case.
     shift : complex
@@ -82,8 +82,7 @@ def charge_solution(
         samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         return ChargeSolution(surface, medium, *given, goal=goal)
-    assert tolerance is not None
-    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, most)
+    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, readings, most)
 
 
 def _in_regions(
@@ -93,7 +92,8 @@ def _in_regions(
     powers: FloatArray,
     ledgers: Sequence[LightLedger],
     inner: Sequence[tuple[Surface, Medium]],
-    tolerance: float,
+    tolerance: float | None,
+    readings: tuple[FloatArray, float] | None,
     most: int,
 ) -> ChargeSolution:
     """Fit charges in a body with regions, again and aiming lower while the ledger lacks too much power."""
@@ -103,13 +103,16 @@ def _in_regions(
     interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
     light = RegionSources(points, region_at(points, surfaces), powers)
     equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
+    goal = None
+    if readings is not None:
+        goal = reading_goal(surface, equations[0], points, powers.sum(axis=1), 0.0, *readings)
     aim = tolerance
     for _ in range(MOST_FITS):
-        fit = fit_regions(interfaces, equations, light, tolerance=aim, most=most)
+        fit = fit_regions(interfaces, equations, light, tolerance=aim, goal=goal, most=most)
         samples_of_all = tuple(each.placement.fitted for each in fit.placements)
         solved = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
-        solution = _with_imbalance(ChargeSolution(surface, medium, *solved))
-        if solution.error_estimate <= tolerance or solution.charges >= most:
+        solution = _with_imbalance(ChargeSolution(surface, medium, *solved, goal=goal))
+        if tolerance is None or aim is None or solution.error_estimate <= tolerance or solution.charges >= most:
             break
         aim *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
     return solution

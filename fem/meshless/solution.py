@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import ErrorEstimates
 from tetlux.fem.charges.field import ChargeField
+from tetlux.fem.charges.jumps import Jumps, errors_by_jumps, jumps_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT
 from tetlux.fem.charges.quadrature import quadrature
 from tetlux.fem.charges.readings import ReadingGoal
@@ -141,7 +142,24 @@ class ChargeSolution(Shown):
         """Estimated relative errors of the exitance at points (q, 3) on the surface, (q,)."""
         source = float(boundary_condition_of(self.medium).inflow(sum(ledger.transmitted for ledger in self.ledgers)))
         exitance = self.exitance_on(queries)
-        return reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
+        errors = reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
+        if self.goal is None:
+            return errors
+        by_jumps = errors_by_jumps(self.surface, self.goal.at(queries), self._jumps)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.hypot(errors, by_jumps / np.abs(exitance)))
+
+    @cached_property
+    def _jumps(self) -> list[Jumps]:
+        """What the fields of all lights together violate at the surfaces of regions."""
+        found = []
+        for interface, fitted in zip(self.interfaces, self.samples, strict=True):
+            if interface.outside is not None:
+                spacing = _nearest(cKDTree(fitted.points), EQUATION_REFINEMENT * fitted.spacing)
+                points = quadrature(interface.surface, spacing)
+                fields = self._sums[interface.inside], self._sums[interface.outside]
+                found.append(jumps_of(*fields, points, spacing(points.points)))
+        return found
 
     def fluence_at(self, points: npt.ArrayLike) -> NumberArray:
         """Fluence at points (q, 3), (q,), W/unit²; nan outside the body, infinite at a source."""

@@ -70,7 +70,7 @@ def solve_with_charges(
     detectors : sequence of Detector
         What is to be read.
     detector_tolerance : float, optional
-        Wanted relative error of what each detector reads, in a body without regions.
+        Wanted relative error of what each detector reads.
     most : int
         Charges at which fitting ends even if the tolerance is not met; the solution then carries a warning.
     frequency : float
@@ -96,7 +96,7 @@ def solve_with_charges(
     >>> solution.error_estimate < 0.02
     True
     """
-    _check_arguments(surface, medium, lights, detectors, regions, Tolerances(tolerance, detector_tolerance))
+    _check_arguments(surface, medium, lights, detectors, Tolerances(tolerance, detector_tolerance))
     assert isinstance(surface, Surface)
     assert isinstance(medium, AnyMedium)
     watch = Stopwatch()
@@ -146,7 +146,6 @@ def _check_arguments(
     medium: AnyMedium | GivenMedia | Sequence[AnyMedium | GivenMedia],
     lights: Sequence[Light],
     detectors: Sequence[Detector],
-    regions: Sequence[Region],
     tolerances: Tolerances,
 ) -> None:
     if isinstance(surface, TetMesh):
@@ -154,10 +153,6 @@ def _check_arguments(
     if not isinstance(medium, AnyMedium):
         raise InputError('model "charges" takes one medium at a time; call it once for each channel.')
     check_tolerances(tolerances, detectors)
-    if tolerances.readings is not None and len(regions):
-        raise InputError(
-            f'model "charges" takes detector_tolerance in a body without regions only; leave it out, or {_INSTEAD}'
-        )
     check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")

@@ -105,8 +105,6 @@ def _check(request: Request) -> None:
     refuse_mesh(request)
     if request.tolerances.fields:
         raise InputError("charges tell no errors of single places")
-    if request.tolerances.readings is not None and request.inner:
-        raise InputError("charges are fitted for readings in a body without regions only")
     for surface in (request.surface, *request.inner):
         check_simple(surface)
     for body in request.bodies:

@@ -147,12 +147,6 @@ class CaseSpec(Section):
                     'tolerance.{name} is for finite elements, not for model "{model}"; leave it out',
                     {"name": name, "model": self.model},
                 )
-        if "detectors" in given and self.regions and self.model == "charges":
-            raise PydanticCustomError(
-                "tolerance",
-                'tolerance.detectors with model "charges" is for a body without regions; leave it out, or write '
-                "model: full",
-            )
         return self
 
     @model_validator(mode="before")
