@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
+from matplotlib.figure import Figure
 
 from tetlux.cases.file.colours import to_linear
 from tetlux.cases.file.load import load_cases
@@ -131,8 +132,9 @@ def test_figures_show_exitance_and_power(folder: Path) -> None:
     assert (folder / "figures.pdf").read_bytes()[:5] == b"%PDF-"
 
 
-def test_the_mean_exitance_by_distance_is_that_of_the_rings(folder: Path) -> None:
+def test_the_mean_exitance_by_distance_is_that_of_the_rings(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from tetlux.cases.solve import solve_case  # noqa: PLC0415
+    from tetlux.cases.write import figures  # noqa: PLC0415
     from tetlux.cases.write.figures import RINGS, exitance_by_distance  # noqa: PLC0415
     from tetlux.cases.write.results import collect_results  # noqa: PLC0415
 
@@ -145,3 +147,9 @@ def test_the_mean_exitance_by_distance_is_that_of_the_rings(folder: Path) -> Non
     near, far = results.solutions[0].exitance_at(np.array([10 * axis, -10 * axis]))
     assert means["all"][0] == pytest.approx(near, rel=0.2)
     assert means["all"][-1] == pytest.approx(far, rel=0.1)
+    # The axis ends with the part of the curve that is drawn.
+    monkeypatch.setattr(figures, "FLOOR", 0.1)
+    axes = Figure().subplots()
+    figures._draw_exitance(axes, results, np.array([[3.0, 0.0, 5.0]]))
+    last = distances[means["all"] >= 0.1 * means["all"].max()][-1]
+    assert last < axes.get_xlim()[1] < 1.1 * last < distances[-1]
