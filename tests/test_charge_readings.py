@@ -12,7 +12,7 @@ from tests.benchmarks.readings import TOLERANCE, measure
 from tests.conftest import TISSUE
 from tetlux.cases.file.load import load_cases
 from tetlux.cases.shipped import library_folder
-from tetlux.fem import ChargeSolution, DiffuseLight, Medium, PencilBeam, PointDetector, PointSource, Region, solve
+from tetlux.fem import ChargeSolution, DiffuseLight, Medium, PencilBeam, PointDetector, PointSource, solve
 from tetlux.fem.exact import cylinder as exact_cylinder
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.meshless import solve_with_charges

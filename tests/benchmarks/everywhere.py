@@ -20,6 +20,8 @@ from tetlux.meshing.arrays import FloatArray
 
 TOLERANCE = 0.1
 POINTS = 1000
+# Scenes of these remainders by six are balls, and balls in balls.
+BALLS = (2, 4)
 
 
 def _points(radius: float, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
@@ -87,8 +89,11 @@ def print_cube() -> None:
 def main() -> None:
     """Print a line for each scene, and one for the cube."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scenes", nargs="*", type=int, default=[0, 3, 4, 7, 8, 11, 12, 15, 16])
-    for number in parser.parse_args().scenes:
+    parser.add_argument("scenes", nargs="*", type=int, default=[2, 4, 8, 10, 14, 16, 20, 22, 26])
+    numbers = parser.parse_args().scenes
+    if not all(number % 6 in BALLS for number in numbers):
+        parser.error(f"scenes are balls and balls in balls: give numbers of remainder {BALLS[0]} or {BALLS[1]} by 6")
+    for number in numbers:
         print_scene(number)
     print_cube()
 

@@ -226,9 +226,8 @@ def main() -> None:
 
 def _print_scenes(given: argparse.Namespace, *, charges: bool) -> None:
     print(f"random scenes by {'charges' if charges else 'finite elements'}")
-    # Two of six kinds have regions, for which charges take no detector tolerance.
-    even = given.even or (charges and given.all)
-    numbers = (number for number in itertools.count(given.first) if not (even and number % 6 > 3))
+    # Two of six kinds have regions.
+    numbers = (number for number in itertools.count(given.first) if not (given.even and number % 6 > 3))
     scenes = itertools.islice(numbers, given.scenes)
     print_scenes(scenes, given.tolerance, charges=charges, each=given.each)
 
