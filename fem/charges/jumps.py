@@ -12,9 +12,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from tetlux.fem.charges.field import ChargeField
-from tetlux.fem.charges.readings import RANDOM, SUMMED, ReadingGoal
+from tetlux.fem.charges.readings import LESS_SMOOTHED_SHARE, RANDOM, SUMMED, ReadingGoal
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
@@ -58,10 +59,12 @@ def errors_by_jumps(surface: Surface, goal: ReadingGoal, jumps: Iterable[Jumps])
     zb, fading = goal.equation.extrapolation_length, goal.fading
     for each in jumps:
         points, normals = each.samples.points, each.samples.normals
-        ways = goal.detectors[:, None] - points
-        distances = np.linalg.norm(ways, axis=2)
-        deepened = 1.0 + np.maximum(np.einsum("dni,di->dn", ways, outward), 0.0) / zb
-        tilt = outward @ normals.T - fading * zb * deepened * np.einsum("dni,ni->dn", ways, normals) / distances
+        # No nearer than residuals of the boundary condition are taken to be.
+        distances = np.hypot(cdist(goal.detectors, points), LESS_SMOOTHED_SHARE * each.spacing)
+        depths = np.einsum("di,di->d", goal.detectors, outward)[:, None] - outward @ points.T
+        deepened = 1.0 + np.maximum(depths, 0.0) / zb
+        along = (goal.detectors @ normals.T - np.einsum("ni,ni->n", points, normals)) / distances
+        tilt = outward @ normals.T - fading * zb * deepened * along
         effects = zb / (2.0 * np.pi) * (1.0 + fading * distances) * np.exp(-fading * distances) / distances**3
         parts = effects * (deepened * each.flux + tilt * each.fluence)
         summed, random = np.abs(parts @ each.samples.areas), np.abs(parts * each.spacing) ** 2 @ each.samples.areas
