@@ -27,6 +27,8 @@ ERROR_OF_REGION = 4.0
 # Charges at least where points light a body that is no ball and that light fades much in: more of them are fitted until
 # the exitance is nowhere below zero.
 OF_FADING, FADING_LENGTHS = 200, 4.0
+# Charges for what detectors read in bodies with regions: 215 to 1,200 in balls in balls, 450 to 1,420 in fingers.
+OF_READINGS_IN_REGIONS = 700
 # Seconds that any fit takes, and those of 300 charges, with the smaller fits before it, and how they grow.
 SECONDS_OF_ANY, SECONDS_OF_300, RATE_OF_SECONDS = 0.07, 0.25, 1.5
 BYTES_OF_300 = 20e6
@@ -46,6 +48,8 @@ def charges_candidate(request: Request) -> Candidate:
     error = first * (300.0 / count) ** rate
     suits = count < MOST_CHARGES or error <= request.exitance_tolerance
     count = max(count * (1 + len(request.inner)), OF_FADING if _has_fading_points(request) else 0.0)
+    if request.tolerances.readings is not None and request.inner:
+        count = max(count, OF_READINGS_IN_REGIONS)
     size = (count / 300.0) ** 2
     seconds = learned[0] * seconds_of_charges(count) * len(request.bodies)
     reason = f"about {round(count, -1):,.0f} charges, whose residual tells the error"
