@@ -67,6 +67,15 @@ def test_lists_make_channels(load: Load) -> None:
     assert load(more="channels: [a, b, c, d]\n").channels[3].lights == {"point_1": PointSource((0.0, 0.0, 0.0))}
 
 
+def test_channels_may_be_wavelengths_as_numbers(load: Load) -> None:
+    two = "{sigma_a: [0.01, 0.02], sigma_s_prime: 1, eta: 1.4}"
+    assert load(two, "channels: [690, 832.5]\npicture: {channel: 832.5}\n").channel_names == ("690", "832.5")
+    with pytest.raises(InputError, match=r"channels\[1\]: expected text, but found true"):
+        load(two, "channels: [690, true]\n")
+    with pytest.raises(InputError, match="channel"):
+        load(two, "channels: [690, 830]\npicture: {channel: 800}\n")
+
+
 def test_powers_make_channels_and_0_leaves_a_light_out(load: Load) -> None:
     case = load(more="  - {name: beam, pencil: {origin: [0, 0, 9], direction: [0, 0, -1], power: [2, 0]}}\n")
     assert case.light_names == ("point_1", "beam")

@@ -12,7 +12,7 @@ from tetlux.cases.file.schema.fit import FitSpec, refuse_beside_fit, refuse_with
 from tetlux.cases.file.schema.fluorescence import FluorescenceSpec
 from tetlux.cases.file.schema.lights import LightSpec
 from tetlux.cases.file.schema.media import Media
-from tetlux.cases.file.schema.parts import TAG, Direction, Each, Label, Number, Section, shape_of
+from tetlux.cases.file.schema.parts import TAG, ChannelName, Direction, Each, Number, Section, shape_of
 from tetlux.cases.file.schema.pictures import Pictures, PictureSpec
 from tetlux.cases.file.schema.pulse import PulseSpec, refuse_beside_pulse
 from tetlux.cases.file.schema.sweep import SweepSpec
@@ -68,7 +68,7 @@ class CaseSpec(Section):
     surface: SurfaceSpec | None = None
     medium: Media | None = None
     mesh: MeshSpec | None = Field(None, description="a volume mesh of your own, in place of surface and medium")
-    channels: Annotated[list[Label], Field(min_length=1)] | None = Field(
+    channels: Annotated[list[ChannelName], Field(min_length=1)] | None = Field(
         None, description="names of the channels, as many as the lists in the case have values"
     )
     regions: list[RegionSpec] = Field([])

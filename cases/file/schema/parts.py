@@ -25,6 +25,14 @@ Direction = Annotated[Vector3, BeforeValidator(_no_letter)]
 Numbers = Annotated[list[Number], Field(min_length=1)]
 # The name of a channel, light, region or detector, which becomes part of the names of arrays in files.
 Label = Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.+-]*$", max_length=60)]
+# The name of a channel, or a number in place of it, as of a wavelength.
+ChannelName = Annotated[
+    Label,
+    BeforeValidator(
+        lambda name: f"{name:.10g}" if isinstance(name, (int, float)) and not isinstance(name, bool) else name,
+        json_schema_input_type=Label | float,
+    ),
+]
 Encoding = Literal["srgb", "linear"]
 
 # Tags of alternatives begin with this, so that error messages can leave them out of keys.

@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic_core import PydanticCustomError
 
 from tetlux.cases.file.schema.camera import CameraSpec
-from tetlux.cases.file.schema.parts import TAG, Label, Number, Section, Vector3, shape_of
+from tetlux.cases.file.schema.parts import TAG, ChannelName, Label, Number, Section, Vector3, shape_of
 
 Pixels = Annotated[int, Field(strict=True, ge=500, le=8000)]
 ColourMap = Literal["inferno", "viridis", "grey", "blue-red"]
@@ -29,7 +29,7 @@ class PictureSpec(Section):
     field: PictureField | None = Field(
         None, description="default: colours of channels red, green and blue, fluence with a cut, else exitance"
     )
-    channel: str | None = Field(None, description="default: the sum of all")
+    channel: ChannelName | None = Field(None, description="default: the sum of all")
     light: str | None = Field(None, description="default: the sum of all")
     scale: Literal["log", "linear"] | None = Field(None, description="default: linear for valid and phase, else log")
     range: tuple[Number, Number] | None = Field(None, description="values at the ends of the colours")
