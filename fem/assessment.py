@@ -78,7 +78,8 @@ class Tolerances:
             readings = [reading for scene, step in by_scene.items() for reading in self._read(scene, step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
             largest_ratio = max(largest_ratio, of_readings / self.readings)
-            summary += f", of readings {of_readings:.2%}"
+            # A reading of next to nothing may be off by many thousands of times itself.
+            summary += f", of readings {of_readings:.2%}" if of_readings <= 1.0 else ", of readings above 100%"
             splits = np.maximum(splits, splits_for_readings(readings, self.readings, len(splits)))
         for where, tolerance in self.fields.items():
             bands = [band for step in steps for band in _bands(step, where)]
