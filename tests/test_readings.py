@@ -204,6 +204,32 @@ def test_a_reading_is_smooth_in_the_coefficients_where_patches_are_kept(far: Sol
     assert np.diff(np.log(found)) == pytest.approx(np.diff(np.log(right)), rel=0.03)
 
 
+@pytest.mark.parametrize("kept", [True, False])
+def test_neighbouring_scenes_agree_within_their_bars(far: Solution, kept: bool) -> None:
+    """Media and positions that differ by a hundredth: on ten meshes by .17 bars of both at most, and by 2e-5."""
+    gamma, errors, bars = ARCS / RADIUS, [], []
+    for sigma_a, depth in ((0.012, DEPTH), (0.01212, DEPTH), (0.012, 1.01 * DEPTH)):
+        medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.1, eta=1.4)
+        detectors = on_ball(ARCS)
+        light = [PointSource((0.0, 0.0, RADIUS - depth), 1.0)]
+        readings = solve(
+            sphere(RADIUS),
+            medium,
+            light,
+            tolerance=None,
+            detectors=detectors,
+            detector_tolerance=0.01,
+            mesh=far.mesh if kept else None,
+            cache=kept,
+        ).readings
+        right = exact.point_exitance(medium, radius=RADIUS, source_radius=RADIUS - depth, gamma=gamma)
+        errors.append([reading.exitance for reading in readings] / right - 1.0)
+        bars.append([reading.relative_error for reading in readings])
+    apart = np.abs(np.array(errors) - errors[0])
+    assert (apart <= 0.5 * (np.array(bars) + bars[0])).all()
+    assert apart.max() < 1e-4
+
+
 def test_light_that_fades_within_a_tetrahedron_is_read_by_linear_elements_and_says_so() -> None:
     """Quadratic elements overshoot by a factor of three there; linear ones are fitted to the layer."""
     absorber = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
