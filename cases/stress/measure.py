@@ -156,7 +156,7 @@ def _solve(scenario: Scenario, variant: Variant) -> AnySolution:
         [scenario.light],
         regions=scenario.regions,
         mesh=mesh,
-        tolerance=None if detectors and options["model"] == "full" else TOLERANCE,
+        tolerance=None if detectors and options["model"] in ("full", "charges") else TOLERANCE,
         detectors=detectors,
         detector_tolerance=TOLERANCE if detectors else None,
         **options,
