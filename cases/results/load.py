@@ -161,6 +161,7 @@ def load_result(folder: str | Path) -> RunResult:
     Examples
     --------
     >>> import tempfile
+    >>> from pathlib import Path
     >>> from tetlux.cases.cli import main
     >>> with tempfile.TemporaryDirectory() as out:
     ...     code = main(["run", "sphere", "--out", out, "--quiet"])
