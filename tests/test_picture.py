@@ -18,6 +18,7 @@ from tetlux.cases.picture.shading import draw_stage, place_samples, samples_of
 from tetlux.cases.picture.stage import (
     BACKGROUND,
     DARK,
+    FULL,
     OVERSAMPLING,
     SHADED,
     build_stage,
@@ -130,6 +131,26 @@ def test_a_body_in_its_own_colours_is_drawn_on_a_dark_ground(tmp_path: Path) -> 
     assert len(rows) > 3000
     assert np.ptp(rows) == pytest.approx(64, abs=2)
     assert np.ptp(columns) == pytest.approx(64, abs=2)
+
+
+def test_an_even_ball_has_its_colour_and_is_shaded_by_its_normals(tmp_path: Path) -> None:
+    ball = sphere(10.0, subdivisions=4)
+    even, target = np.ones(len(ball.points)), tmp_path / "picture.png"
+    draw_picture(PictureScene(ball.points, ball.faces, even, "mm", "even"), target)
+    image = pixels(target)[TOP : TOP + PANEL[1], LEFT : LEFT + PANEL[0]]
+    camera = build_stage(ball.points, ball.faces, even, ()).camera
+    middle, *axes = camera.project(np.vstack([np.zeros(3), np.eye(3)]))[:, :2]
+    right, down = camera.pixel * (np.array(axes) - middle).T
+    row, column = np.mgrid[: PANEL[1], : PANEL[0]] + 0.5
+    x, y = (camera.pixel / 10.0 * (at - start) for at, start in zip((column, row), middle, strict=True))
+    inside = np.hypot(x, y) < 0.95
+    x, y = x[inside], y[inside]
+    normals = np.outer(x, right) + np.outer(y, down) + np.outer(np.sqrt(1.0 - x**2 - y**2), camera.toward)
+    shade = SHADED + (FULL - SHADED) * np.clip(normals @ camera.lamp, 0.0, 1.0)
+    # Measured: .3 in the mean, 1.1 at most, of 255.
+    off = np.abs(image[inside] - 255.0 * shade[:, None] * color_table()[-1])
+    assert off.mean() < 1.0
+    assert off.max() < 4.0
 
 
 def test_a_failure_leaves_the_old_picture_and_nothing_else(
