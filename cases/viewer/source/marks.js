@@ -23,10 +23,14 @@ const ARROW_RADIUS = 0.0042;
 const END_ON = 0.94;
 // Edges of regions at which faces meet at a larger angle, degrees.
 const EDGE = 30;
-// Places of the name of a region, of which one is taken that covers no other mark: at its top, below or above, pixels.
+// Places of the name of a region, of which the nearest is taken that covers no other mark: at its top, below or above,
+// and aside of these, pixels.
 const SHIFTS = [0, 17, -17, 34, -34];
-// Half the size of the ring of a detector or light, pixels.
+// Half the size of the ring of a detector or light, and of the squares that cover the shaft of an arrow, pixels.
 const RING = 8;
+const SHAFT = 4;
+// Squares along a shaft.
+const ALONG = 40;
 
 function arrow([tail, tip], radius, material) {
   const [start, end] = [new Vector3(...tail), new Vector3(...tip)];
@@ -102,7 +106,8 @@ export class Labels {
     this.labels = [];
   }
 
-  add(kind, place, text) {
+  // A beam comes from another place.
+  add(kind, place, text, from) {
     const element = document.createElement("div");
     element.className = `mark ${kind}`;
     element.append(document.createElement("i"));
@@ -112,7 +117,7 @@ export class Labels {
       element.append(name);
     }
     this.parent.append(element);
-    this.labels.push({ kind, place: new Vector3(...place), element });
+    this.labels.push({ kind, place: new Vector3(...place), element, from: from ? new Vector3(...from) : null });
     return element;
   }
 
@@ -120,26 +125,36 @@ export class Labels {
   place(camera, width, height, shown) {
     const taken = [];
     const rings = [];
-    for (const { kind, place, element } of this.labels) {
+    const seen = (place) => {
+      const { x, y } = place.clone().project(camera);
+      return [((x + 1) / 2) * width, ((1 - y) / 2) * height];
+    };
+    for (const { kind, place, element, from } of this.labels) {
       element.hidden = !shown[kind === "beams" ? "lights" : kind];
       if (element.hidden) continue;
-      const { x, y } = place.clone().project(camera);
-      const [left, top] = [((x + 1) / 2) * width, ((1 - y) / 2) * height];
+      const [left, top] = seen(place);
       element.style.transform = `translate(${left}px, ${top}px)`;
       if (kind !== "regions") rings.push([left - RING, top - RING, left + RING, top + RING]);
+      for (let i = 0; from && i < ALONG; i += 1) {
+        const [x, y] = seen(from.clone().lerp(place, i / ALONG));
+        rings.push([x - SHAFT, y - SHAFT, x + SHAFT, y + SHAFT]);
+      }
       const name = element.querySelector("span");
       if (!name) continue;
       name.hidden = false;
       const wide = 7 * name.textContent.length;
       const start = kind === "regions" ? left - wide / 2 : left + 10;
-      const boxAt = (shift) => [start, top + shift - 8, start + wide, top + shift + 8];
-      // Regions are the last, and keep off the rings of all others too.
+      const boxAt = ([across, down]) => [start + across, top + down - 8, start + across + wide, top + down + 8];
+      // Regions are the last, and keep off the rings and shafts of all others too.
       const others = kind === "regions" ? [...taken, ...rings] : taken;
       const free = (box) => !others.some((b) => box[0] < b[2] && b[0] < box[2] && box[1] < b[3] && b[1] < box[3]);
-      const shift = (kind === "regions" ? SHIFTS : [0]).find((each) => free(boxAt(each)));
+      const aside = [0, wide / 2 + 2 * SHAFT, -wide / 2 - 2 * SHAFT];
+      const shifts = kind === "regions" ? aside.flatMap((across) => SHIFTS.map((down) => [across, down])) : [[0, 0]];
+      shifts.sort((one, other) => Math.hypot(...one) - Math.hypot(...other));
+      const shift = shifts.find((each) => free(boxAt(each)));
       name.hidden = shift === undefined;
       if (name.hidden) continue;
-      name.style.marginTop = `${shift}px`;
+      [name.style.marginLeft, name.style.marginTop] = shift.map((each) => `${each}px`);
       taken.push(boxAt(shift));
     }
   }

@@ -69,7 +69,7 @@ class Viewer {
     this.regions = await Promise.all(data.regions.map((region) => makeRegion(region, data.up)));
     this.section = new Section(data, this.regions);
     this.scene.add(this.body.mesh, this.arrows, ...this.regions.map((region) => region.group), ...this.section.objects);
-    this.rings = data.lights.arrows.map(([, tip]) => this.labels.add("beams", tip));
+    this.rings = data.lights.arrows.map(([tail, tip]) => this.labels.add("beams", tip, "", tail));
     for (const place of data.lights.points) this.labels.add("lights", place);
     for (const { name, place } of data.detectors) this.labels.add("detectors", place, name);
     for (const { name, top } of this.regions) this.labels.add("regions", top, name);
