@@ -68,7 +68,5 @@ def _excess(fitted: FittedCharges, goal: ReadingGoal, tolerance: float | None) -
     checked = fitted.placement.checked
     exitance = fitted.field.exitance(goal.detectors).sum(axis=1)
     spacing = EQUATION_REFINEMENT * checked.spacing
-    worst = float(goal.relative_errors(checked, spacing, fitted.residual, exitance).max()) / goal.tolerance
-    # Not a number where nothing is read.
-    worst = worst if np.isfinite(worst) else np.inf
-    return worst if tolerance is None else max(worst, fitted.errors.estimate / tolerance)
+    errors = goal.relative_errors(checked, spacing, fitted.residual, exitance)
+    return goal.excess(errors, fitted.errors.estimate, tolerance)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from tetlux.fem.charges.field import ChargeField
-from tetlux.fem.charges.readings import LESS_SMOOTHED_SHARE, RANDOM, SUMMED, ReadingGoal
+from tetlux.fem.charges.readings import LESS_SMOOTHED_SHARE, ReadingGoal, squared_errors
 from tetlux.fem.charges.samples import Samples
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
@@ -49,8 +49,8 @@ def jumps_of(inside: ChargeField, outside: ChargeField, samples: Samples, spacin
     return Jumps(samples, spacing, fluence, inner[1] - outer[1] - fluence)
 
 
-def errors_by_jumps(surface: Surface, goal: ReadingGoal, jumps: Iterable[Jumps]) -> FloatArray:
-    """Errors of the exitance at the detectors of a goal by jumps at surfaces of regions, (d,), W/unit².
+def errors_by_jumps(surface: Surface, goal: ReadingGoal, jumps: Iterable[Jumps], exitance: NumberArray) -> FloatArray:
+    """Relative errors of the exitance (d,) at the detectors of a goal by jumps at surfaces of regions, (d,).
 
     They count as residuals of the boundary condition do: the sum over each surface, and what random signs leave.
     """
@@ -67,6 +67,6 @@ def errors_by_jumps(surface: Surface, goal: ReadingGoal, jumps: Iterable[Jumps])
         tilt = outward @ normals.T - fading * zb * deepened * along
         effects = zb / (2.0 * np.pi) * (1.0 + fading * distances) * np.exp(-fading * distances) / distances**3
         parts = effects * (deepened * each.flux + tilt * each.fluence)
-        summed, random = np.abs(parts @ each.samples.areas), np.abs(parts * each.spacing) ** 2 @ each.samples.areas
-        squares += (SUMMED * summed) ** 2 + RANDOM**2 * random
-    return np.sqrt(squares)
+        squares += squared_errors(parts, each.samples.areas, each.spacing)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.sqrt(squares) / np.abs(exitance))

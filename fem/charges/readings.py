@@ -166,10 +166,31 @@ class ReadingGoal:
             if len(self.sources) == 0:
                 return np.asarray(ripples / np.abs(exitance))
             effects = self._effects(samples.points)
-            summed = np.abs(effects @ (samples.areas * residual))
-            random = np.sqrt(effects**2 @ (samples.areas * np.abs(residual * spacing) ** 2))
-            squares = (SUMMED * summed) ** 2 + (RANDOM * random) ** 2 + (RIPPLING * ripples) ** 2
+            squares = squared_errors(effects * residual, samples.areas, spacing) + (RIPPLING * ripples) ** 2
             return np.asarray(np.sqrt(squares) / np.abs(exitance))
+
+    def excess(self, errors: FloatArray, estimate: float, tolerance: float | None) -> float:
+        """The largest relative error over its tolerance, of readings (d,) and, with a tolerance, of the exitance."""
+        worst = float(errors.max()) / self.tolerance
+        # Not a number where nothing is read.
+        worst = worst if np.isfinite(worst) else np.inf
+        return worst if tolerance is None else max(worst, estimate / tolerance)
+
+
+def squared_errors(parts: NumberArray, areas: FloatArray, spacing: FloatArray) -> FloatArray:
+    """Squares of errors of readings by residuals: their sum, and what random signs leave, (d,), W²/unit⁴.
+
+    Parameters
+    ----------
+    parts : (d, n) ndarray
+        Residuals times what each changes of each reading, W/unit⁴.
+    areas : (n,) ndarray
+        Of the points of the surface.
+    spacing : (n,) ndarray
+        Of charges there, unit.
+    """
+    summed, random = np.abs(parts @ areas), np.abs(parts * spacing) ** 2 @ areas
+    return np.asarray((SUMMED * summed) ** 2 + RANDOM**2 * random)
 
 
 def ripple_errors(

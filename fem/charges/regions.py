@@ -14,7 +14,7 @@ from tetlux.fem.charges.adapt import COUNT_FACTOR, FEWEST_CHARGES, MOST_CHARGES,
 from tetlux.fem.charges.check import ErrorEstimates, exitance_error, norm, residual_wave_number
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.fit import factorise
-from tetlux.fem.charges.jumps import errors_by_jumps, jumps_of
+from tetlux.fem.charges.jumps import Jumps, errors_by_jumps, jumps_of
 from tetlux.fem.charges.kernel import Equation
 from tetlux.fem.charges.placement import (
     EQUATION_REFINEMENT,
@@ -99,11 +99,17 @@ class FittedRegions:
     fields : tuple of ChargeField
         Of the region around all others, then of regions 1, 2, ...: sources, then charges.
     placements : tuple of InterfacePlacement
+    residual : (n,) ndarray
+        Of the boundary condition at the checked points of the body's surface, of all lights together, W/unit².
+    jumps : tuple of Jumps
+        At the checked points of the surfaces of regions 1, 2, ..., of all lights together.
     errors : ErrorEstimates
     """
 
     fields: tuple[ChargeField, ...]
     placements: tuple[InterfacePlacement, ...]
+    residual: NumberArray
+    jumps: tuple[Jumps, ...]
     errors: ErrorEstimates
 
 
@@ -202,25 +208,14 @@ def fit_regions(
 
 def _excess(fitted: FittedRegions, tolerance: float | None, goal: ReadingGoal | None) -> float:
     """The largest estimated error over its tolerance."""
-    excess = 0.0 if tolerance is None else fitted.errors.estimate / tolerance
     if goal is None:
-        return excess
-    fields = [replace(field, strengths=field.strengths.sum(axis=1)) for field in fitted.fields]
-    body, *others = fitted.placements
-    checked, spacing = body.placement.checked, EQUATION_REFINEMENT * body.placement.checked.spacing
-    residual = fields[0].exitance_and_residual(checked.points, checked.normals)[1]
-    exitance = fields[0].exitance(goal.detectors)
-    jumps = []
-    for each in others:
-        assert each.interface.outside is not None
-        points = each.placement.checked
-        own = fields[each.interface.inside], fields[each.interface.outside]
-        jumps.append(jumps_of(*own, points, EQUATION_REFINEMENT * points.spacing))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        by_jumps = errors_by_jumps(body.interface.surface, goal, jumps) / np.abs(exitance)
-    worst = float(np.hypot(goal.relative_errors(checked, spacing, residual, exitance), by_jumps).max())
-    # Not a number where nothing is read.
-    return max(excess, worst / goal.tolerance if np.isfinite(worst) else np.inf)
+        assert tolerance is not None
+        return fitted.errors.estimate / tolerance
+    body, exitance = fitted.placements[0], fitted.fields[0].exitance(goal.detectors).sum(axis=1)
+    checked = body.placement.checked
+    at_surface = goal.relative_errors(checked, EQUATION_REFINEMENT * checked.spacing, fitted.residual, exitance)
+    within = errors_by_jumps(body.interface.surface, goal, fitted.jumps, exitance)
+    return goal.excess(np.hypot(at_surface, within), fitted.errors.estimate, tolerance)
 
 
 def fit_regions_at(
@@ -244,7 +239,19 @@ def fit_regions_at(
         ChargeField(equation, np.vstack([points, some]), np.vstack([power, part]))
         for equation, points, some, power, part in zip(equations, sources, charges, powers, parts, strict=True)
     )
-    return FittedRegions(fields, tuple(placements), _estimate_errors(fields, placements))
+    sums = [replace(field, strengths=field.strengths.sum(axis=1)) for field in fields]
+    checked = placements[0].placement.checked
+    exitance, residual = sums[0].exitance_and_residual(checked.points, checked.normals)
+    jumps = tuple(_jumps_at(each, sums) for each in placements[1:])
+    errors = _estimate_errors(sums, placements, exitance, residual, jumps)
+    return FittedRegions(fields, tuple(placements), residual, jumps, errors)
+
+
+def _jumps_at(each: InterfacePlacement, fields: Sequence[ChargeField]) -> Jumps:
+    """Jumps at the checked points of the surface of a region."""
+    inside, outside, checked = each.interface.inside, each.interface.outside, each.placement.checked
+    assert outside is not None
+    return jumps_of(fields[inside], fields[outside], checked, EQUATION_REFINEMENT * checked.spacing)
 
 
 def _charges_at(each: InterfacePlacement, region: int) -> FloatArray:
@@ -254,33 +261,27 @@ def _charges_at(each: InterfacePlacement, region: int) -> FloatArray:
     return each.charges_inside if region == each.interface.outside else np.zeros((0, 3))
 
 
-def _estimate_errors(fields: Sequence[ChargeField], placements: Sequence[InterfacePlacement]) -> ErrorEstimates:
+def _estimate_errors(
+    fields: Sequence[ChargeField],
+    placements: Sequence[InterfacePlacement],
+    exitance: NumberArray,
+    residual: NumberArray,
+    jumps: Sequence[Jumps],
+) -> ErrorEstimates:
     """No bound, and an estimate from the residuals at points that were not fitted.
 
     A jump of phi across an inner interface changes phi by half of the jump on either side. A jump of the flux changes
     phi as a sheet of charges does, by ``1/(2 D q)`` of the jump for a wave number q. Both fade as ``exp(-q l)`` on the
     way to the body's surface, a distance l away.
     """
-    body = placements[0]
-    outer = fields[0].equation
-    total, size = 0.0, 0.0
-    for each in placements:
-        samples, interface = each.placement.checked, each.interface
-        spacing = EQUATION_REFINEMENT * samples.spacing
-        if interface.outside is None:
-            exitance, residual = fields[0].exitance_and_residual(samples.points, samples.normals)
-            size = norm(samples.areas, exitance.sum(axis=1))
-            errors = exitance_error(outer, residual.sum(axis=1), spacing)
-        else:
-            inside, outside = (
-                fields[region].exitance_and_residual(samples.points, samples.normals)
-                for region in (interface.inside, interface.outside)
-            )
-            step = (inside[0] - outside[0]).sum(axis=1)
-            flux = (inside[1] - outside[1]).sum(axis=1) - step
-            ripple = residual_wave_number(outer, INNER_RIPPLE_FACTOR * spacing)
-            depth = body.interface.surface.distances(samples.points)
-            sheet = outer.robin / (2.0 * fields[interface.outside].equation.diffusion * ripple)
-            errors = np.exp(-ripple * depth) * np.hypot(0.5 * np.abs(step), np.abs(flux) * sheet)
-        total = float(np.hypot(total, norm(samples.areas, errors)))
-    return ErrorEstimates(np.nan, total / size)
+    body, *others = placements
+    outer, checked = fields[0].equation, body.placement.checked
+    total = norm(checked.areas, exitance_error(outer, residual, EQUATION_REFINEMENT * checked.spacing))
+    for each, jump in zip(others, jumps, strict=True):
+        assert each.interface.outside is not None
+        ripple = residual_wave_number(outer, INNER_RIPPLE_FACTOR * jump.spacing)
+        depth = body.interface.surface.distances(jump.samples.points)
+        sheet = outer.robin / (2.0 * fields[each.interface.outside].equation.diffusion * ripple)
+        errors = np.exp(-ripple * depth) * np.hypot(0.5 * np.abs(jump.fluence), np.abs(jump.flux) * sheet)
+        total = float(np.hypot(total, norm(jump.samples.areas, errors)))
+    return ErrorEstimates(np.nan, total / norm(checked.areas, exitance))

@@ -106,15 +106,16 @@ def _in_regions(
     goal = None
     if readings is not None:
         goal = reading_goal(surface, equations[0], points, powers.sum(axis=1), 0.0, *readings)
-    aim = tolerance
+    below = 1.0
     for _ in range(MOST_FITS):
+        aim = None if tolerance is None else below * tolerance
         fit = fit_regions(interfaces, equations, light, tolerance=aim, goal=goal, most=most)
         samples_of_all = tuple(each.placement.fitted for each in fit.placements)
         solved = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
         solution = _with_imbalance(ChargeSolution(surface, medium, *solved, goal=goal))
-        if tolerance is None or aim is None or solution.error_estimate <= tolerance or solution.charges >= most:
+        if tolerance is None or solution.error_estimate <= tolerance or solution.charges >= most:
             break
-        aim *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
+        below *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
     return solution
 
 

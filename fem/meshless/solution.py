@@ -145,20 +145,26 @@ class ChargeSolution(Shown):
         errors = reading_errors(self.surface, self._sums[0], self.samples[0], source, queries, exitance, self.goal)
         if self.goal is None:
             return errors
-        by_jumps = errors_by_jumps(self.surface, self.goal.at(queries), self._jumps)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.hypot(errors, by_jumps / np.abs(exitance)))
+        return np.hypot(errors, errors_by_jumps(self.surface, self.goal.at(queries), self._jumps, exitance))
 
     @cached_property
     def _jumps(self) -> list[Jumps]:
         """What the fields of all lights together violate at the surfaces of regions."""
         found = []
-        for interface, fitted in zip(self.interfaces, self.samples, strict=True):
+        for interface, (points, spacing) in zip(self.interfaces, self._quadratures, strict=True):
             if interface.outside is not None:
-                spacing = _nearest(cKDTree(fitted.points), EQUATION_REFINEMENT * fitted.spacing)
-                points = quadrature(interface.surface, spacing)
                 fields = self._sums[interface.inside], self._sums[interface.outside]
-                found.append(jumps_of(*fields, points, spacing(points.points)))
+                found.append(jumps_of(*fields, points, spacing))
+        return found
+
+    @cached_property
+    def _quadratures(self) -> list[tuple[Samples, FloatArray]]:
+        """Points at which each interface is integrated over, and the spacing of charges there, unit."""
+        found = []
+        for interface, fitted in zip(self.interfaces, self.samples, strict=True):
+            spacing = _nearest(cKDTree(fitted.points), EQUATION_REFINEMENT * fitted.spacing)
+            points = quadrature(interface.surface, spacing)
+            found.append((points, spacing(points.points)))
         return found
 
     def fluence_at(self, points: npt.ArrayLike) -> NumberArray:
@@ -240,10 +246,7 @@ class ChargeSolution(Shown):
         diffused: Number
         inflow: Number
         area, diffused, inflow = 0.0, 0.0, 0.0
-        for interface, fitted in zip(self.interfaces, self.samples, strict=True):
-            tree = cKDTree(fitted.points)
-            spacing = EQUATION_REFINEMENT * fitted.spacing
-            points = quadrature(interface.surface, _nearest(tree, spacing))
+        for interface, (points, _) in zip(self.interfaces, self._quadratures, strict=True):
             exitance, residual = self._sums[interface.inside].exitance_and_residual(points.points, points.normals)
             inflow += (points.areas @ (residual - exitance)).item()
             if interface.outside is None:
