@@ -53,7 +53,7 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
             f"another run is at work on {target}; wait for its end, or choose another folder with --out."
         ) from error
     except OSError as error:
-        raise write_error(target, error) from error
+        raise write_error(out, name, error) from error
     try:
         try:
             if folder.exists():
@@ -65,7 +65,7 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
                 if not os.access(target, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         except OSError as error:
-            raise write_error(target, error) from error
+            raise write_error(out, name, error) from error
         yield folder
     finally:
         shutil.rmtree(place, ignore_errors=True)
@@ -155,7 +155,7 @@ def replace_files(out: Path, names: Sequence[str]) -> Iterator[Path]:
             yield folder
             publish(folder, out, names)
         except OSError as error:
-            raise write_error(out, error) from error
+            raise write_error(out, ".", error) from error
 
 
 def check_writable(out: Path) -> None:
@@ -180,9 +180,10 @@ def disk_is_full(error: BaseException) -> bool:
     return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
 
 
-def write_error(target: Path, error: OSError) -> RunError:
-    """The error to raise when results cannot be written."""
-    room = "make room, or " if error.errno in FULL else ""
+def write_error(out: Path, name: str, error: OSError) -> RunError:
+    """The error to raise when the results of a run cannot be written into the folder of all results."""
+    # A full disk is full for all runs.
+    place, room = (out, "make room, or ") if error.errno in FULL else (out / name, "")
     return RunError(
-        f"results cannot be written to {target}: {error.strerror or error}; {room}choose another folder with --out."
+        f"results cannot be written to {place}: {error.strerror or error}; {room}choose another folder with --out."
     )

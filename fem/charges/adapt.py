@@ -43,6 +43,9 @@ SMOOTH_ESTIMATE = 0.006
 REFINEMENT_EXPONENT = 0.5
 # Shares within this factor of their geometric mean do not change the spacing.
 NOISE_FACTOR = 1.5
+# A charge that causes less than this share of the largest error is taken to cause so much: where light fades to nothing
+# errors do too, and a spacing by them would be without bounds.
+LEAST_SHARE = 1e-8
 # Factors between which the spacing changes from fit to fit where equations are weighted by more than the distance.
 # Largest error of ten fibres on a ball of radius 80, by 100, 190, 320, 540 charges, without / with them: 25e-3, .33e-3,
 # .39e-3, .30e-3 / 1.3e-3, .31e-3, .30e-3, .30e-3; estimate of the exitance .088, .0017, .0062, .0001 / .017, .0008,
@@ -258,7 +261,7 @@ def refine_spacing(
     count = min(AVERAGED_NEIGHBOURS, len(samples))
     _, near = tree.query(samples.points, k=count)
     local = np.sqrt(np.square(errors)[near].mean(axis=1))
-    deviation = np.log(np.maximum(local, np.finfo(float).tiny))
+    deviation = np.log(np.maximum(local, max(LEAST_SHARE * local.max(), np.finfo(float).tiny)))
     deviation -= deviation.mean()
     deviation = np.sign(deviation) * np.maximum(np.abs(deviation) - np.log(NOISE_FACTOR), 0.0)
     with np.errstate(divide="ignore"):
