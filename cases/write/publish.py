@@ -68,7 +68,10 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
             raise write_error(out, name, error) from error
         yield folder
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        try:
+            place.rmdir()
+        except OSError:
+            shutil.rmtree(place, ignore_errors=True)
         # Unlock last: otherwise another process would take the folder for that of a killed one.
         os.close(lock)
 
@@ -117,9 +120,11 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
     OSError
         If a file cannot be removed or moved.
     """
-    for name in reversed(names):
-        (target / name).unlink(missing_ok=True)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        for name in reversed(names):
+            (target / name).unlink(missing_ok=True)
+    else:
+        target.parent.mkdir(parents=True, exist_ok=True)
     try:
         # In one step, unless the target exists and is not empty.
         folder.rename(target)
