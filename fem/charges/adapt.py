@@ -48,7 +48,7 @@ NOISE_FACTOR = 1.5
 # .39e-3, .30e-3 / 1.3e-3, .31e-3, .30e-3, .30e-3; estimate of the exitance .088, .0017, .0062, .0001 / .017, .0008,
 # .0001, .00003.
 LEAST_CHANGE, MOST_CHANGE = 0.5, 1.4
-# The same where they are not: where light fades to nothing errors do too, and a spacing by them would be without bounds.
+# The same where they are not: where light fades to nothing errors do too, and a spacing by them would have no bounds.
 # Lit bodies have .35 to 4, and up to 70 where they absorb most.
 LEAST_BY_ERRORS, MOST_BY_ERRORS = 0.1, 10.0
 # Number of nearest points over which the residual and the spacing are averaged.
@@ -260,7 +260,7 @@ def refine_spacing(
     """
     tree = cKDTree(samples.points)
     count = min(AVERAGED_NEIGHBOURS, len(samples))
-    apart, near = tree.query(samples.points, k=count)
+    apart, near = (np.asarray(found) for found in tree.query(samples.points, k=count))
     local = np.sqrt(np.square(errors)[near].mean(axis=1))
     deviation = np.log(np.maximum(local, np.finfo(float).tiny))
     deviation -= deviation.mean()

@@ -74,7 +74,7 @@ class InterpolatedSpacing:
 def _grow_slowly(spacing: FloatArray, near: IntArray, apart: FloatArray) -> FloatArray:
     """The largest spacing (n,), not above a given one, that grows by no more than distances of neighbours (n, k)."""
     while True:
-        limited = np.minimum(spacing, (spacing[near] + apart).min(axis=1))
+        limited: FloatArray = np.minimum(spacing, (spacing[near] + apart).min(axis=1))
         if np.array_equal(limited, spacing):
             return limited
         spacing = limited

@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tetlux.fem.body.body import Body
 from tetlux.fem.media.coefficients import AnyMedium, base_of
 from tetlux.fem.media.medium import Medium
