@@ -165,7 +165,7 @@ def finish_case(
                 publish(folder, target, [*_more_pictures(folder, target), *ALL_FILES])
                 report(f"written in {time.perf_counter() - writing:.2f} s")
             except OSError as error:
-                raise write_error(target, error) from error
+                raise write_error(out, case.name, error) from error
     except (MemoryError, RuntimeError) as error:
         if not memory_ran_out(error):
             raise

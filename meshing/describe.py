@@ -1,6 +1,6 @@
 """Short texts for messages and representations: counts, sizes with units, vectors, objects with arrays."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, Field, fields
 from typing import Any
 
@@ -8,6 +8,8 @@ import numpy as np
 
 from tetlux.meshing.arrays import FloatArray
 
+# Labels that a message lists; it counts the others.
+MOST_LABELS_NAMED = 8
 # Largest number of characters of one value and of a line.
 LONGEST_VALUE, LONGEST_LINE = 90, 180
 
@@ -21,6 +23,14 @@ def size(points: FloatArray, unit: str) -> str:
     """Side lengths of the bounding box of points (n, 3), such as ``34.2 x 30 x 26 mm``."""
     lengths = np.ptp(points, axis=0) if len(points) else np.zeros(3)
     return f"{' x '.join(f'{length:.3g}' for length in lengths)} {unit}"
+
+
+def label_text(labels: Iterable[int], names: Mapping[int, str]) -> str:
+    """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
+    texts = [f"{label} ({names[label]})" if label in names else str(label) for label in labels]
+    more = len(texts) - MOST_LABELS_NAMED
+    shown = texts if more <= 0 else [*texts[:MOST_LABELS_NAMED], f"{more} more"]
+    return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
 def as_text(vector: Iterable[float], size: float = 0.0) -> str:

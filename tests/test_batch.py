@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tetlux.cases import run as runs
 from tetlux.cases.batch import workshop
 from tetlux.cases.batch.engine import run_batch, worker_count
 from tetlux.cases.batch.events import BatchEnded, Event, MeshFinished, RunFailed, RunFinished, WorkerLost
@@ -21,6 +22,7 @@ from tetlux.cases.batch.launch import Launcher, seem_many
 from tetlux.cases.batch.requests import load_all
 from tetlux.cases.cli import main
 from tetlux.cases.file.case import Case
+from tetlux.cases.results import batch_tables
 from tetlux.cases.results.batch_tables import BatchTables
 from tetlux.cases.run import finish_case
 from tetlux.cases.write.content import content_of
@@ -158,15 +160,21 @@ def test_one_failing_run_does_not_end_the_others(tmp_path: Path, monkeypatch: py
 
 
 def test_a_full_disk_ends_the_batch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fill(case: Case, *_: object, **__: object) -> None:
-        full = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        raise RunError("results cannot be written: No space left on device.") from full
+    """It is said once, of the folder of all results, though tables cannot be written either."""
 
-    monkeypatch.setattr(workshop, "finish_case", fill)
+    def fill(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(runs, "publish", fill)
+    monkeypatch.setattr(batch_tables, "write_page", fill)
     events: list[Event] = []
-    ended = run_batch(read(tmp_path), tmp_path / "out", jobs=1, listeners=[events.append])
+    ended = run_batch(read(tmp_path), tmp_path / "out", jobs=1, listeners=[events.append, BatchTables()])
     assert (ended.failed, ended.left, ended.how) == (1, 5, "stopped")
-    assert len([event for event in events if isinstance(event, RunFailed)]) == 1
+    (failure,) = [event for event in events if isinstance(event, RunFailed)]
+    assert failure.reason == (
+        f"results cannot be written to {tmp_path / 'out'}: {os.strerror(errno.ENOSPC)}; make room, or choose another "
+        "folder with --out."
+    )
 
 
 def test_workers_find_what_one_process_finds_though_one_is_killed(finished: Path, tmp_path: Path) -> None:

@@ -21,14 +21,14 @@ from tetlux.fem import (
     read,
     solve,
 )
-from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges, fit_placed_charges
+from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges, fit_for_remainder, fit_placed_charges
 from tetlux.fem.charges.check import estimate_errors, norm
 from tetlux.fem.charges.faint import fit_with_faint
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import Equation, equation_of
 from tetlux.fem.charges.placement import EQUATION_REFINEMENT, place_above_surface
 from tetlux.fem.charges.samples import Samples
-from tetlux.fem.exact import layered_ball, sphere_light
+from tetlux.fem.exact import half_space, layered_ball, sphere_light
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.meshless import ChargeSolution, solve_with_charges
 from tetlux.fem.outcome.surface_exitance import surface_exitance
@@ -140,6 +140,20 @@ def spoilt(fitted: FittedCharges, field: ChargeField) -> float:
     return estimate_errors(
         field.equation, samples, EQUATION_REFINEMENT * samples.spacing, exitance[:, 0], residual[:, 0]
     ).bound
+
+
+def test_charges_gather_where_light_is_though_it_fades_to_nothing_elsewhere(ball: Surface) -> None:
+    """A spacing that follows errors over three hundred orders of magnitude would ask for charges without number."""
+    medium, depth = Medium(sigma_a=100.0, sigma_s_prime=0.1, eta=1.4), 0.01
+    light = below_pole(depth)
+    fitted = fit_for_remainder(ball, equation_of(medium), light, tolerance=0.005)
+    assert fitted is not None
+    assert len(fitted.placement.feet) < 1000
+    checked = fitted.placement.checked
+    near = checked[np.linalg.norm(checked.points - light.points[0], axis=1) < 10.0 * depth]
+    # The surface is flat to so near a source.
+    right = half_space.point_exitance(medium, depth=depth, rho=np.hypot(*near.points[:, :2].T))
+    assert norm(near.areas, fitted.field.exitance(near.points)[:, 0] - right) < 0.02 * norm(near.areas, right)
 
 
 def test_the_residual_tells_a_flipped_sign(fitted: FittedCharges) -> None:

@@ -234,7 +234,7 @@ def test_a_residual_that_is_known_at_some_points_is_that_computed_anew(ball: Sur
     (light,) = split_lights([PointSource((0.0, 0.0, 9.0))], Body(ball, (TISSUE,)), "fitted").fitted.values()
     points = light.points_within(lambda places: np.where(places[:, 2] > 0.0, np.inf, 1.5))
     taken, anew = (residual_at(points, light.charges, known) for known in (light.residual, None))
-    distance = np.asarray(light.residual.tree.query(points.points)[0])
+    distance = np.asarray(light.points.tree.query(points.points)[0])
     assert 0.1 < (distance < 1e-9).mean() < 0.9
     assert taken.values == pytest.approx(anew.values, rel=1e-6, abs=1e-12)
     assert taken.exitance == pytest.approx(anew.exitance, rel=1e-9)

@@ -5,6 +5,7 @@ import pytest
 
 from tests.conftest import TISSUE
 from tetlux.fem import DiscDetector, Medium, PointDetector, PointSource, Region, Transient, solve
+from tetlux.fem.exact.modulated.sphere import pulse_exitance
 from tetlux.fem.transient.contour import LONGEST_WINDOW, contour_for, windows_of
 from tetlux.fem.transient.solve import slowest_decay
 from tetlux.meshing import InputError, Surface, TetMesh, sphere
@@ -201,3 +202,13 @@ def test_times_before_light_diffuses_are_reported(
     assert any(note.startswith("at the first time, 2e-11 s, light has gone 4.3 mean free") for note in early.warnings)
     later = solve(ball, TISSUE, [SOURCE], times=[6e-11, 1e-9], mesh=ball_mesh)
     assert not any(note.startswith("at the first time") for note in later.warnings)
+
+
+def test_late_light_of_the_series_is_its_slowest_mode() -> None:
+    """The same everywhere but for a factor, however much is absorbed meanwhile; the next mode is .3 % of it then."""
+    gamma, medium = np.linspace(0.1, 3.0, 5), Medium(sigma_a=0.01, sigma_s_prime=0.99, eta=1.4)
+    earlier, later = (
+        pulse_exitance(medium, radius=30.0, source_radius=29.0, gamma=gamma, path=path) for path in (2400.0, 3000.0)
+    )
+    np.testing.assert_allclose(later / earlier, later[-1] / earlier[-1], rtol=0.005)
+    assert (earlier > 0).all()

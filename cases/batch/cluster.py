@@ -243,7 +243,7 @@ def _write_files(out: Path, name: str, files: _Files) -> None:
                 (folder / file).write_bytes(content)
             publish(folder, out / name, ALL_FILES)
         except OSError as error:
-            raise write_error(out / name, error) from error
+            raise write_error(out, name, error) from error
 
 
 # A worker may have several threads, but the solver has its own, and caches that are not for several.

@@ -19,7 +19,7 @@ from tetlux.cases.results.rows import (
     result_rows,
 )
 from tetlux.cases.results.table_file import TableFile, replace_file
-from tetlux.cases.write.publish import write_error
+from tetlux.cases.write.publish import FULL, write_error
 from tetlux.meshing.errors import RunError
 
 RESULTS, PARQUET, READINGS, PAGE = "results.csv", "results.parquet", "readings.csv", "index.html"
@@ -70,7 +70,9 @@ class BatchTables:
             try:
                 self._finish()
             except OSError as error:
-                raise write_error(self._out, error) from error
+                # That the disk is full was said of the run that found it so; rows of finished runs are there.
+                if event.how != "stopped" or error.errno not in FULL:
+                    raise write_error(self._out, ".", error) from error
 
     def _start(self, event: BatchStarted) -> None:
         self._out = event.out

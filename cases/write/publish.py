@@ -53,7 +53,7 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
             f"another run is at work on {target}; wait for its end, or choose another folder with --out."
         ) from error
     except OSError as error:
-        raise write_error(target, error) from error
+        raise write_error(out, name, error) from error
     try:
         try:
             if folder.exists():
@@ -65,10 +65,13 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
                 if not os.access(target, os.W_OK):
                     raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         except OSError as error:
-            raise write_error(target, error) from error
+            raise write_error(out, name, error) from error
         yield folder
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        try:
+            place.rmdir()
+        except OSError:
+            shutil.rmtree(place, ignore_errors=True)
         # Unlock last: otherwise another process would take the folder for that of a killed one.
         os.close(lock)
 
@@ -117,9 +120,11 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
     OSError
         If a file cannot be removed or moved.
     """
-    for name in reversed(names):
-        (target / name).unlink(missing_ok=True)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    if target.exists():
+        for name in reversed(names):
+            (target / name).unlink(missing_ok=True)
+    else:
+        target.parent.mkdir(parents=True, exist_ok=True)
     try:
         # In one step, unless the target exists and is not empty.
         folder.rename(target)
@@ -155,7 +160,7 @@ def replace_files(out: Path, names: Sequence[str]) -> Iterator[Path]:
             yield folder
             publish(folder, out, names)
         except OSError as error:
-            raise write_error(out, error) from error
+            raise write_error(out, ".", error) from error
 
 
 def check_writable(out: Path) -> None:
@@ -180,9 +185,10 @@ def disk_is_full(error: BaseException) -> bool:
     return isinstance(error.__cause__, OSError) and error.__cause__.errno in FULL
 
 
-def write_error(target: Path, error: OSError) -> RunError:
-    """The error to raise when results cannot be written."""
-    room = "make room, or " if error.errno in FULL else ""
+def write_error(out: Path, name: str, error: OSError) -> RunError:
+    """The error to raise when the results of a run cannot be written into the folder of all results."""
+    # A full disk is full for all runs.
+    place, room = (out, "make room, or ") if error.errno in FULL else (out / name, "")
     return RunError(
-        f"results cannot be written to {target}: {error.strerror or error}; {room}choose another folder with --out."
+        f"results cannot be written to {place}: {error.strerror or error}; {room}choose another folder with --out."
     )

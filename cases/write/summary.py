@@ -196,7 +196,7 @@ def _validity(validity: Validity) -> dict[str, float]:
         "albedo": validity.albedo,
         "least_thickness_in_mean_free_paths": float(validity.thickness.min()),
         "share_thin": validity.mean(validity.thickness < THIN),
-        "share_near_light": validity.mean(validity.distances(validity.middles) < NEAR),
+        "share_near_light": validity.mean(validity.facet_distances < NEAR),
         "mean_valid": validity.mean(valid),
         "least_valid": float(valid.min()),
     }

@@ -19,7 +19,7 @@ from tetlux.fem.charges.placement import (
     place_charges,
     weight_by_distance,
 )
-from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.charges.samples import InterpolatedSpacing, Samples, Spacing
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -48,10 +48,11 @@ NOISE_FACTOR = 1.5
 # .39e-3, .30e-3 / 1.3e-3, .31e-3, .30e-3, .30e-3; estimate of the exitance .088, .0017, .0062, .0001 / .017, .0008,
 # .0001, .00003.
 LEAST_CHANGE, MOST_CHANGE = 0.5, 1.4
+# The same where they are not: where light fades to nothing errors do too, and a spacing by them would have no bounds.
+# Lit bodies have .35 to 4, and up to 70 where they absorb most.
+LEAST_BY_ERRORS, MOST_BY_ERRORS = 0.1, 10.0
 # Number of nearest points over which the residual and the spacing are averaged.
 AVERAGED_NEIGHBOURS = 12
-# Number of nearest old points from which the spacing at a new point is interpolated.
-INTERPOLATED_NEIGHBOURS = 3
 # Where finite elements solve for the remainder, fitting ends when the estimated error of the charges alone is this
 # multiple of the tolerance: of their residual a third to a half is left then. Processor seconds (hare's side, its ear)
 # at a tolerance of .02 for .6 / 1: .34, .68 / .24, .35.
@@ -248,7 +249,10 @@ def error_of_each(fitted: FittedCharges) -> FloatArray:
 
 
 def refine_spacing(
-    samples: Samples, errors: FloatArray, least_change: float = 0.0, most_change: float = np.inf
+    samples: Samples,
+    errors: FloatArray,
+    least_change: float = LEAST_BY_ERRORS,
+    most_change: float = MOST_BY_ERRORS,
 ) -> Spacing:
     """Spacing, up to a factor, that is finer where charges cause large errors (n,), which refinement makes equal.
 
@@ -256,17 +260,11 @@ def refine_spacing(
     """
     tree = cKDTree(samples.points)
     count = min(AVERAGED_NEIGHBOURS, len(samples))
-    _, near = tree.query(samples.points, k=count)
+    apart, near = (np.asarray(found) for found in tree.query(samples.points, k=count))
     local = np.sqrt(np.square(errors)[near].mean(axis=1))
     deviation = np.log(np.maximum(local, np.finfo(float).tiny))
     deviation -= deviation.mean()
     deviation = np.sign(deviation) * np.maximum(np.abs(deviation) - np.log(NOISE_FACTOR), 0.0)
-    with np.errstate(divide="ignore"):
-        change = np.clip(-REFINEMENT_EXPONENT * deviation, np.log(least_change), np.log(most_change))
+    change = np.clip(-REFINEMENT_EXPONENT * deviation, np.log(least_change), np.log(most_change))
     logarithm = (np.log(samples.spacing) + change)[near].mean(axis=1)
-
-    def spacing(points: FloatArray) -> FloatArray:
-        _, around = tree.query(points, k=min(INTERPOLATED_NEIGHBOURS, count))
-        return np.asarray(np.exp(logarithm[around].mean(axis=1)))
-
-    return spacing
+    return InterpolatedSpacing(tree, logarithm, near, apart)

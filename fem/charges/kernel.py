@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.distance import cdist
 
 from tetlux.fem.media.medium import Medium
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.host.blocks import run_in_blocks
 
 # Pairs of a point and a charge that are evaluated at once; they fit into the processor's cache.
-PAIRS_PER_BLOCK = 50_000
+PAIRS_PER_BLOCK = 25_000
 
 
 @dataclass(frozen=True)
@@ -130,8 +131,11 @@ class Equation:
 
     def unit_fluence(self, distance: FloatArray) -> NumberArray:
         """Fluence of a unit charge at distances, W/unit²."""
-        value: NumberArray = np.exp(-self.wave_number * distance)
-        value /= 4.0 * np.pi * self.diffusion * distance
+        # In place: memory costs more than arithmetic.
+        value: NumberArray = np.multiply(distance, -self.wave_number)
+        value -= np.log(4.0 * np.pi * self.diffusion)
+        np.exp(value, out=value)
+        value /= distance
         return value
 
     def _unit_traces(
@@ -141,22 +145,21 @@ class Equation:
         fluence = self.unit_fluence(distance)
         # Coordinates relative to a nearby point lose fewer digits.
         origin = points[0]
-        height = np.einsum("ij,ij->i", points - origin, normals)[:, None] - normals @ (positions - origin).T
+        outward = self.diffusion * normals
+        depth = outward @ (positions - origin).T
+        depth -= np.einsum("ij,ij->i", points - origin, outward)[:, None]
         np.reciprocal(distance, out=distance)
-        height *= distance
-        flux = np.multiply(fluence, height)
-        flux *= -self.diffusion * (self.wave_number + distance)
+        depth *= distance
+        flux = np.multiply(fluence, depth)
+        flux *= np.add(distance, self.wave_number, out=None if np.iscomplexobj(flux) else distance)
         return fluence, flux
 
 
 def distances_between(points: FloatArray, positions: FloatArray, closest: float = 0.0) -> FloatArray:
     """Distances between points (n, 3) and positions (c, 3), at least `closest`, (n, c)."""
-    # |x - p|² from |x|² + |p|² - 2 x.p would lose digits close to a charge.
-    square: FloatArray = np.square(points[:, :1] - positions[:, 0])
-    square += np.square(points[:, 1:2] - positions[:, 1])
-    square += np.square(points[:, 2:] - positions[:, 2])
-    np.sqrt(square, out=square)
-    return square if closest == 0.0 else np.maximum(square, closest, out=square)
+    # Not from |x|² + |p|² - 2 x.p, which loses digits close to a charge.
+    distance: FloatArray = cdist(points, positions)
+    return distance if closest == 0.0 else np.maximum(distance, closest, out=distance)
 
 
 def rows_per_block(positions: FloatArray) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tetlux.fem.charges.samples import LEAST_SEPARATION, Samples, Spacing, cells_of, spread, thin
+from tetlux.fem.charges.samples import LEAST_SEPARATION, Samples, Spacing, cells_of, scaled, spread, thin
 from tetlux.meshing.arrays import BoolArray, FloatArray
 from tetlux.meshing.surface.surface import Surface
 
@@ -167,14 +167,12 @@ def spacing_scale(surfaces: Sequence[Surface], spacings: Sequence[Spacing], coun
     scale = 1.0
     for _ in range(3):
         # The spacing is better known by cells of about its own size.
-        cells = [cells_of(*each, COUNTING_CELL * scale) for each in zip(surfaces, spacings, strict=True)]
-        scale = float(np.sqrt(CHARGES_PER_SQUARE * sum(each.sample_count for each in cells) / count))
+        cells = [
+            cells_of(surface, scaled(spacing, scale), COUNTING_CELL)
+            for surface, spacing in zip(surfaces, spacings, strict=True)
+        ]
+        scale *= float(np.sqrt(CHARGES_PER_SQUARE * sum(each.sample_count for each in cells) / count))
     return scale
-
-
-def scaled(spacing: Spacing, scale: float) -> Spacing:
-    """A spacing times a factor."""
-    return lambda points: scale * spacing(points)
 
 
 def _checked(others: Samples, fitted: Samples) -> Samples:

@@ -24,12 +24,11 @@ from tetlux.fem.charges.placement import (
     distance_from,
     place_above_surface,
     place_charges_at,
-    scaled,
     spacing_scale,
     weight_by_distance,
 )
 from tetlux.fem.charges.readings import ReadingGoal
-from tetlux.fem.charges.samples import Samples
+from tetlux.fem.charges.samples import Samples, scaled
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 

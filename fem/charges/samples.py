@@ -27,9 +27,64 @@ CHECKED_NEIGHBOURS = 20
 # Longest side of a cell, over the spacing in its middle.
 LARGEST_CELL = 1.5
 _MOST_CUTS = 80
+# Number of nearest points from which a spacing is interpolated.
+INTERPOLATED_NEIGHBOURS = 3
+# A spacing that differs by more than this factor over the surface grows by no more than the distance, as that of the
+# first fit does: cells of the surface larger than a place where it is small would miss it.
+LARGEST_CONTRAST = 1e3
 
 # The wanted distance between points (n, 3) of the surface, (n,), unit.
 Spacing = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class InterpolatedSpacing:
+    """A spacing between points at which it is known.
+
+    Attributes
+    ----------
+    tree : cKDTree
+        Of the points.
+    logarithms : (n,) ndarray
+        Of the spacing at the points, unit.
+    near : (n, k) ndarray
+        Numbers of the nearest points of each, itself among them.
+    apart : (n, k) ndarray
+        How far they are away, unit.
+    """
+
+    tree: cKDTree
+    logarithms: FloatArray
+    near: IntArray
+    apart: FloatArray
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        """The spacing at points (q, 3), (q,), unit."""
+        _, around = self.tree.query(points, k=min(INTERPOLATED_NEIGHBOURS, len(self.logarithms)))
+        return np.asarray(np.exp(self.logarithms[around].mean(axis=1)))
+
+    def scaled(self, scale: float) -> "InterpolatedSpacing":
+        """The spacing times a factor; one that differs much grows by no more than the distance between points."""
+        logarithms = self.logarithms + np.log(scale)
+        if np.ptp(logarithms) > np.log(LARGEST_CONTRAST):
+            logarithms = np.log(_grow_slowly(np.exp(logarithms), self.near, self.apart))
+        return replace(self, logarithms=logarithms)
+
+
+def _grow_slowly(spacing: FloatArray, near: IntArray, apart: FloatArray) -> FloatArray:
+    """The largest spacing (n,), not above a given one, that grows by no more than distances of neighbours (n, k)."""
+    while True:
+        limited: FloatArray = np.minimum(spacing, (spacing[near] + apart).min(axis=1))
+        if np.array_equal(limited, spacing):
+            return limited
+        spacing = limited
+
+
+def scaled(spacing: Spacing, scale: float) -> Spacing:
+    """A spacing times a factor."""
+    if isinstance(spacing, InterpolatedSpacing):
+        return spacing.scaled(scale)
+    return lambda points: scale * spacing(points)
 
 
 @dataclass(frozen=True, eq=False)

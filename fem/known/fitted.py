@@ -36,9 +36,11 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import BoolArray, FloatArray, Number, NumberArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Number, NumberArray
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.mesh import TetMesh
 
 # A source nearer to the surface than this share of a mean free path is not fitted: it would take many charges.
 SHALLOWEST = 1e-3
@@ -59,6 +61,10 @@ READING_SHARE = 0.05
 # once or twice the exitance there.
 ACCURATE, AVERAGED = 0.3, 12
 
+# Many runs have the same points on one mesh: the point nearest to each node, and which of other points are the same.
+_NEAREST: ByPair[TetMesh, Samples, IntArray] = ByPair()
+_SAME_POINTS: ByPair[Samples, Samples, tuple[IntArray, IntArray, IntArray]] = ByPair()
+
 
 @dataclass(frozen=True, eq=False)
 class BoundaryResidual:
@@ -78,11 +84,6 @@ class BoundaryResidual:
     exitance: NumberArray
     values: NumberArray
     missed: Number
-
-    @cached_property
-    def tree(self) -> cKDTree:
-        """The search tree of the points."""
-        return self.points.tree
 
     __repr__ = one_line
 
@@ -128,11 +129,12 @@ class FittedLight:
         field, _ = fit_strengths(self.placement, equation_of(known.medium, shift), lights)
         return replace(known, equation=field.equation, strengths=field.strengths[:, 0])
 
-    def accurate_at(self, points: FloatArray) -> BoolArray:
-        """Whether the charges are accurate at the point of `residual` nearest to each of some points (n, 3), (n,)."""
+    def accurate_on(self, mesh: TetMesh) -> BoolArray:
+        """Whether the charges are accurate at the point of `residual` nearest to each node of a mesh, (n,)."""
         if self.accurate.all():
-            return np.ones(len(points), dtype=bool)
-        return np.asarray(self.accurate[self.residual.tree.query(points)[1]])
+            return np.ones(len(mesh.points), dtype=bool)
+        nearest = _NEAREST.get(mesh, self.points, lambda: np.asarray(self.points.tree.query(mesh.points)[1]))
+        return np.asarray(self.accurate[nearest])
 
     def points_within(self, wanted: Spacing) -> Samples:
         """Points as far apart as wanted at most, where a mesh is finer than those of the residual."""
@@ -215,7 +217,7 @@ def _fit_for_readings(
 def _accurate(residual: BoundaryResidual, equation: Equation) -> BoolArray:
     """Whether charges are accurate around each point, (q,), by the error that residuals make of the exitance there."""
     points = residual.points
-    nearest = residual.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
+    nearest = points.tree.query(points.points, k=min(AVERAGED, len(points.points)))[1]
     errors = exitance_error(equation, residual.values, points.spacing)
     error = np.sqrt((np.abs(errors[nearest]) ** 2).mean(axis=1))
     exitance = np.abs(residual.exitance[nearest]).mean(axis=1)
@@ -263,15 +265,21 @@ def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | Non
     exitance, values = np.empty((2, len(points)), charges.equation.dtype)
     new = np.arange(len(points))
     if known is not None:
-        distance, nearest = (np.asarray(found) for found in known.tree.query(points.points))
-        same = distance <= SAME * float(np.abs(points.points).max())
-        # Two triangles may have a point in common and not its normal.
-        same &= np.abs(known.points.normals[nearest] - points.normals).max(axis=1) <= SAME
-        exitance[same], values[same] = known.exitance[nearest[same]], known.values[nearest[same]]
-        new = new[~same]
+        of_known = known.points
+        old, same, new = _SAME_POINTS.get(of_known, points, lambda: _same_points(of_known, points))
+        exitance[same], values[same] = known.exitance[old], known.values[old]
     exitance[new], values[new] = charges.exitance_and_residual(points.points[new], points.normals[new])
     outflow = (points.areas @ (exitance - values)).item()
     return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
+
+
+def _same_points(known: Samples, points: Samples) -> tuple[IntArray, IntArray, IntArray]:
+    """Numbers of known points that are among some points, theirs among these, and those of all others of these."""
+    distance, nearest = (np.asarray(found) for found in known.tree.query(points.points))
+    same = distance <= SAME * float(np.abs(points.points).max())
+    # Two triangles may have a point in common and not its normal.
+    same &= np.abs(known.normals[nearest] - points.normals).max(axis=1) <= SAME
+    return nearest[same], np.flatnonzero(same), np.flatnonzero(~same)
 
 
 def _missed(charges: Charges, points: Samples, outflow: Number) -> Number:

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -15,7 +14,7 @@ from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_te
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.assembly import Lumping
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray, sum_by_index
-from tetlux.meshing.surface.triangles import longest_sides
+from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Ripples that a mesh misses are shorter than those that charges leave, by this factor.
@@ -84,7 +83,7 @@ class FittedPatch(Patch):
         """
         corners = self.mesh.boundary_faces[self.facets]
         seen = (self.residual_at_nodes[corners] * self.weights).sum(axis=1)
-        sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
+        sides = self.mesh.boundary_sides
         length = SHORTER * np.minimum(self.residual.points.spacing, sides[self.facets])
         missed = exitance_error(self.charges.equation, self.residual.values - seen, length)
         square = self.areas * np.abs(missed) ** 2
@@ -92,7 +91,7 @@ class FittedPatch(Patch):
 
     def splits_to_see(self) -> IntArray:
         """How often each boundary triangle has to be halved until it is as short as charges are apart, (f,)."""
-        sides = longest_sides(self.mesh.points[self.mesh.boundary_faces])
+        sides = self.mesh.boundary_sides
         apart = np.full(len(sides), np.inf)
         np.minimum.at(apart, self.facets, self.residual.points.spacing)
         # Two halve its sides.
@@ -113,8 +112,8 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
         new = light.charges.fluence(mesh.points[len(coarse.at_nodes) :])
         at_nodes = np.concatenate([coarse.at_nodes, new])
     residual = light.residual if coarse is None else coarse.residual
-    small = _are_small(mesh, light.residual)
-    lacking = int((small & _are_small(mesh, residual)).sum())
+    small = _are_small(mesh, light.points)
+    lacking = int((small & _are_small(mesh, residual.points)).sum())
     anew = lacking > max(MOST_SMALL * int(small.sum()), FEWEST_SMALL)
     if anew:
         residual = residual_at(_finer_points(mesh, light, small), light.charges, light.residual)
@@ -124,37 +123,39 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
         facets, weights = _unchanged(coarse.mesh, mesh)[coarse.facets], coarse.weights.copy()
         others = np.flatnonzero(facets < 0)
         _, facets[others], weights[others] = mesh.closest_boundary(residual.points.points[others])
-    cells: BoolArray = np.asarray(light.accurate_at(mesh.points)[mesh.tetrahedra].all(axis=1))
+    cells: BoolArray = np.asarray(light.accurate_on(mesh)[mesh.tetrahedra].all(axis=1))
     patch = FittedPatch(mesh, light.charges, cells, at_nodes, residual, facets, weights)
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
 
 
-def _are_small(mesh: TetMesh, residual: BoundaryResidual) -> BoolArray:
+# On one mesh these are the same for all coefficients: which boundary triangles are small beside the points of a
+# residual, and the points that take their place there.
+_SMALL: ByPair[TetMesh, Samples, BoolArray] = ByPair()
+_FINER: ByPair[TetMesh, Samples, Samples] = ByPair()
+
+
+def _are_small(mesh: TetMesh, points: Samples) -> BoolArray:
     """Whether boundary triangles are smaller than the points of a residual are apart there, (f,)."""
-    corners = mesh.points[mesh.boundary_faces]
-    apart = np.sqrt(2.0 * residual.points.areas)[residual.tree.query(corners.mean(axis=1))[1]]
-    return np.asarray(longest_sides(corners) < FINE * apart)
+
+    def compare() -> BoolArray:
+        middles = mesh.points[mesh.boundary_faces].mean(axis=1)
+        apart = np.sqrt(2.0 * points.areas)[points.tree.query(middles)[1]]
+        return np.asarray(mesh.boundary_sides < FINE * apart)
+
+    return _SMALL.get(mesh, points, compare)
 
 
 def _spacing_of(mesh: TetMesh, small: BoolArray) -> Spacing:
     """The spacing of points that small boundary triangles need, of a mask (f,)."""
     corners = mesh.points[mesh.boundary_faces]
-    limits, tree = np.where(small, FINER * longest_sides(corners), np.inf), cKDTree(corners.mean(axis=1))
+    limits, tree = np.where(small, FINER * mesh.boundary_sides, np.inf), cKDTree(corners.mean(axis=1))
     near = min(BESIDE, len(limits))
     return lambda queries: limits[tree.query(queries, k=near)[1].reshape(len(queries), near)].min(axis=1)
 
 
-# Points by those of a residual that they take the place of: on one mesh they are the same for all coefficients.
-_FINER: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Samples, Samples]] = WeakKeyDictionary()
-
-
 def _finer_points(mesh: TetMesh, light: FittedLight, small: BoolArray) -> Samples:
     """Points that are as close together as small boundary triangles need, of a mask (f,)."""
-    of_mesh = _FINER.setdefault(mesh, WeakKeyDictionary())
-    known = light.residual.points
-    if known not in of_mesh:
-        of_mesh[known] = light.points_within(_spacing_of(mesh, small))
-    return of_mesh[known]
+    return _FINER.get(mesh, light.points, lambda: light.points_within(_spacing_of(mesh, small)))
 
 
 def _unchanged(coarse: TetMesh, fine: TetMesh) -> IntArray:

@@ -149,7 +149,7 @@ def _holds(patch: Patch, places: FloatArray, foot: FloatArray, face: IntArray) -
 
 def _sizes(mesh: TetMesh, faces: IntArray) -> FloatArray:
     """Longest sides of boundary triangles, (q,)."""
-    return longest_sides(mesh.points[mesh.boundary_faces[faces]])
+    return mesh.boundary_sides[faces]
 
 
 def _point_cells(mesh: TetMesh, places: FloatArray, foot: FloatArray, face: IntArray) -> IntArray:

@@ -9,7 +9,6 @@ from tetlux.fem.models.modulation import modulus
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray, freeze, perpendicular_axes
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 # The brightest peaks, from which the largest value is climbed to, and how dim they may be beside the brightest, since a
@@ -21,6 +20,8 @@ SHORTER = 0.5 ** np.arange(LENGTHS)
 DIMMEST = 16
 # A step that gains less than this share is the last.
 LEAST_GAIN, MOST_STEPS = 1e-3, 40
+# After a step, places of less than this share of the brightest are not climbed from any more.
+LEAST_OF_BEST = 0.6
 
 # Vertices of a surface, and the last points of the surface that were tried for a mesh: runs on one mesh mostly try the
 # same. None can be written to, so that the mesh keeps which of its facets they are on.
@@ -95,15 +96,16 @@ def _climb(solution: Solution) -> FloatArray:
     mesh = solution.mesh
     sides = np.zeros(len(mesh.points))
     facets = mesh.boundary_faces
-    np.maximum.at(sides, facets.ravel(), np.repeat(longest_sides(mesh.points[facets]), 3))
+    np.maximum.at(sides, facets.ravel(), np.repeat(mesh.boundary_sides, 3))
     brightest = _peaks(solution)
     places, steps = mesh.points[brightest], sides[brightest]
-    climbing = np.arange(len(brightest))
+    climbing, heights = np.arange(len(brightest)), np.zeros(len(brightest))
     for _ in range(MOST_STEPS):
         tried = _around(solution, places[climbing], steps[climbing])
         bright = modulus(solution.exitance_on(tried)).reshape(len(climbing), -1)
         # The first of the places tried is where it is.
-        better = bright.max(axis=1) - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
+        heights[climbing] = bright.max(axis=1)
+        better = heights[climbing] - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
         best = np.where(better, bright.argmax(axis=1), 0)
         places[climbing] = tried.reshape(len(climbing), -1, 3)[np.arange(len(climbing)), best]
         climbing, best = climbing[better], best[better]
@@ -111,6 +113,7 @@ def _climb(solution: Solution) -> FloatArray:
             break
         # The next steps begin with the length that led farthest.
         steps[climbing] *= SHORTER[(best - 1) // DIRECTIONS]
+        climbing = climbing[heights[climbing] >= LEAST_OF_BEST * heights.max()]
     return places
 
 

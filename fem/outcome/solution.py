@@ -25,7 +25,6 @@ from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray
 from tetlux.meshing.describe import count
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import longest_sides
 from tetlux.meshing.tets.mesh import TetMesh
 
 
@@ -193,10 +192,10 @@ class Solution(Shown):
 
         Middles of boundary facets and their longest sides; and points where charges were fitted, and their spacing.
         """
-        facets = self.mesh.points[self.mesh.boundary_faces]
+        middles = self.mesh.points[self.mesh.boundary_faces].mean(axis=1)
         fitted = [patch.residual.points for patch in self.patches if isinstance(patch, FittedPatch)]
-        places = np.vstack([facets.mean(axis=1), *(each.points for each in fitted)])
-        return places, np.concatenate([longest_sides(facets), *(each.spacing for each in fitted)])
+        places = np.vstack([middles, *(each.points for each in fitted)])
+        return places, np.concatenate([self.mesh.boundary_sides, *(each.spacing for each in fitted)])
 
     def valid_at(self, points: FloatArray) -> FloatArray:
         """How far the diffusion approximation is to be trusted at the points of the surface nearest to given points.

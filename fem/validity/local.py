@@ -74,8 +74,7 @@ class Validity:
         (q,) ndarray
             The largest of the errors by each cause.
         """
-        below = self.below[facets]
-        causes = [wide_error(below.albedo, self.coefficients.outer.eta), self.thin_errors[facets]]
+        causes = [self.wide_errors[facets], self.thin_errors[facets]]
         causes += [self.far_errors(points, facets), self.near_errors(points)]
         return np.asarray(np.max(causes, axis=0))
 
@@ -146,14 +145,35 @@ class Validity:
         return np.asarray(np.max(errors, axis=0))
 
     @cached_property
+    def wide_errors(self) -> FloatArray:
+        """Expected errors in wide light by the albedo below each boundary facet, (f,)."""
+        return wide_error(self.below.albedo, self.coefficients.outer.eta)
+
+    @cached_property
     def middles(self) -> FloatArray:
         """Centroids of the boundary facets, (f, 3)."""
         return np.asarray(self.mesh.points[self.mesh.boundary_faces].mean(axis=1))
 
     @cached_property
+    def facet_distances(self) -> FloatArray:
+        """`distances` of the centroids of the boundary facets, (f,)."""
+        return self.distances(self.middles)
+
+    @cached_property
+    def facet_near_errors(self) -> FloatArray:
+        """`near_errors` at the centroids of the boundary facets, (f,)."""
+        return self.near_errors(self.middles)
+
+    @cached_property
+    def facet_far_errors(self) -> FloatArray:
+        """`far_errors` at the centroids of the boundary facets, (f,)."""
+        return self.far_errors(self.middles, np.arange(len(self.middles)))
+
+    @cached_property
     def facet_errors(self) -> FloatArray:
-        """Expected errors at the centroids of the boundary facets, (f,)."""
-        return self.errors(self.middles, np.arange(len(self.middles)))
+        """`errors` at the centroids of the boundary facets, (f,)."""
+        causes = [self.wide_errors, self.thin_errors, self.facet_far_errors, self.facet_near_errors]
+        return np.asarray(np.max(causes, axis=0))
 
     def mean(self, values: npt.NDArray[np.float64 | np.bool_]) -> float:
         """Mean over the surface of values of the boundary facets (f,)."""

@@ -1,9 +1,11 @@
 """Process long arrays in cache-sized blocks on all cores."""
 
 import os
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache
+from typing import TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -26,11 +28,42 @@ THREADS = int(os.environ.get(THREADS_VARIABLE, CORES))
 
 
 def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """Compute ``[work(item) for item in items]`` in threads on all cores."""
+    """Compute ``[work(item) for item in items]`` on all cores: in this thread, and in others that are kept for it."""
     if len(items) < 2 or THREADS < 2:
         return [work(item) for item in items]
-    with ThreadPoolExecutor(THREADS) as pool:
-        return list(pool.map(work, items))
+    results: list[_Result | None] = [None] * len(items)
+    # Each item is taken once, by whichever thread comes first: taking from a deque is atomic.
+    left = deque(range(len(items)))
+
+    def take() -> None:
+        while True:
+            try:
+                number = left.popleft()
+            except IndexError:
+                return
+            try:
+                results[number] = work(items[number])
+            except BaseException:
+                left.clear()
+                raise
+
+    others = [_pool().submit(take) for _ in range(min(THREADS, len(items)) - 1)]
+    try:
+        take()
+    finally:
+        # An error or an interrupt ends the others too. One that waits for a thread of the pool has nothing to do, and
+        # within a thread of the pool it might wait for ever.
+        left.clear()
+        begun = [other for other in others if not other.cancel()]
+        wait(begun)
+    for other in begun:
+        other.result()
+    return cast("list[_Result]", results)
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(THREADS - 1)
 
 
 def run_in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:

@@ -1,10 +1,9 @@
 """Sampled distances between two surfaces, and between a mesh's boundary and a surface."""
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, spread_indices
+from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -27,15 +26,12 @@ def two_sided_distance(first: Surface, second: Surface, samples: int = DISTANCE_
 
 
 # Many runs may be solved on one mesh.
-_DEVIATIONS: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Surface, float]] = WeakKeyDictionary()
+_DEVIATIONS: ByPair[TetMesh, Surface, float] = ByPair()
 
 
 def surface_deviation(mesh: TetMesh, surface: Surface) -> float:
     """Two-sided distance between a mesh's boundary and a surface, unit; it is computed once."""
-    of_mesh = _DEVIATIONS.setdefault(mesh, WeakKeyDictionary())
-    if surface not in of_mesh:
-        of_mesh[surface] = two_sided_distance(mesh.surface, surface)
-    return of_mesh[surface]
+    return _DEVIATIONS.get(mesh, surface, lambda: two_sided_distance(mesh.surface, surface))
 
 
 def _farthest(source: Surface, target: Surface, samples: int) -> float:

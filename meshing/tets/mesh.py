@@ -7,20 +7,18 @@ from functools import cached_property
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IndexArray, IntArray, sum_by_index
-from tetlux.meshing.describe import count, size
+from tetlux.meshing.describe import count, label_text, size
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.html import mesh_html
 from tetlux.meshing.search.cell_tree import CellTree
 from tetlux.meshing.search.rays import RayCaster
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import triangle_areas
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets import geometry, topology
 from tetlux.meshing.tets.cache import MeshCache
 from tetlux.meshing.tets.queries import BoundaryQueries
 
 _NO_REGIONS = np.zeros(0, dtype=np.int64)
-# Labels that a message lists; it counts the others.
-MOST_LABELS_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +173,11 @@ class TetMesh:
         return triangle_areas(self.points, self.boundary_faces)[1]
 
     @cached_property
+    def boundary_sides(self) -> FloatArray:
+        """Longest side of each boundary triangle, (f,), unit."""
+        return longest_sides(self.points[self.boundary_faces])
+
+    @cached_property
     def boundary_node_areas(self) -> FloatArray:
         """A third of the area of the triangles at each boundary node, (b,), unit²: weights that sum to `area`."""
         return self.to_boundary_nodes(self.boundary_areas)
@@ -276,10 +279,7 @@ class TetMesh:
 
     def label_text(self, labels: Iterable[int]) -> str:
         """Labels as text, with their names: ``1 (scalp) and 2 (skull)``."""
-        texts = [f"{label} ({self.labels[label]})" if label in self.labels else str(label) for label in labels]
-        more = len(texts) - MOST_LABELS_NAMED
-        shown = texts if more <= 0 else [*texts[:MOST_LABELS_NAMED], f"{more} more"]
-        return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+        return label_text(labels, self.labels)
 
     @cached_property
     def region_volumes(self) -> dict[int, float]:

@@ -27,8 +27,8 @@ from tetlux.fem.charges.adapt import FittedCharges, LightSources, fit_charges
 from tetlux.fem.charges.check import norm
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.placement import distance_from
-from tetlux.fem.charges.placement import scaled as scaled_spacing
 from tetlux.fem.charges.samples import cells_of, draw
+from tetlux.fem.charges.samples import scaled as scaled_spacing
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.known.split import Subtract
 from tetlux.meshing import Surface, box, cylinder, read_surface, refine, slab, sphere, tetrahedralize, torus
