@@ -57,6 +57,22 @@ def test_a_ball_is_right_and_the_estimate_honest(ball: Surface, albedo: float, e
     assert abs(solution.power.balance_error) < 1e-9
 
 
+@pytest.mark.parametrize("albedo", [0.5, 0.99])
+def test_the_estimate_is_honest_where_a_bright_spot_is_smaller_than_facets(
+    albedo: float, ball: Surface, ball_mesh: TetMesh
+) -> None:
+    """At nodes the spot would seem six times as bright as it is; measured: .7 to 1.7 times the error, on 12 meshes."""
+    total = 30.0 / np.sqrt(3.0 * (1.0 - albedo))
+    medium = Medium(sigma_a=(1.0 - albedo) * total, sigma_s_prime=albedo * total, eta=1.4)
+    solution = solve(ball, medium, [PointSource((0.0, 0.0, 9.5))], tolerance=0.5, mesh=ball_mesh)
+    gamma = np.linspace(0.0, 0.15, 400)
+    places = 10.0 * np.column_stack([np.sin(gamma), 0.0 * gamma, np.cos(gamma)])
+    right = exact_sphere.point_exitance(medium, radius=10.0, source_radius=9.5, gamma=gamma)
+    weights = np.sin(gamma)
+    error = np.sqrt(weights @ (solution.exitance_on(places) - right) ** 2 / (weights @ right**2))
+    assert 0.4 * error < solution.error_estimate < 3.0 * error
+
+
 def test_exitance_between_nodes_where_light_fades_within_a_facet(ball: Surface) -> None:
     """Charges are below zero there; the linear function beside a bright node is hundreds of times too large."""
     medium = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)

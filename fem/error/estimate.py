@@ -44,6 +44,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 # times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACET_WEIGHT = 0.5
+# A bright spot is smaller than facets if its norm at nodes is so much too large.
+SMALL_SPOT = 0.5
 # Exited power below this share of the incident power is rounding error of the linear solver.
 ROUNDING = 1e-12
 
@@ -110,7 +112,7 @@ def estimate_error(
     Estimate
     """
     mesh, areas = solution.mesh, solution.mesh.boundary_node_areas
-    norm, total = float(np.sqrt(areas @ np.abs(whole.exitance) ** 2)), float(areas @ np.abs(whole.exitance))
+    norm, total = _norm_of_exitance(whole), float(areas @ np.abs(whole.exitance))
     if total <= ROUNDING * abs(whole.power.incident):
         # Where no light leaves, the exitance has no error.
         count = len(mesh.tetrahedra)
@@ -194,6 +196,23 @@ def _remainder(solution: Solution) -> tuple[NumberArray, NumberArray]:
             outward_flux[mesh.boundary_nodes] -= robin * subtracted[mesh.boundary_nodes]
             outward_flux += residual
     return remainder, outward_flux
+
+
+def _norm_of_exitance(solution: Solution) -> float:
+    """L2 norm over the surface, W/unit.
+
+    A bright spot that is smaller than the facets around it, of one light by fitted charges, is as bright as these have
+    it where they are fitted: at nodes its norm would be several times too large, and errors relative to it too small.
+    """
+    areas = solution.mesh.boundary_node_areas
+    at_nodes = float(np.sqrt(areas @ np.abs(solution.exitance) ** 2))
+    if len(solution.patches) != 1 or not isinstance(patch := solution.patches[0], FittedPatch):
+        return at_nodes
+    remainder = solution.fluence[solution.mesh.boundary_nodes] - patch.at_nodes[solution.mesh.boundary_nodes]
+    of_charges = patch.residual.points.areas @ np.abs(patch.residual.exitance) ** 2
+    of_rest = areas @ np.abs(patch.charges.equation.robin * remainder) ** 2
+    resolved = float(np.sqrt(of_charges) + np.sqrt(of_rest))
+    return resolved if resolved < SMALL_SPOT * at_nodes else at_nodes
 
 
 def _unresolved_indicators(solution: Solution, norm: float) -> FloatArray:
