@@ -15,8 +15,8 @@ from tetlux.cases.stress.panels import Panel, Value, Variant
 from tetlux.meshing.errors import TetluxError
 from tetlux.meshing.host.blocks import THREADS
 
-# A trial is stopped after this many seconds.
-TIME_LIMIT = 120.0
+# A trial is stopped after this many seconds. The mesher takes up to 150 for four layers.
+TIME_LIMIT = 300.0
 _spawning = get_context("spawn")
 
 
