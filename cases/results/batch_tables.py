@@ -19,7 +19,7 @@ from tetlux.cases.results.rows import (
     result_rows,
 )
 from tetlux.cases.results.table_file import TableFile, replace_file
-from tetlux.cases.write.publish import FULL, write_error
+from tetlux.cases.write.publish import FULL, disk_is_full, write_error
 from tetlux.meshing.errors import RunError
 
 RESULTS, PARQUET, READINGS, PAGE = "results.csv", "results.parquet", "readings.csv", "index.html"
@@ -46,6 +46,8 @@ class BatchTables:
     def __init__(self) -> None:
         self._out = Path()
         self._kept: tuple[list[Row], list[Row]] = ([], [])
+        # Whether a run has reported so, which the tables need not do again.
+        self._disk_is_full = False
         # By the number of the run; what could not be written yet.
         self._results: dict[int, list[Row]] = {}
         self._readings: dict[int, list[Row]] = {}
@@ -65,14 +67,17 @@ class BatchTables:
         elif isinstance(event, RunFinished):
             self._add(event.run, result_rows(event.summary), reading_rows(event.summary))
         elif isinstance(event, RunFailed):
+            self._disk_is_full |= event.ends_batch
             self._add(event.run, [failure_row(event.name, event.reason, event.sweep)], [])
         elif isinstance(event, BatchEnded):
             try:
                 self._finish()
             except OSError as error:
-                # That the disk is full was said of the run that found it so; rows of finished runs are there.
-                if event.how != "stopped" or error.errno not in FULL:
+                if not (self._disk_is_full and error.errno in FULL):
                     raise write_error(self._out, ".", error) from error
+            except RunError as error:
+                if not (self._disk_is_full and disk_is_full(error)):
+                    raise
 
     def _start(self, event: BatchStarted) -> None:
         self._out = event.out

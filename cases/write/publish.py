@@ -129,6 +129,8 @@ def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
         # In one step, unless the target exists and is not empty.
         folder.rename(target)
     except OSError:
+        if not target.is_dir():
+            raise
         for name in names:
             if (folder / name).exists():
                 (folder / name).replace(target / name)

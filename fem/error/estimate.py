@@ -44,7 +44,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACET_WEIGHT = 0.5
-# A bright spot is smaller than facets if its norm at nodes is so much too large.
+# A bright spot is smaller than facets if its norm, where charges are fitted, is less than this share of that at nodes.
 SMALL_SPOT = 0.5
 # Exited power below this share of the incident power is rounding error of the linear solver.
 ROUNDING = 1e-12
@@ -206,7 +206,9 @@ def _norm_of_exitance(solution: Solution) -> float:
     """
     areas = solution.mesh.boundary_node_areas
     at_nodes = float(np.sqrt(areas @ np.abs(solution.exitance) ** 2))
-    if len(solution.patches) != 1 or not isinstance(patch := solution.patches[0], FittedPatch):
+    if len(solution.patches) != 1 or np.any(solution.transmitted_irradiance):
+        return at_nodes
+    if not isinstance(patch := solution.patches[0], FittedPatch):
         return at_nodes
     remainder = solution.fluence[solution.mesh.boundary_nodes] - patch.at_nodes[solution.mesh.boundary_nodes]
     of_charges = patch.residual.points.areas @ np.abs(patch.residual.exitance) ** 2

@@ -20,8 +20,6 @@ SHORTER = 0.5 ** np.arange(LENGTHS)
 DIMMEST = 16
 # A step that gains less than this share is the last.
 LEAST_GAIN, MOST_STEPS = 1e-3, 40
-# After a step, places of less than this share of the brightest are not climbed from any more.
-LEAST_OF_BEST = 0.6
 
 # Vertices of a surface, and the last points of the surface that were tried for a mesh: runs on one mesh mostly try the
 # same. None can be written to, so that the mesh keeps which of its facets they are on.
@@ -99,13 +97,12 @@ def _climb(solution: Solution) -> FloatArray:
     np.maximum.at(sides, facets.ravel(), np.repeat(mesh.boundary_sides, 3))
     brightest = _peaks(solution)
     places, steps = mesh.points[brightest], sides[brightest]
-    climbing, heights = np.arange(len(brightest)), np.zeros(len(brightest))
+    climbing = np.arange(len(brightest))
     for _ in range(MOST_STEPS):
         tried = _around(solution, places[climbing], steps[climbing])
         bright = modulus(solution.exitance_on(tried)).reshape(len(climbing), -1)
         # The first of the places tried is where it is.
-        heights[climbing] = bright.max(axis=1)
-        better = heights[climbing] - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
+        better = bright.max(axis=1) - bright[:, 0] > LEAST_GAIN * np.abs(bright[:, 0])
         best = np.where(better, bright.argmax(axis=1), 0)
         places[climbing] = tried.reshape(len(climbing), -1, 3)[np.arange(len(climbing)), best]
         climbing, best = climbing[better], best[better]
@@ -113,7 +110,6 @@ def _climb(solution: Solution) -> FloatArray:
             break
         # The next steps begin with the length that led farthest.
         steps[climbing] *= SHORTER[(best - 1) // DIRECTIONS]
-        climbing = climbing[heights[climbing] >= LEAST_OF_BEST * heights.max()]
     return places
 
 

@@ -1,9 +1,10 @@
 """Process long arrays in cache-sized blocks on all cores."""
 
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from functools import cache
 from typing import TypeVar, cast
 
@@ -28,32 +29,37 @@ THREADS = int(os.environ.get(THREADS_VARIABLE, CORES))
 
 
 def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> list[_Result]:
-    """Compute ``[work(item) for item in items]`` on all cores: in this thread, and in others that are kept for it."""
-    if len(items) < 2 or THREADS < 2:
+    """Compute ``[work(item) for item in items]`` on all cores: in this thread, and in others that are kept for it.
+
+    Within such work all cores are busy, and more of it is done by one thread.
+    """
+    if len(items) < 2 or THREADS < 2 or getattr(_here, "is_busy", False):
         return [work(item) for item in items]
     results: list[_Result | None] = [None] * len(items)
     # Each item is taken once, by whichever thread comes first: taking from a deque is atomic.
     left = deque(range(len(items)))
 
     def take() -> None:
-        while True:
-            try:
-                number = left.popleft()
-            except IndexError:
-                return
-            try:
+        _here.is_busy = True
+        try:
+            while left:
+                try:
+                    number = left.popleft()
+                except IndexError:  # another thread took the last one
+                    return
                 results[number] = work(items[number])
-            except BaseException:
-                left.clear()
-                raise
+        finally:
+            # An error or an interrupt ends the others too.
+            left.clear()
+            _here.is_busy = False
 
-    others = [_pool().submit(take) for _ in range(min(THREADS, len(items)) - 1)]
+    others: list[Future[None]] = []
     try:
+        others += [_pool(THREADS - 1).submit(take) for _ in range(min(THREADS, len(items)) - 1)]
         take()
     finally:
-        # An error or an interrupt ends the others too. One that waits for a thread of the pool has nothing to do, and
-        # within a thread of the pool it might wait for ever.
         left.clear()
+        # One that still waits for a thread has nothing to do.
         begun = [other for other in others if not other.cancel()]
         wait(begun)
     for other in begun:
@@ -61,9 +67,18 @@ def map_in_threads(work: Callable[[_Item], _Result], items: Sequence[_Item]) -> 
     return cast("list[_Result]", results)
 
 
+_here = threading.local()
+
+
 @cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(THREADS - 1)
+def _pool(threads: int) -> ThreadPoolExecutor:
+    """Threads that are kept, since starting them takes as long as small work."""
+    return ThreadPoolExecutor(threads)
+
+
+if hasattr(os, "register_at_fork"):
+    # A forked process has none of the threads.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def run_in_blocks(work: Callable[[slice], object], count: int, size: int = BLOCK) -> None:
