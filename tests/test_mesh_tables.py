@@ -1,12 +1,16 @@
 """Edges, faces and bisection of a mesh, against the slow and obvious ways to get them."""
 
+from gc import collect
+from weakref import ref
+
 import numpy as np
 import pytest
 
 from tests.test_assembly import random_mesh
 from tetlux.meshing import TetMesh, refine
 from tetlux.meshing.host import blocks
-from tetlux.meshing.host.blocks import find_single_keys, group_keys, run_in_blocks
+from tetlux.meshing.host.blocks import find_single_keys, group_keys, map_in_threads, run_in_blocks
+from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.tets.topology import EDGES
 
 
@@ -144,3 +148,33 @@ def test_bisection_does_not_flatten(ball_mesh: TetMesh) -> None:
     assert mesh.quality.min() > 0.35 * ball_mesh.quality.min()
     assert np.quantile(mesh.quality, 0.01) > 0.2
     assert hanging_nodes(mesh) == 0
+
+
+def test_work_within_work_is_done_too_and_lets_go_of_its_arrays() -> None:
+    """Threads that are kept must neither wait for each other nor hold what they were given."""
+
+    class Held: ...
+
+    held = Held()
+    gone = ref(held)
+
+    def outer(number: int, held: Held = held) -> list[int]:
+        assert held is not None
+        return map_in_threads(lambda inner: 10 * number + inner, range(3))
+
+    assert map_in_threads(outer, range(4)) == [[10 * number + inner for inner in range(3)] for number in range(4)]
+    del outer, held
+    collect()
+    assert gone() is None
+
+
+def test_what_is_kept_by_pair_goes_with_either() -> None:
+    class Thing: ...
+
+    for which in (0, 1):
+        pair, kept = [Thing(), Thing()], ByPair[Thing, Thing, Thing]()
+        value = ref(kept.get(pair[0], pair[1], Thing))
+        assert kept.get(pair[0], pair[1], Thing) is value()
+        del pair[which]
+        collect()
+        assert value() is None

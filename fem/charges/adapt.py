@@ -48,8 +48,9 @@ NOISE_FACTOR = 1.5
 # .39e-3, .30e-3 / 1.3e-3, .31e-3, .30e-3, .30e-3; estimate of the exitance .088, .0017, .0062, .0001 / .017, .0008,
 # .0001, .00003.
 LEAST_CHANGE, MOST_CHANGE = 0.5, 1.4
-# The same where they are not: where light fades to nothing errors do too, and a spacing by them would have no bounds.
-# Lit bodies have .35 to 4, and up to 70 where they absorb most.
+# Factors between which it changes where equations are weighted by the distance alone. Where light fades to nothing,
+# errors do too, and a spacing that follows them would have no bounds. Seen without limits: .35 to 4, and 70 in the dark
+# of a strong absorber.
 LEAST_BY_ERRORS, MOST_BY_ERRORS = 0.1, 10.0
 # Number of nearest points over which the residual and the spacing are averaged.
 AVERAGED_NEIGHBOURS = 12

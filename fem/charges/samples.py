@@ -29,8 +29,8 @@ LARGEST_CELL = 1.5
 _MOST_CUTS = 80
 # Number of nearest points from which a spacing is interpolated.
 INTERPOLATED_NEIGHBOURS = 3
-# A spacing that differs by more than this factor over the surface grows by no more than the distance, as that of the
-# first fit does: cells of the surface larger than a place where it is small would miss it.
+# A spacing that differs by more than this factor over the surface is limited: from a point to the next it grows by no
+# more than their distance, as that of the first fit does. Otherwise a large cell could hide a spot where it is small.
 LARGEST_CONTRAST = 1e3
 
 # The wanted distance between points (n, 3) of the surface, (n,), unit.

@@ -201,8 +201,9 @@ def _remainder(solution: Solution) -> tuple[NumberArray, NumberArray]:
 def _norm_of_exitance(solution: Solution) -> float:
     """L2 norm over the surface, W/unit.
 
-    A bright spot that is smaller than the facets around it, of one light by fitted charges, is as bright as these have
-    it where they are fitted: at nodes its norm would be several times too large, and errors relative to it too small.
+    A bright spot that is smaller than the facets around it has several times too large a norm at the nodes, and errors
+    relative to that would be too small. Where the charges of one light are all that is subtracted, the norm is at most
+    that of the charges, at the points of their residual, and that of what they lack, at the nodes.
     """
     areas = solution.mesh.boundary_node_areas
     at_nodes = float(np.sqrt(areas @ np.abs(solution.exitance) ** 2))

@@ -128,8 +128,8 @@ def fitted_patch(mesh: TetMesh, light: FittedLight, coarse: FittedPatch | None =
     return patch if patch.is_whole or holds_sources(patch) else patch.extend()
 
 
-# On one mesh these are the same for all coefficients: which boundary triangles are small beside the points of a
-# residual, and the points that take their place there.
+# On one mesh these are the same for all coefficients: which boundary triangles are small beside the distance of the
+# points of a residual, and the finer points that replace those of the residual there.
 _SMALL: ByPair[TetMesh, Samples, BoolArray] = ByPair()
 _FINER: ByPair[TetMesh, Samples, Samples] = ByPair()
 

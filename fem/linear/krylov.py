@@ -5,7 +5,6 @@ Melissen 1990): the same recurrences with dot products that conjugate nothing.
 """
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -47,12 +46,11 @@ class Product:
         cuts = [0, *limits.tolist(), matrix.shape[0]]
         self._rows = [slice(a, b) for a, b in pairwise(cuts)]
         self._blocks = [_rows_of(matrix, rows) for rows in self._rows] if threads > 1 else [matrix]
-        self._pool = ThreadPoolExecutor(threads - 1) if threads > 1 else None
 
     @property
     def on_all_cores(self) -> bool:
         """Whether one product has all cores at work."""
-        return self._pool is not None
+        return len(self._blocks) > 1
 
     @property
     def is_complex(self) -> bool:
@@ -61,17 +59,14 @@ class Product:
 
     def __call__(self, x: NumberArray) -> NumberArray:
         """``matrix @ x``."""
-        if self._pool is None:
+        if not self.on_all_cores:
             return np.asarray(self.matrix @ x)
         result = np.empty((self.matrix.shape[0], *x.shape[1:]), np.result_type(self.matrix.dtype, x.dtype))
 
         def multiply(index: int) -> None:
             result[self._rows[index]] = self._blocks[index] @ x
 
-        others = [self._pool.submit(multiply, index) for index in range(1, len(self._blocks))]
-        multiply(0)
-        for other in others:
-            other.result()
+        map_in_threads(multiply, range(len(self._blocks)))
         return result
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from tetlux.fem.models.modulation import modulus
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, IntArray, freeze, perpendicular_axes
+from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -25,7 +26,7 @@ LEAST_GAIN, MOST_STEPS = 1e-3, 40
 # same. None can be written to, so that the mesh keeps which of its facets they are on.
 MOST_KEPT = 64
 _VERTICES: WeakKeyDictionary[Surface, FloatArray] = WeakKeyDictionary()
-_KEPT: WeakKeyDictionary[TetMesh, WeakKeyDictionary[Surface, dict[bytes, FloatArray]]] = WeakKeyDictionary()
+_KEPT: ByPair[TetMesh, Surface, dict[bytes, FloatArray]] = ByPair()
 
 
 def extreme_places(solution: Solution) -> FloatArray:
@@ -67,8 +68,7 @@ def _vertices_of(surface: Surface) -> FloatArray:
 
 def _kept(solution: Solution, key: IntArray | FloatArray, make: Callable[[], FloatArray]) -> FloatArray:
     """Points of the surface that are made only if they are not among the last for a mesh and a key."""
-    kept = _KEPT.setdefault(solution.mesh, WeakKeyDictionary()).setdefault(solution.surface, {})
-    content = key.tobytes()
+    kept, content = _KEPT.get(solution.mesh, solution.surface, dict), key.tobytes()
     # The last that was used is the last that is forgotten.
     points = kept.pop(content, None)
     kept[content] = points = freeze(make()) if points is None else points

@@ -74,9 +74,7 @@ class Validity:
         (q,) ndarray
             The largest of the errors by each cause.
         """
-        causes = [self.wide_errors[facets], self.thin_errors[facets]]
-        causes += [self.far_errors(points, facets), self.near_errors(points)]
-        return np.asarray(np.max(causes, axis=0))
+        return self._largest(facets, self.far_errors(points, facets), self.near_errors(points))
 
     def distances(self, points: FloatArray) -> FloatArray:
         """Distances of points (q, 3) from the nearest light, (q,), in transport mean free paths where it enters.
@@ -172,8 +170,11 @@ class Validity:
     @cached_property
     def facet_errors(self) -> FloatArray:
         """`errors` at the centroids of the boundary facets, (f,)."""
-        causes = [self.wide_errors, self.thin_errors, self.facet_far_errors, self.facet_near_errors]
-        return np.asarray(np.max(causes, axis=0))
+        return self._largest(slice(None), self.facet_far_errors, self.facet_near_errors)
+
+    def _largest(self, facets: IntArray | slice, far: FloatArray, near: FloatArray) -> FloatArray:
+        """The largest errors of all causes, with those far from and near light at places on given facets."""
+        return np.asarray(np.max([self.wide_errors[facets], self.thin_errors[facets], far, near], axis=0))
 
     def mean(self, values: npt.NDArray[np.float64 | np.bool_]) -> float:
         """Mean over the surface of values of the boundary facets (f,)."""

@@ -10,7 +10,9 @@ _Value = TypeVar("_Value")
 
 
 class ByPair(Generic[_First, _Second, _Value]):
-    """Values by two objects, as a mesh and the points that runs on it share; a value refers to neither.
+    """Values by two objects, such as a mesh and the points that runs on it share.
+
+    A value must not refer to either of them, or none of the three is ever freed.
 
     Examples
     --------

@@ -63,8 +63,8 @@ def pulse_exitance(
 ) -> FloatArray:
     """Exitance of a ball at a time after a pulse of 1 J from a point, in the diffusion approximation.
 
-    By Talbot's contour with 32 nodes (Weideman 2006, SIAM J. Numer. Anal. 44, 2342): right to some 1e-9 of the largest
-    exitance in time, both without absorption, which a factor ``exp(-sigma_a path)`` puts back.
+    By Talbot's contour with 32 nodes (Weideman 2006, SIAM J. Numer. Anal. 44, 2342): without absorption it is right
+    to some 1e-9 of the largest exitance in time, and a factor ``exp(-sigma_a path)`` is that of absorption.
 
     Parameters
     ----------
