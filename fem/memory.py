@@ -12,27 +12,27 @@ from tetlux.meshing.errors import RunError
 # Measured: growth of the peak memory of a process while it solves and estimates the error, less BYTES_OF_IMPORTS, in kB
 # for each tetrahedron; the last column is what `estimate_memory` gives:
 #
-#   a given mesh, by its tetrahedra        48k    413k  1,296k  estimate
-#   a point source                         .43     .92     .77   1.02
-#   eight                                          .97           1.16
-#   eight, and diffuse light                               .82   1.18
-#   a beam on the whole body                       .97           1.02
-#   the same in three channels                    1.14    1.07   1.30
-#   eight scenes, each of another medium (384k)   1.41           2.00
+#   a given mesh, by its tetrahedra               413k  1,296k  estimate
+#   a point source                                 .54     .79    .80
+#   eight                                          .62     .71    .94
+#   eight, and diffuse light                               .71    .96
+#   a beam on the whole body                       .66            .80
+#   the same in three channels                     .84     .89   1.04
+#   eight scenes, each of another medium (384k)   1.10           1.64
 #
-#   the finest mesh, after refinement
+#   the finest mesh, after refinement (with threads started anew for each piece of work, which take a third more)
 #   a beam on the whole body, 154k                1.58           1.62
-#   the same in three channels, 291k              1.37           1.90
-#   and with diffuse light, 197k                  1.78           1.96
+#   the same in three channels, 291k              1.37           1.86
+#   and with diffuse light, 197k                  1.78           1.92
 #   a pencil beam, 191k                           1.46           1.62
 #   eight point sources, 238k                     1.54           1.76
 #
 # Refinement holds two meshes at a time, and makes a third one that may turn out to be too large.
 BYTES_OF_IMPORTS = 80e6
-BYTES_PER_TETRAHEDRON_GIVEN, BYTES_PER_TETRAHEDRON_REFINED = 1000.0, 1600.0
+BYTES_PER_TETRAHEDRON_GIVEN, BYTES_PER_TETRAHEDRON_REFINED = 780.0, 1600.0
 # For each tetrahedron: of a further medium (its matrix and solver), of a light (its fluence and patch), and of
 # quadratic elements, where detectors are read (measured on 74,000 tetrahedra).
-BYTES_PER_MATRIX, BYTES_PER_LIGHT, BYTES_OF_READINGS = 120.0, 20.0, 3750.0
+BYTES_PER_MATRIX, BYTES_PER_LIGHT, BYTES_OF_READINGS = 100.0, 20.0, 3750.0
 
 
 def estimate_memory(
