@@ -73,6 +73,17 @@ def test_the_estimate_is_honest_where_a_bright_spot_is_smaller_than_facets(
     assert 0.4 * error < solution.error_estimate < 3.0 * error
 
 
+def test_estimates_of_small_bright_spots_hold_for_two_of_them(ball: Surface, ball_mesh: TetMesh) -> None:
+    medium = Medium(sigma_a=12.0, sigma_s_prime=12.0, eta=1.4)
+    lights = [PointSource((0.0, 0.0, 9.5)), PointSource((9.5, 0.0, 0.0))]
+    one, other, both, turned = (
+        solve(ball, medium, some, tolerance=0.5, mesh=ball_mesh).error_estimate
+        for some in (lights[:1], lights[1:], lights, lights[::-1])
+    )
+    assert 0.5 * min(one, other) < both < 1.1 * max(one, other)
+    assert turned == pytest.approx(both)
+
+
 def test_exitance_between_nodes_where_light_fades_within_a_facet(ball: Surface) -> None:
     """Charges are below zero there; the linear function beside a bright node is hundreds of times too large."""
     medium = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)

@@ -202,19 +202,19 @@ def _norm_of_exitance(solution: Solution) -> float:
     """L2 norm over the surface, W/unit.
 
     A bright spot that is smaller than the facets around it has several times too large a norm at the nodes, and errors
-    relative to that would be too small. Where the charges of one light are all that is subtracted, the norm is at most
-    that of the charges, at the points of their residual, and that of what they lack, at the nodes.
+    relative to that would be too small. Where fitted charges are all that is subtracted, the norm is at most the sum of
+    those of the charges of each light, at the points of their residual, and that of what they lack, at the nodes.
     """
-    areas = solution.mesh.boundary_node_areas
+    areas, nodes = solution.mesh.boundary_node_areas, solution.mesh.boundary_nodes
     at_nodes = float(np.sqrt(areas @ np.abs(solution.exitance) ** 2))
-    if len(solution.patches) != 1 or np.any(solution.transmitted_irradiance):
+    fitted = [patch for patch in solution.patches if isinstance(patch, FittedPatch)]
+    if not fitted or len(fitted) < len(solution.patches):
         return at_nodes
-    if not isinstance(patch := solution.patches[0], FittedPatch):
-        return at_nodes
-    remainder = solution.fluence[solution.mesh.boundary_nodes] - patch.at_nodes[solution.mesh.boundary_nodes]
-    of_charges = patch.residual.points.areas @ np.abs(patch.residual.exitance) ** 2
-    of_rest = areas @ np.abs(patch.charges.equation.robin * remainder) ** 2
-    resolved = float(np.sqrt(of_charges) + np.sqrt(of_rest))
+    remainder = solution.fluence[nodes] - sum(each.at_nodes[nodes] for each in fitted)
+    lacking = solution.boundary_condition.exitance(remainder, solution.transmitted_irradiance)
+    residuals = [each.residual for each in fitted]
+    squares = [each.points.areas @ np.abs(each.exitance) ** 2 for each in residuals]
+    resolved = float(np.sqrt(squares).sum() + np.sqrt(areas @ np.abs(lacking) ** 2))
     return resolved if resolved < SMALL_SPOT * at_nodes else at_nodes
 
 
