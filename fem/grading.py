@@ -1,7 +1,7 @@
 """The first mesh: fine enough near sources for its error to be estimated at all."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -9,9 +9,10 @@ from scipy.spatial.distance import cdist
 
 from tetlux.fem.media.coefficients import AnyMedium, coefficients_on
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.layers import add_layers
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.refine import refine
 
@@ -30,6 +31,63 @@ LONGEST_EDGE = 1.0
 # Where charges are fitted the error needs no such edges, but values at nodes should show the light: 10 to 60 % more
 # nodes than the mesher's own.
 LONGEST_IF_FITTED = 1.5
+
+# Layers below a surface that light covers: the height of the first for a tolerance of .02, in depths over which the
+# light decays to 1/e; by how much each is higher than the one above it, for each depth that it lies deeper; and the
+# depth of the last. The error is proportional to the square of the heights.
+FIRST_LAYER, LAYER_TOLERANCE, LAYER_GROWTH, DEEPEST_LAYER = 0.07, 0.02, 4.0, 30.0
+
+# Layers become thinner by this factor where they are what limits the error.
+THINNER = 0.7
+# A node is lit if a place where light enters is nearer than this many times the distance between neighbouring ones.
+NEAR_PLACES = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Layers of flat tetrahedra below the parts of a surface that light covers.
+
+    Attributes
+    ----------
+    places : (p, 3) ndarray
+        Where the light enters, unit.
+    depth : float
+        Over which the light decays to 1/e, unit.
+    fineness : float
+        The height of layers, relative to that for a tolerance of `LAYER_TOLERANCE`.
+    """
+
+    places: FloatArray
+    depth: float
+    fineness: float
+
+    @classmethod
+    def for_lights(cls, deposits: Sequence[Deposit], tolerance: float) -> "Layers | None":
+        """Those for some lights and a tolerance of the exitance; None if no light covers a surface."""
+        covering = [deposit.hints for deposit in deposits if deposit.hints.depth > 0]
+        if not covering:
+            return None
+        depth = min(hints.depth for hints in covering)
+        return cls(np.vstack([hints.places for hints in covering]), depth, np.sqrt(tolerance / LAYER_TOLERANCE))
+
+    @property
+    def depths(self) -> FloatArray:
+        """Of the lower sides of the layers, (k,), unit."""
+        ratio = 1.0 + LAYER_GROWTH * FIRST_LAYER * self.fineness
+        count = int(np.log1p(LAYER_GROWTH * DEEPEST_LAYER) / np.log(ratio))
+        return np.asarray(self.depth / LAYER_GROWTH * (ratio ** np.arange(1, count + 1) - 1.0))
+
+    def thinner(self) -> "Layers":
+        """Layers of smaller heights."""
+        return replace(self, fineness=THINNER * self.fineness)
+
+    def on(self, mesh: TetMesh) -> tuple[TetMesh, IntArray]:
+        """A mesh with the layers, and the tetrahedron of the mesh given that each of its tetrahedra belongs to, (m,)."""
+        near = np.zeros(len(mesh.points), dtype=bool)
+        gaps = cKDTree(self.places).query(self.places, k=[2], workers=THREADS)[0]
+        distances = cKDTree(self.places).query(mesh.boundary_points, workers=THREADS)[0]
+        near[mesh.boundary_nodes] = distances < NEAR_PLACES * np.median(gaps)
+        return add_layers(mesh, self.depths, near)
 
 
 def places_to_resolve(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:

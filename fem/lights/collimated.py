@@ -86,7 +86,9 @@ class CollimatedBeam:
         depth = self._least_depth(body, entries)
         size = np.inf if self.spot is None else self.spot.reach
         return Deposit(
-            hints=MeshHints(illumination_resolution(surface, depth, size), entries),
+            hints=MeshHints(
+                illumination_resolution(surface, depth, size), entries, depth=depth if self.spot is None else 0.0
+            ),
             footprint=Footprint(entries, radius=np.inf if self.spot is None else None),
             on_mesh=self,
         )
