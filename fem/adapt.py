@@ -163,10 +163,10 @@ def first_mesh(
     *,
     cache: bool,
     layers: Layers | None = None,
-) -> TetMesh:
+) -> tuple[TetMesh, Layers | None]:
     """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors.
 
-    Lights for which there are layers do not refine it.
+    Lights for which there are layers do not refine it. Returns the layers too, if they serve.
     """
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
@@ -175,6 +175,8 @@ def first_mesh(
         else:
             with _report_if_slow(report):
                 mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        if layers is not None and not layers.serve(mesh, scenes.surface):
+            layers = None
         slack = 1.0 if problem.shared is None else SLACK
         for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
             deposits = [
@@ -188,6 +190,9 @@ def first_mesh(
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
+        if layers is not None and len(places := layers.places_at_creases(scenes.surface)):
+            depths = np.full(len(places), layers.depth)
+            mesh = grade_mesh(mesh, scenes.surface, places, depths, most_tetrahedra, inner=scenes.inner)
         if tolerances.readings is not None:
             ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):
@@ -203,7 +208,7 @@ def first_mesh(
                 )
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh it was given"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
-    return mesh
+    return mesh, layers
 
 
 def _ways_of_light(problem: Problem, tolerances: Tolerances) -> list[tuple[FloatArray, FloatArray]]:

@@ -176,7 +176,7 @@ def solve_problem(
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
     layers = None if given else layers_of(problem, tolerances)
     if mesh is None:
-        mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache, layers=layers)
+        mesh, layers = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache, layers=layers)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
     steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report, layers)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)

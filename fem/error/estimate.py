@@ -44,6 +44,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 # times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACET_WEIGHT = 0.5
+# Where light is deposited just below facets, it moves with them, and the errors of gradients and facets add up.
+LIT_FACET_WEIGHT = 1.0
 # A bright spot is smaller than facets if its norm, where charges are fitted, is less than this share of that at nodes.
 SMALL_SPOT = 0.5
 # Exited power below this share of the incident power is rounding error of the linear solver.
@@ -143,7 +145,8 @@ def weigh_residual(
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
-    moving = scale if load is None else scale * _share_from_afar(mesh, coefficients, load, outward_flux)
+    afar = 1.0 if load is None else _share_from_afar(mesh, coefficients, load, outward_flux)
+    facet_weight = afar * FACET_WEIGHT + (1.0 - afar) * LIT_FACET_WEIGHT
 
     def indicators_for_dual(dual: NumberArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
@@ -158,8 +161,8 @@ def weigh_residual(
         if fitting is not None:
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
         values = remainder, outward_flux, dual
-        indicators += FACET_WEIGHT * boundary_facets(
-            mesh, coefficients, solution.surface, values, float(indicators.sum()), moving
+        indicators += facet_weight * boundary_facets(
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale * afar
         )
         indicators += interface_layers(mesh, coefficients, smooth, at_corners)
         return indicators + FACET_WEIGHT * interface_facets(
