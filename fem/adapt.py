@@ -9,7 +9,14 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.assessment import Tolerances
-from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, Layers, grade_between, grade_mesh, places_to_resolve
+from tetlux.fem.grading.layers import Layers, refine_below, with_layers
+from tetlux.fem.grading.near_sources import (
+    LONGEST_EDGE,
+    LONGEST_IF_FITTED,
+    grade_between,
+    grade_mesh,
+    places_to_resolve,
+)
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
@@ -19,10 +26,9 @@ from tetlux.fem.shared import EXPECTED_LIGHTS, SharedMesh
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.fem.system import MeshSolution, System
-from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
@@ -179,20 +185,16 @@ def first_mesh(
             layers = None
         slack = 1.0 if problem.shared is None else SLACK
         for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
-            deposits = [
-                each
-                for split in problem.lights
-                for each in split.deposits_if(fitted=fitted)
-                if layers is None or each.hints.depth == 0
-            ]
+            deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
+            deposits = [each for each in deposits if layers is None or each.hints.depth == 0]
             # The lights of others are taken to be of the same kind.
             source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
-        if layers is not None and len(places := layers.places_at_creases(scenes.surface)):
-            depths = np.full(len(places), layers.depth)
-            mesh = grade_mesh(mesh, scenes.surface, places, depths, most_tetrahedra, inner=scenes.inner)
+        if layers is not None:
+            creases = layers.places_at_creases(scenes.surface)
+            mesh = grade_mesh(mesh, scenes.surface, *creases, most_tetrahedra, inner=scenes.inner)
         if tolerances.readings is not None:
             ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):
@@ -267,7 +269,7 @@ def solve_and_refine(
     # When the mesh is found that the first scenes need, the others are solved for.
     first, *others = problem.groups
     pending = [scene for group in others for scene in group]
-    base, (mesh, parents) = mesh, _with_layers(mesh, layers)
+    base, (mesh, parents) = mesh, with_layers(mesh, layers)
     solve_on = problem.solver_on(mesh)
     steps = best_steps = {scene: solve_on(scene, None) for scene in first}
     least_ratio = np.inf
@@ -282,11 +284,8 @@ def solve_and_refine(
         fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                scenes = problem.scenes
-                splits = np.zeros(len(base.tetrahedra), dtype=np.int64)
-                np.maximum.at(splits, parents, found.splits)
-                below = refine_often(base, splits, scenes.surface, scenes.inner, most_tetrahedra)
-                finer, owners = _with_layers(below, layers)
+                surfaces = problem.scenes.surface, problem.scenes.inner
+                below, finer, owners = refine_below(base, parents, found.splits, surfaces, most_tetrahedra, layers)
             if len(finer.tetrahedra) <= most_tetrahedra:
                 base, mesh, parents, solve_on = below, finer, owners, problem.solver_on(finer)
                 # Patches are inherited from meshes with the same nodes, which layers move.
@@ -298,8 +297,3 @@ def solve_and_refine(
             return [chosen[scene] for scene in range(len(problem.lights))]
         steps = best_steps = {**steps, **{scene: solve_on(scene, None) for scene in pending}}
         pending, least_ratio = [], np.inf
-
-
-def _with_layers(mesh: TetMesh, layers: Layers | None) -> tuple[TetMesh, IntArray]:
-    """A mesh with layers, if there are any, and what each of its tetrahedra belongs to: see `Layers.on`."""
-    return (mesh, np.arange(len(mesh.tetrahedra))) if layers is None else layers.on(mesh)

@@ -161,11 +161,6 @@ class Surface:
         return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))[:2]
 
     @cached_property
-    def creases(self) -> FloatArray:
-        """The ends of the edges that bend by more than `crease_angle`, (c, 2, 3), unit."""
-        return self._patches.creases
-
-    @cached_property
     def groups(self) -> TriangleGroups:
         """Groups of neighbouring triangles."""
         faces, corners = cut_long_triangles(self.points[self.faces])

@@ -5,6 +5,7 @@ size stays that of the facets, and their heights are chosen freely.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_array, diags_array
@@ -78,7 +79,7 @@ def _fill(
     # Neighbouring prisms divide the side between them alike, as the corners are in the order of the nodes.
     facets = np.sort(mesh.boundary_faces, axis=1)
     cells, parents = [mesh.tetrahedra], [np.arange(len(mesh.tetrahedra))]
-    for upper, below in zip(nodes[:-1], nodes[1:], strict=True):
+    for upper, below in pairwise(nodes):
         a, b = upper[facets].T, below[facets].T
         for corners in ((a[0], a[1], a[2], b[2]), (a[0], a[1], b[1], b[2]), (a[0], b[0], b[1], b[2])):
             tetrahedra = np.column_stack(corners)
