@@ -39,6 +39,12 @@ def test_the_solver_imports_no_pictures_and_no_readers() -> None:
     assert imported("import tetlux.fem", (*PICTURES, *READERS, *SOLVERS, "pydantic")) == []
 
 
+@needs("pyarrow")
+def test_a_table_needs_no_pandas() -> None:
+    code = "from tetlux.cases.results.parquet import parquet_of\nassert parquet_of([{'x': 1.0}], ['x'])"
+    assert imported(code, ("pandas", "pyarrow")) == ["pyarrow"]
+
+
 def test_closed_forms_are_imported_when_they_are_asked_for() -> None:
     names = ("tetlux.fem.exact.monte_carlo",)
     assert imported("import tetlux.fem.exact", names) == []
