@@ -8,6 +8,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from tetlux.cases.start import first_imports
+
 if TYPE_CHECKING:
     from tetlux.cases.batch.events import Listener
     from tetlux.cases.batch.launch import Launcher
@@ -15,8 +17,7 @@ if TYPE_CHECKING:
 
 def run(options: argparse.Namespace) -> int:
     """Solve cases and write their results."""
-    from tetlux.cases.batch.launch import Launcher, seem_many  # noqa: PLC0415
-    from tetlux.meshing.host.blocks import CORES  # noqa: PLC0415
+    from tetlux.cases.batch.launch import CORES, Launcher, seem_many  # noqa: PLC0415
 
     with Launcher() as launcher:
         starts_early = options.scheduler is None and not options.resume
@@ -27,12 +28,13 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_with(launcher: "Launcher", options: argparse.Namespace, *, starts_early: bool) -> int:
-    from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
-    from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
-    from tetlux.cases.batch.engine import run_batch, worker_count  # noqa: PLC0415
-    from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
-    from tetlux.cases.results.batch_tables import BatchTables, results_file  # noqa: PLC0415
-    from tetlux.meshing.errors import RunError  # noqa: PLC0415
+    with first_imports():
+        from tetlux.cases.batch.display.displays import choose_display  # noqa: PLC0415
+        from tetlux.cases.batch.display.logs import RunLogs  # noqa: PLC0415
+        from tetlux.cases.batch.engine import run_batch, worker_count  # noqa: PLC0415
+        from tetlux.cases.batch.requests import load_all  # noqa: PLC0415
+        from tetlux.cases.results.batch_tables import BatchTables, results_file  # noqa: PLC0415
+        from tetlux.meshing.errors import RunError  # noqa: PLC0415
 
     def expect(runs: int) -> None:
         if starts_early:
@@ -62,14 +64,16 @@ def _run_with(launcher: "Launcher", options: argparse.Namespace, *, starts_early
 
 def check(options: argparse.Namespace) -> int:
     """Check cases without solving."""
-    from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
+    with first_imports():
+        from tetlux.cases.batch.requests import check_all  # noqa: PLC0415
 
     return check_all(options.cases, plan=options.plan)
 
 
 def plan(options: argparse.Namespace) -> int:
     """Print which model fits each case."""
-    from tetlux.cases.batch.requests import print_models  # noqa: PLC0415
+    with first_imports():
+        from tetlux.cases.batch.requests import print_models  # noqa: PLC0415
 
     return print_models(options.cases)
 

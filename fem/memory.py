@@ -33,6 +33,8 @@ BYTES_PER_TETRAHEDRON_GIVEN, BYTES_PER_TETRAHEDRON_REFINED = 780.0, 1600.0
 # For each tetrahedron: of a further medium (its matrix and solver), of a light (its fluence and patch), and of
 # quadratic elements, where detectors are read (measured on 74,000 tetrahedra).
 BYTES_PER_MATRIX, BYTES_PER_LIGHT, BYTES_OF_READINGS = 100.0, 20.0, 3750.0
+# What the first version of control groups calls no limit is a little less than 2^63 bytes.
+NO_LIMIT = 2**62
 
 
 def estimate_memory(
@@ -155,8 +157,10 @@ def _left_by_groups(root: Path) -> Iterator[float]:
             group = base / path.lstrip("/")
             for folder in (group, *group.parents):
                 with suppress(OSError, ValueError):
-                    left = int((folder / limit).read_text()) - int((folder / usage).read_text())
-                    yield float(left + _reclaimable_cache(folder))
+                    # The second version calls no limit "max", which is no number.
+                    if (allowed := int((folder / limit).read_text())) < NO_LIMIT:
+                        left = allowed - int((folder / usage).read_text())
+                        yield float(left + _reclaimable_cache(folder))
                 if folder == base:
                     break
 

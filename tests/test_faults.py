@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing.context import ForkServerProcess
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from tests.elsewhere import start_elsewhere
 from tetlux.cases.chart import files as chart
 from tetlux.cases.cli import main
 from tetlux.cases.run import ALL_FILES
-from tetlux.cases.write.publish import claim_folder
+from tetlux.cases.write.publish import claim_folder, publish
 from tetlux.meshing import RunError, sphere, tetrahedralize
 from tetlux.meshing.host.scratch import scratch
 from tetlux.meshing.mesher import api as mesher
@@ -189,8 +189,8 @@ def test_killed_between_any_two_changes(notes: str, tmp_path: Path) -> None:
         [sys.executable, "-c", KILLER, str(tmp_path), notes, *ALL_FILES], capture_output=True, text=True, check=True
     )
     *lines, names = done.stdout.splitlines()
-    # All files go, a folder is looked for, and another one is put in its place, or all of its files.
-    assert len(lines) == len(ALL_FILES) + 3 + bool(notes) * (len(ALL_FILES) - 1)
+    # All files go, and another folder is put in the place of theirs; or all of its files, and it is removed.
+    assert len(lines) == len(ALL_FILES) + 2 + bool(notes) * len(ALL_FILES)
     old, new = set(ALL_FILES[1:]), set(ALL_FILES) - {ALL_FILES[-2]}
     for line in lines:
         _, code, text = line.split(" ", 2)
@@ -229,7 +229,7 @@ out, me, done = Path(sys.argv[1]), sys.argv[2], 0
 while done < 40:
     try:
         with claim_folder(out, "ball") as folder:
-            (folder.parent / "alone").mkdir()
+            (folder / "alone").mkdir()
             for name in ("a", "b", "c"):
                 (folder / name).write_text(me)
             publish(folder, out / "ball", ("a", "b", "c"))
@@ -249,6 +249,29 @@ def test_many_may_want_one_folder(tmp_path: Path) -> None:
         assert racer.returncode == 0
     assert [path.name for path in tmp_path.iterdir()] == ["ball"]
     assert len({(tmp_path / "ball" / name).read_text() for name in ("a", "b", "c")}) == 1
+
+
+def test_a_run_that_ends_leaves_the_next_one_its_folder(tmp_path: Path) -> None:
+    """What it wrote into is the final folder by then, and the next one's has the name that it had."""
+    with ExitStack() as first:
+        folder = first.enter_context(claim_folder(tmp_path, "ball"))
+        (folder / "summary.json").write_text("{}")
+        publish(folder, tmp_path / "ball", ["summary.json"])
+        with claim_folder(tmp_path, "ball") as again:
+            first.close()
+            assert again.is_dir()
+    assert [path.name for path in tmp_path.iterdir()] == ["ball"]
+
+
+def test_what_a_killed_run_left_is_not_published(tmp_path: Path) -> None:
+    with claim_folder(tmp_path, "ball") as folder:
+        pass
+    (folder / "results").mkdir(parents=True)
+    (folder / "surface.ply").write_text("half")
+    with claim_folder(tmp_path, "ball") as folder:
+        (folder / "summary.json").write_text("{}")
+        publish(folder, tmp_path / "ball", ["surface.ply", "summary.json"])
+    assert [path.name for path in (tmp_path / "ball").iterdir()] == ["summary.json"]
 
 
 def test_the_lock_is_on_the_folder_that_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

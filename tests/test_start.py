@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import needs
+from tetlux.cases.batch import launch
+from tetlux.meshing.host import blocks
 
 # Each takes a tenth of a second or more to import, alone or with what it needs.
 PICTURES = ("matplotlib", "pyvista", "vtkmodules")
@@ -35,8 +37,25 @@ def test_help_imports_nothing() -> None:
     assert imported(code, ("numpy", "yaml", "pydantic", *PICTURES, *READERS, *SOLVERS)) == []
 
 
+def test_a_worker_starts_before_libraries_are_imported() -> None:
+    assert imported("import tetlux.cases.batch.launch", ("numpy", "tetlux.meshing")) == []
+    assert (launch.CORES, launch.THREADS_VARIABLE) == (blocks.CORES, blocks.THREADS_VARIABLE)
+
+
+def test_garbage_is_collected_after_a_run(tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(CASE + "outputs: []\n")
+    code = "import gc\nfrom tetlux.cases.cli import main\nmain(['run', *sys.argv[1:]])\nassert gc.isenabled()"
+    assert imported(code, ("numpy",), str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")) == ["numpy"]
+
+
 def test_the_solver_imports_no_pictures_and_no_readers() -> None:
     assert imported("import tetlux.fem", (*PICTURES, *READERS, *SOLVERS, "pydantic")) == []
+
+
+@needs("pyarrow")
+def test_a_table_needs_no_pandas() -> None:
+    code = "from tetlux.cases.results.parquet import parquet_of\nassert parquet_of([{'x': 1.0}], ['x'])"
+    assert imported(code, ("pandas", "pyarrow")) == ["pyarrow"]
 
 
 def test_closed_forms_are_imported_when_they_are_asked_for() -> None:

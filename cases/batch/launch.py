@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 
-from tetlux.meshing.host.blocks import THREADS_VARIABLE
+# These two are as in `tetlux.meshing.host.blocks`, which takes half a second to import: the first worker starts before.
+CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+THREADS_VARIABLE = "TETLUX_THREADS"
 
 # Libraries read these when they are imported. Each worker has one thread, as many workers as there are cores.
 THREAD_LIMITS = dict.fromkeys(

@@ -44,10 +44,9 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
     """
     target = out / name
     # A hash, since names may have subfolders and be too long for a prefix.
-    place = out / f".partial-{blake2b(os.fsencode(name), digest_size=6).hexdigest()}"
-    folder = place / "results"
+    folder = out / f".partial-{blake2b(os.fsencode(name), digest_size=6).hexdigest()}"
     try:
-        lock = _lock(place)
+        lock = _lock(folder)
     except BlockingIOError as error:
         raise RunError(
             f"another run is at work on {target}; wait for its end, or choose another folder with --out."
@@ -56,9 +55,7 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
         raise write_error(out, name, error) from error
     try:
         try:
-            if folder.exists():
-                shutil.rmtree(folder)
-            folder.mkdir()
+            _remove_content(folder)
             # Fail now, not after an hour of work, if a file or a read-only folder is in the way.
             if target.exists():
                 next(target.iterdir(), None)
@@ -68,11 +65,13 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
             raise write_error(out, name, error) from error
         yield folder
     finally:
-        # Results that were moved leave it empty, which takes a tenth of the time to remove.
-        try:
-            place.rmdir()
-        except OSError:
-            shutil.rmtree(place, ignore_errors=True)
+        # Unless it has become the final folder, and another process has begun one of the same name.
+        if _is_of(lock, folder):
+            # Results that were moved leave it empty, which takes a tenth of the time to remove.
+            try:
+                folder.rmdir()
+            except OSError:
+                shutil.rmtree(folder, ignore_errors=True)
         # Unlock last: otherwise another process would take the folder for that of a killed one.
         os.close(lock)
 
@@ -92,16 +91,33 @@ def _lock(folder: Path) -> int:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # The process that held the lock before may have removed the folder.
-            if folder.stat().st_ino == os.fstat(lock).st_ino:
+            if _is_of(lock, folder):
                 return lock
-        except FileNotFoundError:
-            pass
         except OSError as error:
             if error.errno in WITHOUT_LOCKS:
                 return lock
             os.close(lock)
             raise
         os.close(lock)
+
+
+def _is_of(lock: int, folder: Path) -> bool:
+    """Whether a lock is of the folder that is there; without locks it always is."""
+    if sys.platform == "win32":
+        return True
+    try:
+        return folder.stat().st_ino == os.fstat(lock).st_ino
+    except FileNotFoundError:
+        return False
+
+
+def _remove_content(folder: Path) -> None:
+    """Remove what a killed process left in a folder."""
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
 
 
 def publish(folder: Path, target: Path, names: Sequence[str]) -> None:
