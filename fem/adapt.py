@@ -193,8 +193,8 @@ def first_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
         if layers is not None:
-            creases = layers.places_at_creases(scenes.surface)
-            mesh = grade_mesh(mesh, scenes.surface, *creases, most_tetrahedra, inner=scenes.inner)
+            elsewhere = layers.places_without(scenes.surface)
+            mesh = grade_mesh(mesh, scenes.surface, *elsewhere, most_tetrahedra, inner=scenes.inner)
         if tolerances.readings is not None:
             ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):

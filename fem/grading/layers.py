@@ -23,8 +23,8 @@ from tetlux.meshing.tets.refine import refine_often
 # light decays to 1/e; by how much each is higher than the one above it, for each depth that it lies deeper; and the
 # depth of the last. The error is proportional to the square of the heights.
 FIRST_LAYER, LAYER_TOLERANCE, LAYER_GROWTH, DEEPEST_LAYER = 0.07, 0.02, 6.0, 30.0
-# Layers become thinner by this factor where they are what limits the error.
-THINNER = 0.7
+# Layers become thinner by this factor where they are what limits the error, down to the second share of their height.
+THINNER, THINNEST = 0.7, 0.1
 # A node is lit if a place where light enters is nearer than this many times the distance between neighbouring ones.
 NEAR_PLACES = 3.0
 # Lateral size of tetrahedra that a curved surface needs, over its radius of curvature and the root of the tolerance.
@@ -33,6 +33,8 @@ LATERAL_SIZE = 1.0
 NODES_OF_REGULAR = 22.0
 # Layers are made if they are expected to need at most this share of the nodes.
 MUCH_SMALLER = 0.25
+# Size of tetrahedra at rims and creases, in the resolution without layers.
+RIM_SIZE = 2.0
 # Least spacing of places along creases, relative to the diagonal of the body.
 LEAST_SPACING = 0.005
 
@@ -45,6 +47,8 @@ class Layers:
     ----------
     places : (p, 3) ndarray
         Where the light enters, unit.
+    rims : (r, 3) ndarray
+        Where it varies along the surface as fast as with depth, unit.
     depth : float
         Over which the light decays to 1/e, unit.
     resolution : float
@@ -56,6 +60,7 @@ class Layers:
     """
 
     places: FloatArray
+    rims: FloatArray
     depth: float
     resolution: float
     tolerance: float
@@ -69,7 +74,8 @@ class Layers:
             return None
         depth = min(hints.depth for hints in covering)
         resolution = min(hints.resolution for hints in covering)
-        return cls(np.vstack([hints.places for hints in covering]), depth, resolution, tolerance)
+        places, rims = (np.vstack(each) for each in zip(*((h.places, h.rims) for h in covering), strict=True))
+        return cls(places, rims, depth, resolution, tolerance)
 
     def serve(self, mesh: TetMesh, surface: Surface) -> bool:
         """Whether a mesh with layers is expected to be much smaller than one of regular tetrahedra."""
@@ -96,7 +102,7 @@ class Layers:
 
     def thinner(self) -> "Layers":
         """Layers of smaller heights."""
-        return replace(self, thinned=THINNER * self.thinned)
+        return replace(self, thinned=max(THINNER * self.thinned, THINNEST))
 
     def lights(self, points: FloatArray) -> BoolArray:
         """Whether points of the surface (q, 3) are lit."""
@@ -104,8 +110,8 @@ class Layers:
         gaps = tree.query(self.places, k=[2], workers=THREADS)[0]
         return np.asarray(tree.query(points, workers=THREADS)[0] < NEAR_PLACES * np.median(gaps))
 
-    def places_at_creases(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
-        """Places along lit creases, (c, 3), where light varies along the surface as fast as with depth; and depths."""
+    def places_without(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
+        """Rims and lit creases (c, 3), for which layers do not serve, and the lengths to resolve there, (c,)."""
         ends = CurvedPatches(surface.points, surface.faces, surface.normals, surface.crease_angle).creases
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         parts = np.ceil(lengths / max(self.depth, LEAST_SPACING * surface.diagonal)).astype(np.int64)
@@ -114,7 +120,8 @@ class Layers:
         points = ends[own, 0] + along[:, None] * (ends[own, 1] - ends[own, 0])
         if len(points):
             points = points[self.lights(points)]
-        return points, np.full(len(points), self.depth)
+        points = np.vstack([points, self.rims])
+        return points, np.full(len(points), RIM_SIZE * self.resolution)
 
     def on(self, mesh: TetMesh) -> tuple[TetMesh, IntArray]:
         """A mesh with the layers, and what each of its tetrahedra belongs to: see `add_layers`."""

@@ -23,11 +23,14 @@ class MeshHints:
     depth : float
         Where the light covers all of a surface that it meets, the depth over which it decays to 1/e, unit; then layers
         along the surface serve as well. 0 if they do not.
+    rims : (r, 3) ndarray
+        Places where it varies along the surface as fast as with depth, so that layers do not serve, unit.
     """
 
     resolution: float = np.inf
     places: FloatArray = field(default_factory=no_vectors)
     depth: float = 0.0
+    rims: FloatArray = field(default_factory=no_vectors)
 
     @classmethod
     def merge(cls, parts: "Sequence[MeshHints]") -> "MeshHints":
@@ -36,6 +39,7 @@ class MeshHints:
             resolution=min(part.resolution for part in parts),
             places=np.vstack([part.places for part in parts]),
             depth=min(part.depth for part in parts),
+            rims=np.vstack([part.rims for part in parts]),
         )
 
     __repr__ = one_line
