@@ -9,7 +9,14 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.assessment import Tolerances
-from tetlux.fem.grading import LONGEST_EDGE, LONGEST_IF_FITTED, grade_between, grade_mesh, places_to_resolve
+from tetlux.fem.grading.layers import Layers, refine_below, with_layers
+from tetlux.fem.grading.near_sources import (
+    LONGEST_EDGE,
+    LONGEST_IF_FITTED,
+    grade_between,
+    grade_mesh,
+    places_to_resolve,
+)
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.operators.assembly import Assembly, Lumping
@@ -22,10 +29,11 @@ from tetlux.fem.system import MeshSolution, System
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.mesher.api import TIME_LIMIT, tetrahedralize
 from tetlux.meshing.tets.mesh import TetMesh
-from tetlux.meshing.tets.refine import refine_often
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
+# Where a finer mesh has more than this share of the error, it is the layers that have to be finer.
+SLOW = 0.8
 # A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
 SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
@@ -146,10 +154,26 @@ class Problem:
         )
 
 
+def layers_of(problem: Problem, tolerances: Tolerances) -> Layers | None:
+    """The layers that meshes of a body have below surfaces that light covers, if any."""
+    if problem.shared is not None or problem.emitters or tolerances.need_quadratic or tolerances.exitance is None:
+        return None
+    return Layers.for_lights([each for split in problem.lights for each in split.deposits], tolerances.exitance)
+
+
 def first_mesh(
-    problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report, *, cache: bool
-) -> TetMesh:
-    """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors."""
+    problem: Problem,
+    tolerances: Tolerances,
+    most_tetrahedra: int,
+    report: Report,
+    *,
+    cache: bool,
+    layers: Layers | None = None,
+) -> tuple[TetMesh, Layers | None]:
+    """The mesher's or a shared mesh of a body, refined towards its lights, and between them and detectors.
+
+    Lights for which there are layers do not refine it. Returns the layers too, if they serve.
+    """
     scenes = problem.scenes
     with problem.watch.stage("mesh"):
         if problem.shared is not None:
@@ -157,14 +181,20 @@ def first_mesh(
         else:
             with _report_if_slow(report):
                 mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
+        if layers is not None and not layers.serve(mesh, scenes.surface):
+            layers = None
         slack = 1.0 if problem.shared is None else SLACK
         for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):
             deposits = [each for split in problem.lights for each in split.deposits_if(fitted=fitted)]
+            deposits = [each for each in deposits if layers is None or each.hints.depth == 0]
             # The lights of others are taken to be of the same kind.
             source_points = places_to_resolve([*deposits, *problem.others] if deposits else [])
             mesh = grade_mesh(
                 mesh, scenes.surface, *source_points, most_tetrahedra, longest=longest, inner=scenes.inner
             )
+        if layers is not None:
+            elsewhere = layers.places_without(scenes.surface)
+            mesh = grade_mesh(mesh, scenes.surface, *elsewhere, most_tetrahedra, inner=scenes.inner)
         if tolerances.readings is not None:
             ways = _ways_of_light(problem, tolerances)
             for media, shift in dict.fromkeys(problem.kinds):
@@ -180,7 +210,7 @@ def first_mesh(
                 )
     begin = "tetrahedralized" if problem.shared is None else "began with the mesh it was given"
     report(f"{begin}: {len(mesh.tetrahedra):,} tetrahedra")
-    return mesh
+    return mesh, layers
 
 
 def _ways_of_light(problem: Problem, tolerances: Tolerances) -> list[tuple[FloatArray, FloatArray]]:
@@ -209,7 +239,12 @@ def _report_if_slow(report: Report) -> Iterator[None]:
 
 
 def solve_and_refine(
-    mesh: TetMesh, problem: Problem, tolerances: Tolerances, most_tetrahedra: int, report: Report
+    mesh: TetMesh,
+    problem: Problem,
+    tolerances: Tolerances,
+    most_tetrahedra: int,
+    report: Report,
+    layers: Layers | None = None,
 ) -> list[MeshSolution]:
     """Solve for all scenes on one mesh, refined until each is within the tolerances or the mesh as large as it may be.
 
@@ -223,6 +258,8 @@ def solve_and_refine(
         Largest number of tetrahedra after refinement; 0 to solve on the mesh as it is.
     report : callable
         Called with a line of text for each mesh.
+    layers : Layers, optional
+        Those that are put on each mesh: what is refined is the mesh below.
 
     Returns
     -------
@@ -232,23 +269,27 @@ def solve_and_refine(
     # When the mesh is found that the first scenes need, the others are solved for.
     first, *others = problem.groups
     pending = [scene for group in others for scene in group]
+    base, (mesh, parents) = mesh, with_layers(mesh, layers)
     solve_on = problem.solver_on(mesh)
     steps = best_steps = {scene: solve_on(scene, None) for scene in first}
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
             found = tolerances.assess(steps)
+        if layers is not None and found.largest_error_ratio > SLOW * least_ratio:
+            layers = layers.thinner()
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
         fine_enough = not found.splits.any()
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
-                scenes = problem.scenes
-                finer = refine_often(mesh, found.splits, scenes.surface, scenes.inner, most_tetrahedra)
+                surfaces = problem.scenes.surface, problem.scenes.inner
+                below, finer, owners = refine_below(base, parents, found.splits, surfaces, most_tetrahedra, layers)
             if len(finer.tetrahedra) <= most_tetrahedra:
-                mesh, solve_on = finer, problem.solver_on(finer)
-                steps = {scene: solve_on(scene, step) for scene, step in steps.items()}
+                base, mesh, parents, solve_on = below, finer, owners, problem.solver_on(finer)
+                # Patches are inherited from meshes with the same nodes, which layers move.
+                steps = {scene: solve_on(scene, step if layers is None else None) for scene, step in steps.items()}
                 continue
         if not pending:
             # Where refinement no longer reduces the error, an earlier mesh may have been better.

@@ -107,7 +107,7 @@ def share_mesh(
     problem = Problem(checked, split, "lumped", True, Stopwatch(), others=others)
     reading = len(detectors) > 0 or tolerances.need_quadratic
     limit = limit_by_memory(MOST_SHARED_TETRAHEDRA, *problem.size, reading=reading).tetrahedra
-    mesh = first_mesh(problem, tolerances, limit, report, cache=cache)
+    mesh, _ = first_mesh(problem, tolerances, limit, report, cache=cache)
     return SharedMesh(_refine_for_most(mesh, problem, tolerances, limit, report))
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, solve_and_refine
+from tetlux.fem.adapt import MOST_TETRAHEDRA, Problem, first_mesh, layers_of, solve_and_refine
 from tetlux.fem.assessment import Tolerances
 from tetlux.fem.error.tolerance import check_tolerance
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
@@ -174,10 +174,11 @@ def solve_problem(
     """
     given, reading = mesh is not None, any(detectors) or tolerances.need_quadratic
     limit_of_mesh = limit_by_memory(most_tetrahedra, *problem.size, reading=reading)
+    layers = None if given else layers_of(problem, tolerances)
     if mesh is None:
-        mesh = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache)
+        mesh, layers = first_mesh(problem, tolerances, limit_of_mesh.tetrahedra, report, cache=cache, layers=layers)
     check_memory(len(mesh.tetrahedra), *problem.size, reading=reading)
-    steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report)
+    steps = solve_and_refine(mesh, problem, tolerances, 0 if given else limit_of_mesh.tetrahedra, report, layers)
     where = "on the mesh given" if given else _in_words(limit_of_mesh)
     solutions, scenes = [], problem.scenes
     for number, step in enumerate(steps):

@@ -30,7 +30,7 @@ from tetlux.fem.error.residual import (
 )
 from tetlux.fem.known.fitted_patch import FittedPatch
 from tetlux.fem.linear.solver import Solver
-from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.operators.fitting import LayerFitting
 from tetlux.fem.outcome.solution import Solution
@@ -44,6 +44,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 # times the true error on spheres, cylinders and slabs of 3 to 100 mean free paths, sources 0.005 to 10 below the
 # surface, indices 1 to 1.5 and albedos 0.5 to 0.9999, and in the corners of boxes.
 FACET_WEIGHT = 0.5
+# Where light is deposited just below facets, it moves with them, and the errors of gradients and facets add up.
+LIT_FACET_WEIGHT = 1.0
 # A bright spot is smaller than facets if its norm, where charges are fitted, is less than this share of that at nodes.
 SMALL_SPOT = 0.5
 # Exited power below this share of the incident power is rounding error of the linear solver.
@@ -119,7 +121,7 @@ def estimate_error(
         no_duals = np.zeros((len(mesh.points), 2))
         return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64), no_duals)
     duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
-    indicators, power_indicators = weigh_residual(solution, coefficients, duals, emission, inner, fitting)
+    indicators, power_indicators = weigh_residual(solution, coefficients, duals, emission, inner, fitting, load)
     indicators += ripple_indicators(mesh, coefficients, load, norm)
     unresolved = _unresolved_indicators(solution, norm)
     splits = np.where(unresolved > indicators, _splits_to_resolve(solution), 1)
@@ -133,6 +135,7 @@ def weigh_residual(
     emission: float | FloatArray = 0.0,
     inner: Sequence[Surface] = (),
     fitting: LayerFitting | None = None,
+    load: FloatArray | None = None,
 ) -> list[FloatArray]:
     """Indicators of the tetrahedra, (m,), by each of several dual solutions (n, k): see `estimate_error`."""
     mesh, mean = solution.mesh, nodal_averaging(solution.mesh)
@@ -142,6 +145,8 @@ def weigh_residual(
     diffusion, scale = coefficients.diffusion, 1.0
     if fitting is not None:
         diffusion, scale = fitting.diffusion, fitting.absorption_scale[mesh.tetrahedra].min(axis=1) ** 2
+    afar = 1.0 if load is None else _share_from_afar(mesh, coefficients, load, outward_flux)
+    facet_weight = afar * FACET_WEIGHT + (1.0 - afar) * LIT_FACET_WEIGHT
 
     def indicators_for_dual(dual: NumberArray) -> FloatArray:
         at_corners = dual[mesh.tetrahedra]
@@ -156,8 +161,8 @@ def weigh_residual(
         if fitting is not None:
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
         values = remainder, outward_flux, dual
-        indicators += FACET_WEIGHT * boundary_facets(
-            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale
+        indicators += facet_weight * boundary_facets(
+            mesh, coefficients, solution.surface, values, float(indicators.sum()), scale * afar
         )
         indicators += interface_layers(mesh, coefficients, smooth, at_corners)
         return indicators + FACET_WEIGHT * interface_facets(
@@ -165,6 +170,19 @@ def weigh_residual(
         )
 
     return map_in_threads(indicators_for_dual, list(duals.T))
+
+
+def _share_from_afar(
+    mesh: TetMesh, coefficients: Coefficients, load: FloatArray, outward_flux: NumberArray
+) -> FloatArray:
+    """At boundary cells, the share of the outward flux that does not come from light deposited just below, (m,)."""
+    cells = mesh.boundary_cells
+    density = (np.abs(load) / mesh.node_volumes)[mesh.tetrahedra[cells]].min(axis=1)
+    entering = density * 3.0 * at_cells(coefficients.diffusion, cells)
+    flux = np.abs(outward_flux[mesh.boundary_faces].mean(axis=1))
+    share = np.ones(len(mesh.tetrahedra))
+    share[cells] = np.clip(1.0 - entering / np.maximum(flux, np.finfo(float).tiny), 0.0, 1.0)
+    return share
 
 
 def _dual_loads(

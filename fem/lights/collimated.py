@@ -29,6 +29,9 @@ DEPTH_SAMPLES = 64
 # Arrows of light on the whole body in pictures.
 ARROWS = 3
 
+# Where light meets a surface at a smaller cosine, it varies along the surface as fast as with depth.
+GRAZING = 0.12
+
 
 @dataclass(frozen=True)
 class CollimatedBeam:
@@ -84,12 +87,18 @@ class CollimatedBeam:
                 f"{surface.extent}; change its direction or the spot's center."
             )
         depth = self._least_depth(body, entries)
-        size = np.inf if self.spot is None else self.spot.reach
         return Deposit(
-            hints=MeshHints(illumination_resolution(surface, depth, size), entries),
+            hints=self._hints(surface, entries, depth),
             footprint=Footprint(entries, radius=np.inf if self.spot is None else None),
             on_mesh=self,
         )
+
+    def _hints(self, surface: Surface, entries: FloatArray, depth: float) -> MeshHints:
+        if self.spot is not None:
+            return MeshHints(illumination_resolution(surface, depth, self.spot.reach), entries)
+        cosines = -surface.project(entries)[1] @ unit_vector(self.direction, "direction")
+        resolution = illumination_resolution(surface, depth)
+        return MeshHints(resolution, entries, depth=depth, rims=entries[cosines < GRAZING])
 
     def arrows(self, surface: Surface) -> Arrows:
         """Draw several on the whole body, one on a spot; see `HasArrows`."""

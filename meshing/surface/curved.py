@@ -104,6 +104,13 @@ class CurvedPatches:
         return smooth.reshape(-1, 3)
 
     @cached_property
+    def creases(self) -> FloatArray:
+        """The ends of the edges that bend by more than the crease angle, (c, 2, 3)."""
+        faces, places = np.nonzero(~self._smooth_sides)
+        corners = self._faces[faces[:, None], np.column_stack([places, NEXT_CORNER[places]])]
+        return np.asarray(self._points[corners])
+
+    @cached_property
     def _smooth_edges(self) -> tuple[IntArray, IntArray]:
         """Edges that bend less than the crease angle, by the corners (3 face + place) where their two sides start."""
         tail, head = self._faces, self._faces[:, NEXT_CORNER]

@@ -1,0 +1,154 @@
+"""Layers of flat tetrahedra along the boundary, where something varies with depth much faster than along the surface.
+
+The mesh is pulled inward from its boundary, and the gap is filled with prisms, each of three tetrahedra. Their lateral
+size stays that of the facets, and their heights are chosen freely.
+"""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import coo_array, diags_array
+from scipy.sparse.linalg import cg
+
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.surface.triangles import triangle_areas
+from tetlux.meshing.tets.geometry import tetrahedron_volumes
+from tetlux.meshing.tets.mesh import TetMesh
+
+# Layers together are at most this share of the mean length of the edges at a node.
+REACH = 1.5
+# Their depth changes along the surface by at most this much for each length.
+STEEPEST = 0.5
+# A pulled tetrahedron keeps at least this share of its volume: layers are made thinner at its corners until it does.
+SMALLEST_SHARE = 0.25
+# Layers are made thinner by this factor, so often; where that is not enough there are none.
+THINNER, ATTEMPTS = 0.6, 8
+# Relative accuracy of the displacement of inner nodes: any that keeps volumes positive will do.
+ACCURACY = 1e-2
+
+
+def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[TetMesh, IntArray]:
+    """Put layers of flat tetrahedra along the boundary of a mesh.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    depths : (k,) ndarray
+        Depths of the layers' lower sides, ascending, unit.
+    where : (n,) ndarray of bool
+        The nodes of the boundary below which there are layers, as many as fit within `REACH`.
+
+    Returns
+    -------
+    mesh : TetMesh
+        Its boundary is that of the mesh given. Layers are thinner, or fewer, where the body is too thin for them.
+    parents : (m,) ndarray
+        The tetrahedron of the mesh given that each of its tetrahedra is pulled from, or stands on the facet of.
+    """
+    lit = np.zeros(len(mesh.points), dtype=bool)
+    lit[mesh.boundary_nodes] = where[mesh.boundary_nodes]
+    reach = np.where(lit, REACH * _edge_lengths_at_nodes(mesh), 0.0)
+    normals, lowest = _node_normals(mesh), np.concatenate([[0.0], depths])
+    pull = _Pull(mesh)
+    for _ in range(ATTEMPTS):
+        reach = _even_out(mesh, reach)
+        numbers = np.searchsorted(depths, reach, side="right")
+        lower = pull(-lowest[numbers][:, None] * normals)
+        squashed = tetrahedron_volumes(lower, mesh.tetrahedra) < SMALLEST_SHARE * mesh.volumes
+        if not squashed.any():
+            break
+        reach[np.unique(mesh.tetrahedra[squashed])] *= THINNER
+    else:
+        return mesh, np.arange(len(mesh.tetrahedra))
+    return _fill(mesh, lower, numbers, lowest, normals)
+
+
+def _fill(
+    mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArray, normals: FloatArray
+) -> tuple[TetMesh, IntArray]:
+    """Fill the gap between the boundary and the pulled nodes (n, 3) with prisms, and return as `add_layers` does."""
+    points, nodes = [lower], np.tile(np.arange(len(lower)), (int(numbers.max()) + 1, 1))
+    total = len(lower)
+    for level in range(int(numbers.max())):
+        # The lowest side of the layers at a node is the pulled node itself.
+        own = np.flatnonzero(numbers > level)
+        nodes[level, own] = total + np.arange(len(own))
+        total += len(own)
+        points.append(mesh.points[own] - depths[level] * normals[own])
+    # Neighbouring prisms divide the side between them alike, as the corners are in the order of the nodes.
+    facets = np.sort(mesh.boundary_faces, axis=1)
+    cells, parents = [mesh.tetrahedra], [np.arange(len(mesh.tetrahedra))]
+    for upper, below in pairwise(nodes):
+        a, b = upper[facets].T, below[facets].T
+        for corners in ((a[0], a[1], a[2], b[2]), (a[0], a[1], b[1], b[2]), (a[0], b[0], b[1], b[2])):
+            tetrahedra = np.column_stack(corners)
+            solid = (np.diff(np.sort(tetrahedra, axis=1), axis=1) > 0).all(axis=1)
+            cells.append(tetrahedra[solid])
+            parents.append(mesh.boundary_cells[solid])
+    everything, tetrahedra, owners = np.vstack(points), np.vstack(cells), np.concatenate(parents)
+    inverted = tetrahedron_volumes(everything, tetrahedra) < 0
+    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
+    layered = TetMesh(everything, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
+    return (replace(layered, regions=mesh.regions[owners]) if mesh.regions.any() else layered), owners
+
+
+def _even_out(mesh: TetMesh, reach: FloatArray) -> FloatArray:
+    """Let the depth of layers (n,) grow along the surface by no more than `STEEPEST` times the way."""
+    first, second = mesh.edges[np.unique(mesh.boundary_edges)].T
+    most = STEEPEST * np.linalg.norm(mesh.points[first] - mesh.points[second], axis=1)
+    while True:
+        before = reach.copy()
+        np.minimum.at(reach, first, before[second] + most)
+        np.minimum.at(reach, second, before[first] + most)
+        if (reach == before).all():
+            return reach
+
+
+def _edge_lengths_at_nodes(mesh: TetMesh) -> FloatArray:
+    """Mean length of the edges at each node, (n,), unit."""
+    ends, lengths = mesh.edges.reshape(-1), np.repeat(mesh.edge_lengths, 2)
+    return np.asarray(np.bincount(ends, lengths) / np.bincount(ends))
+
+
+def _node_normals(mesh: TetMesh) -> FloatArray:
+    """Outward unit normals at nodes of the boundary, zero at others, (n, 3)."""
+    vectors, areas = triangle_areas(mesh.points, mesh.boundary_faces)
+    sums = np.zeros_like(mesh.points)
+    for corner in mesh.boundary_faces.T:
+        np.add.at(sums, corner, vectors * areas[:, None])
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.asarray(sums / np.where(lengths > 0, lengths, 1.0))
+
+
+class _Pull:
+    """Moves the nodes of a mesh as the boundary is moved: inner nodes follow by Laplace's equation.
+
+    Nodes between regions stay.
+    """
+
+    def __init__(self, mesh: TetMesh) -> None:
+        self._mesh = mesh
+        self._free = self._find_free()
+        gradients, corners = mesh.hat_gradients, mesh.tetrahedra
+        stiffness = np.einsum("mik,mjk,m->mij", gradients, gradients, mesh.volumes)
+        places = np.repeat(corners, 4, axis=1).reshape(-1), np.tile(corners, 4).reshape(-1)
+        matrix = coo_array((stiffness.reshape(-1), places), shape=(len(mesh.points),) * 2).tocsr()
+        self._rows = matrix[self._free]
+        self._inner = self._rows[:, self._free]
+        self._scaled = diags_array(1.0 / self._inner.diagonal())
+
+    def _find_free(self) -> BoolArray:
+        free = np.ones(len(self._mesh.points), dtype=bool)
+        free[self._mesh.boundary_nodes] = False
+        if self._mesh.regions.any():
+            free[np.unique(self._mesh.interfaces[0])] = False
+        return free
+
+    def __call__(self, shifts: FloatArray) -> FloatArray:
+        """The nodes (n, 3), with those of the boundary moved by the shifts (n, 3)."""
+        moved = self._mesh.points + shifts
+        for axis, load in enumerate((-(self._rows @ shifts)).T):
+            if load.any():
+                moved[self._free, axis] += cg(self._inner, load, rtol=ACCURACY, M=self._scaled)[0]
+        return moved
