@@ -7,7 +7,7 @@ from tests.conftest import block
 from tetlux.fem import CollimatedBeam, Medium, solve
 from tetlux.fem.exact.sphere_light import beam_exitance, beam_total
 from tetlux.fem.grading import Layers
-from tetlux.meshing import box, sphere
+from tetlux.meshing import Surface, box, sphere, torus
 from tetlux.meshing.mesher.api import tetrahedralize
 from tetlux.meshing.tets.layers import add_layers
 
@@ -47,6 +47,17 @@ def test_there_are_no_layers_where_no_light_is() -> None:
     thin, _ = add_layers(plate, DEPTHS, np.ones(len(plate.points), dtype=bool))
     assert thin.volume == pytest.approx(plate.volume, rel=1e-12)
     assert thin.volumes.min() > 0
+
+
+@pytest.mark.parametrize("shape", [box((10.0, 10.0, 2.0)), torus(10.0, 4.0)], ids=["box", "torus"])
+def test_layers_do_not_fold(shape: Surface) -> None:
+    """Below edges and narrow facets they are thinner, so that tetrahedra do not overlap: the volume stays exact."""
+    mesh = tetrahedralize(shape)
+    depths = (1.42 ** np.arange(1, 16) - 1.0) / 60.0
+    layered, _ = add_layers(mesh, depths, np.ones(len(mesh.points), dtype=bool))
+    assert len(layered.points) > 1.5 * len(mesh.points)
+    assert layered.volume == pytest.approx(mesh.volume, rel=1e-12)
+    assert layered.area == pytest.approx(mesh.area, rel=1e-12)
 
 
 def test_layers_keep_the_regions_of_a_mesh() -> None:

@@ -6,6 +6,7 @@ size stays that of the facets, and their heights are chosen freely.
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_array, diags_array
@@ -22,10 +23,12 @@ REACH = 1.5
 STEEPEST = 0.5
 # A pulled tetrahedron keeps at least this share of its volume: layers are made thinner at its corners until it does.
 SMALLEST_SHARE = 0.25
-# Layers are made thinner by this factor, so often; where that is not enough there are none.
-THINNER, ATTEMPTS = 0.6, 8
+# Layers are made thinner by this factor, so often; where that is not enough they are left out, again so often at most.
+THINNER, ATTEMPTS = 0.6, 6
 # Relative accuracy of the displacement of inner nodes: any that keeps volumes positive will do.
 ACCURACY = 1e-2
+# Odd orders of three corners, as numbers to the base 3.
+_ODD_ORDERS = [int(np.dot(order, [9, 3, 1])) for order in ((0, 2, 1), (1, 0, 2), (2, 1, 0))]
 
 
 def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[TetMesh, IntArray]:
@@ -51,23 +54,43 @@ def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[Tet
     reach = np.where(lit, REACH * _edge_lengths_at_nodes(mesh), 0.0)
     normals, lowest = _node_normals(mesh), np.concatenate([[0.0], depths])
     pull = _Pull(mesh)
-    for _ in range(ATTEMPTS):
+    for attempt in range(2 * ATTEMPTS):
         reach = _even_out(mesh, reach)
         numbers = np.searchsorted(depths, reach, side="right")
         lower = pull(-lowest[numbers][:, None] * normals)
+        layers = _fill(mesh, lower, numbers, lowest, normals)
         squashed = tetrahedron_volumes(lower, mesh.tetrahedra) < SMALLEST_SHARE * mesh.volumes
-        if not squashed.any():
-            break
-        reach[np.unique(mesh.tetrahedra[squashed])] *= THINNER
-    else:
-        return mesh, np.arange(len(mesh.tetrahedra))
-    return _fill(mesh, lower, numbers, lowest, normals)
+        folded = np.unique(layers.facets[tetrahedron_volumes(layers.points, layers.tetrahedra) < layers.least])
+        if not squashed.any() and len(folded) == 0:
+            return _joined(mesh, layers)
+        nodes = np.union1d(mesh.tetrahedra[squashed], mesh.boundary_faces[folded])
+        reach[nodes] *= THINNER if attempt < ATTEMPTS else 0.0
+    return mesh, np.arange(len(mesh.tetrahedra))
 
 
-def _fill(
-    mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArray, normals: FloatArray
-) -> tuple[TetMesh, IntArray]:
-    """Fill the gap between the boundary and the pulled nodes (n, 3) with prisms, and return as `add_layers` does."""
+class _Filled(NamedTuple):
+    """The layers, and the nodes of the mesh below them.
+
+    Attributes
+    ----------
+    points : (p, 3) ndarray
+        Those of the mesh that is pulled inward, then those of the layers.
+    tetrahedra : (t, 4) ndarray
+        Of the layers.
+    facets : (t,) ndarray
+        The boundary triangle above each.
+    least : (t,) ndarray
+        The least volume of each, unit³: those of a fold are smaller.
+    """
+
+    points: FloatArray
+    tetrahedra: IntArray
+    facets: IntArray
+    least: FloatArray
+
+
+def _fill(mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArray, normals: FloatArray) -> _Filled:
+    """Fill the gap between the boundary and the pulled nodes (n, 3) with prisms."""
     points, nodes = [lower], np.tile(np.arange(len(lower)), (int(numbers.max()) + 1, 1))
     total = len(lower)
     for level in range(int(numbers.max())):
@@ -77,20 +100,29 @@ def _fill(
         total += len(own)
         points.append(mesh.points[own] - depths[level] * normals[own])
     # Neighbouring prisms divide the side between them alike, as the corners are in the order of the nodes.
-    facets = np.sort(mesh.boundary_faces, axis=1)
-    cells, parents = [mesh.tetrahedra], [np.arange(len(mesh.tetrahedra))]
-    for upper, below in pairwise(nodes):
-        a, b = upper[facets].T, below[facets].T
-        for corners in ((a[0], a[1], a[2], b[2]), (a[0], a[1], b[1], b[2]), (a[0], b[0], b[1], b[2])):
-            tetrahedra = np.column_stack(corners)
-            solid = (np.diff(np.sort(tetrahedra, axis=1), axis=1) > 0).all(axis=1)
+    order = np.argsort(mesh.boundary_faces, axis=1)
+    corners = np.take_along_axis(mesh.boundary_faces, order, axis=1)
+    is_odd = np.isin(order @ [9, 3, 1], _ODD_ORDERS)
+    cells, facets, least = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    for level, (upper, below) in enumerate(pairwise(nodes)):
+        a, b = upper[corners].T, below[corners].T
+        share = SMALLEST_SHARE / 3.0 * (depths[level + 1] - depths[level]) * mesh.boundary_areas
+        for four in ((a[0], a[2], a[1], b[2]), (a[0], a[1], b[1], b[2]), (a[0], b[1], b[0], b[2])):
+            tetrahedra = np.column_stack(four)
+            tetrahedra[is_odd] = tetrahedra[is_odd][:, [0, 2, 1, 3]]
+            solid = np.flatnonzero((np.diff(np.sort(tetrahedra, axis=1), axis=1) > 0).all(axis=1))
             cells.append(tetrahedra[solid])
-            parents.append(mesh.boundary_cells[solid])
-    everything, tetrahedra, owners = np.vstack(points), np.vstack(cells), np.concatenate(parents)
-    inverted = tetrahedron_volumes(everything, tetrahedra) < 0
-    tetrahedra[inverted] = tetrahedra[inverted][:, [0, 2, 1, 3]]
-    layered = TetMesh(everything, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
-    return (replace(layered, regions=mesh.regions[owners]) if mesh.regions.any() else layered), owners
+            facets.append(solid)
+            least.append(share[solid])
+    return _Filled(np.vstack(points), np.vstack(cells), np.concatenate(facets), np.concatenate(least))
+
+
+def _joined(mesh: TetMesh, layers: _Filled) -> tuple[TetMesh, IntArray]:
+    """The pulled mesh with its layers, and its parents: see `add_layers`."""
+    parents = np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[layers.facets]])
+    tetrahedra = np.vstack([mesh.tetrahedra, layers.tetrahedra])
+    layered = TetMesh(layers.points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
+    return (replace(layered, regions=mesh.regions[parents]) if mesh.regions.any() else layered), parents
 
 
 def _even_out(mesh: TetMesh, reach: FloatArray) -> FloatArray:
