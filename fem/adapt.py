@@ -181,7 +181,7 @@ def first_mesh(
         else:
             with _report_if_slow(report):
                 mesh = tetrahedralize(scenes.surface, scenes.inner, cache=cache)
-        if layers is not None and not layers.serve(mesh, scenes.surface):
+        if layers is not None and not layers.serve(mesh, scenes.surface, most_tetrahedra):
             layers = None
         slack = 1.0 if problem.shared is None else SLACK
         for fitted, longest in ((False, slack * LONGEST_EDGE), (True, slack * LONGEST_IF_FITTED)):

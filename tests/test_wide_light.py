@@ -68,6 +68,11 @@ def test_layers_keep_the_regions_of_a_mesh() -> None:
     assert len(layered.points) > 1.5 * len(mesh.points)
     assert (layered.regions == mesh.regions[parents]).all()
     assert layered.region_volumes == pytest.approx(mesh.region_volumes, rel=1e-12)
+    # A region close below is not in the way of thinner ones.
+    mesh = tetrahedralize(ball, [sphere(9.5)])
+    layered, _ = add_layers(mesh, DEPTHS, np.ones(len(mesh.points), dtype=bool))
+    assert len(layered.points) > len(mesh.points)
+    assert layered.region_volumes == pytest.approx(mesh.region_volumes, rel=1e-12)
 
 
 def test_a_wide_beam_costs_no_more_for_its_thin_layer() -> None:

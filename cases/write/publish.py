@@ -5,7 +5,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
 
@@ -66,12 +66,13 @@ def claim_folder(out: Path, name: str) -> Iterator[Path]:
         yield folder
     finally:
         # Unless it has become the final folder, and another process has begun one of the same name.
-        if _is_of(lock, folder):
-            # Results that were moved leave it empty, which takes a tenth of the time to remove.
-            try:
-                folder.rmdir()
-            except OSError:
-                shutil.rmtree(folder, ignore_errors=True)
+        with suppress(OSError):
+            if _is_of(lock, folder):
+                # Results that were moved leave it empty, which takes a tenth of the time to remove.
+                try:
+                    folder.rmdir()
+                except OSError:
+                    shutil.rmtree(folder, ignore_errors=True)
         # Unlock last: otherwise another process would take the folder for that of a killed one.
         os.close(lock)
 

@@ -181,7 +181,7 @@ def _share_from_afar(
     entering = density * 3.0 * at_cells(coefficients.diffusion, cells)
     flux = np.abs(outward_flux[mesh.boundary_faces].mean(axis=1))
     share = np.ones(len(mesh.tetrahedra))
-    share[cells] = np.clip(1.0 - entering / np.maximum(flux, np.finfo(float).tiny), 0.0, 1.0)
+    np.minimum.at(share, cells, np.clip(1.0 - entering / np.maximum(flux, np.finfo(float).tiny), 0.0, 1.0))
     return share
 
 

@@ -77,8 +77,8 @@ class Layers:
         places, rims = (np.vstack(each) for each in zip(*((h.places, h.rims) for h in covering), strict=True))
         return cls(places, rims, depth, resolution, tolerance)
 
-    def serve(self, mesh: TetMesh, surface: Surface) -> bool:
-        """Whether a mesh with layers is expected to be much smaller than one of regular tetrahedra."""
+    def serve(self, mesh: TetMesh, surface: Surface, most: int) -> bool:
+        """Whether a mesh with layers is expected to be much smaller than one of regular tetrahedra, and than `most`."""
         lit = np.flatnonzero(self.lights(mesh.points[mesh.boundary_faces].mean(axis=1)))
         if len(lit) == 0:
             return False
@@ -90,7 +90,9 @@ class Layers:
         regular = (
             NODES_OF_REGULAR * max(1.0, LAYER_TOLERANCE / self.tolerance) ** 1.25 * areas.sum() / self.resolution**2
         )
-        return bool(count * (areas / lateral**2).sum() < MUCH_SMALLER * regular)
+        if count * (areas / lateral**2).sum() >= MUCH_SMALLER * regular:
+            return False
+        return len(self.on(mesh)[0].tetrahedra) < MUCH_SMALLER * most
 
     @property
     def depths(self) -> FloatArray:

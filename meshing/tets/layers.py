@@ -17,7 +17,7 @@ from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Layers together are at most this share of the mean length of the edges at a node.
+# Layers together are at most this many times as deep as the mean length of the edges at a node.
 REACH = 1.5
 # Their depth changes along the surface by at most this much for each length.
 STEEPEST = 0.5
@@ -51,6 +51,9 @@ def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[Tet
     """
     lit = np.zeros(len(mesh.points), dtype=bool)
     lit[mesh.boundary_nodes] = where[mesh.boundary_nodes]
+    if mesh.regions.any():
+        # An interface that reaches the boundary would be bent.
+        lit[mesh.interfaces[0]] = False
     reach = np.where(lit, REACH * _edge_lengths_at_nodes(mesh), 0.0)
     normals, lowest = _node_normals(mesh), np.concatenate([[0.0], depths])
     pull = _Pull(mesh)
@@ -64,6 +67,8 @@ def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[Tet
         if not squashed.any() and len(folded) == 0:
             return _joined(mesh, layers)
         nodes = np.union1d(mesh.tetrahedra[squashed], mesh.boundary_faces[folded])
+        if not reach[nodes].any():  # they are within the body, next to a region
+            nodes = np.flatnonzero(reach)
         reach[nodes] *= THINNER if attempt < ATTEMPTS else 0.0
     return mesh, np.arange(len(mesh.tetrahedra))
 
