@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.benchmarks.scenes import lit_ball, turbid
 from tests.conftest import block
-from tetlux.fem import CollimatedBeam, Medium, solve
-from tetlux.fem.exact.sphere_light import beam_exitance, beam_total
+from tetlux.fem import solve
+from tetlux.fem.exact.sphere_light import beam_total
 from tetlux.fem.grading import Layers
 from tetlux.meshing import Surface, box, sphere, torus
 from tetlux.meshing.mesher.api import tetrahedralize
@@ -77,19 +78,14 @@ def test_layers_keep_the_regions_of_a_mesh() -> None:
 
 def test_a_wide_beam_costs_no_more_for_its_thin_layer() -> None:
     """Exitance, power and estimate by the series of a ball; nodes hardly grow with the radius."""
-    medium = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.0)
-    directions = np.random.default_rng(3).normal(size=(2000, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    gamma = np.arccos(directions[:, 2])
     nodes = {}
     for radius in (10.0, 100.0):
-        beam = CollimatedBeam(direction=(0.0, 0.0, -1.0), irradiance=1.0)
-        solution = solve(sphere(radius), medium, [beam], tolerance=0.02)
-        exact = beam_exitance(medium, radius=radius, gamma=gamma)
-        error = np.linalg.norm(solution.exitance_at(radius * directions) - exact) / np.linalg.norm(exact)
+        ball = lit_ball("", turbid(0.99, 1.0), radius=radius)
+        solution = solve(ball.surface, ball.medium, [ball.light], tolerance=0.02)
+        error = ball.error(solution)
         assert error < 0.02
         assert 0.5 < solution.error_estimate / error < 3.0
-        assert solution.power.exited == pytest.approx(beam_total(medium, radius=radius), rel=0.02)
+        assert solution.power.exited == pytest.approx(beam_total(ball.medium, radius=radius), rel=0.02)
         nodes[radius] = len(solution.mesh.points)
     assert nodes[10.0] < 8_000
     assert nodes[100.0] < 10.0**0.65 * nodes[10.0]

@@ -21,6 +21,7 @@ import numpy as np
 from tetlux.fem.error.facets import boundary_facets, interface_facets
 from tetlux.fem.error.layers import boundary_layers, interface_layers
 from tetlux.fem.error.residual import (
+    density_below_facets,
     lumping_error,
     nodal_averaging,
     recovered_gradient_difference,
@@ -177,8 +178,8 @@ def _share_from_afar(
 ) -> FloatArray:
     """At boundary cells, the share of the outward flux that does not come from light deposited just below, (m,)."""
     cells = mesh.boundary_cells
-    density = (np.abs(load) / mesh.node_volumes)[mesh.tetrahedra[cells]].min(axis=1)
-    entering = density * 3.0 * at_cells(coefficients.diffusion, cells)
+    # Below an area, light that decays over a mean free path leaves that much times its density at the surface.
+    entering = density_below_facets(mesh, load) * 3.0 * at_cells(coefficients.diffusion, cells)
     flux = np.abs(outward_flux[mesh.boundary_faces].mean(axis=1))
     share = np.ones(len(mesh.tetrahedra))
     np.minimum.at(share, cells, np.clip(1.0 - entering / np.maximum(flux, np.finfo(float).tiny), 0.0, 1.0))

@@ -6,6 +6,7 @@ tetrahedra that resolve that depth grow in number with the square of the body's 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -108,9 +109,15 @@ class Layers:
 
     def lights(self, points: FloatArray) -> BoolArray:
         """Whether points of the surface (q, 3) are lit."""
+        tree, near = self._tree
+        return np.asarray(tree.query(points, workers=THREADS)[0] < near)
+
+    @cached_property
+    def _tree(self) -> tuple[cKDTree, float]:
+        """A tree of the places, and how near one of them a point has to be to be lit, unit."""
         tree = cKDTree(self.places)
         gaps = tree.query(self.places, k=[2], workers=THREADS)[0]
-        return np.asarray(tree.query(points, workers=THREADS)[0] < NEAR_PLACES * np.median(gaps))
+        return tree, NEAR_PLACES * float(np.median(gaps))
 
     def places_without(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
         """Rims and lit creases (c, 3), for which layers do not serve, and the lengths to resolve there, (c,)."""

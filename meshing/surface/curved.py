@@ -108,7 +108,8 @@ class CurvedPatches:
         """The ends of the edges that bend by more than the crease angle, (c, 2, 3)."""
         faces, places = np.nonzero(~self._smooth_sides)
         corners = self._faces[faces[:, None], np.column_stack([places, NEXT_CORNER[places]])]
-        return np.asarray(self._points[corners])
+        # Both faces at an edge have it, in opposite directions.
+        return np.asarray(self._points[corners[corners[:, 0] < corners[:, 1]]])
 
     @cached_property
     def _smooth_edges(self) -> tuple[IntArray, IntArray]:
