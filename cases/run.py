@@ -4,6 +4,7 @@ import json
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -238,7 +239,10 @@ def _a_key_a_line(figures: dict[str, Any]) -> str:
 
 def _more_pictures(*folders: Path) -> set[str]:
     """Pictures beside the first one, of this run and of an earlier one."""
-    names = {name for folder in folders if folder.exists() for name in os.listdir(folder)}  # noqa: PTH208 - quick
+    names: set[str] = set()
+    for folder in folders:
+        with suppress(FileNotFoundError):
+            names.update(os.listdir(folder))  # noqa: PTH208 - quick
     return {name for name in names if any(fnmatchcase(name, pattern) for pattern in MORE_PICTURES)}
 
 

@@ -13,8 +13,10 @@ with first_imports():
     from tetlux.cases.batch.wire import Sender, receive
     from tetlux.cases.batch.workshop import Workshop
     from tetlux.cases.file.schema.case import CaseSpec
+    from tetlux.cases.write.summary import LIBRARIES
     from tetlux.fem.memory import share_memory
     from tetlux.fem.simplex_rules import triangle_rule
+    from tetlux.meshing.host.libraries import installed_versions
     from tetlux.meshing.mesher._mesher_process import die_with
 
 
@@ -54,6 +56,7 @@ def _prepare() -> None:
     """Do what takes time at its first use, while the cases are still read: a tenth of a second of the first run."""
     CaseSpec.model_rebuild()
     triangle_rule(2)
+    installed_versions(LIBRARIES)
 
 
 if __name__ == "__main__":

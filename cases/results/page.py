@@ -4,7 +4,9 @@ import base64
 import io
 import json
 import math
+import os
 from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +99,7 @@ def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, tuple[str, str]]
     for run in dict.fromkeys(row["run"] for row in rows):
         if len(found) == MOST_THUMBNAILS:
             break
-        picture = next((path for name in PICTURES for path in sorted((folder / run).glob(name))), None)
+        picture = _first_picture(folder / run)
         if picture is None:
             continue
         try:
@@ -110,3 +112,12 @@ def _thumbnails(folder: Path, rows: Sequence[Row]) -> dict[str, tuple[str, str]]
         small.save(target, "JPEG", quality=80)
         found[run] = picture.name, "data:image/jpeg;base64," + base64.b64encode(target.getvalue()).decode()
     return found
+
+
+def _first_picture(folder: Path) -> Path | None:
+    """The picture of a run by which it is shown."""
+    try:
+        names = sorted(os.listdir(folder))  # noqa: PTH208 - quick, and most runs of large batches have none
+    except OSError:
+        return None
+    return next((folder / name for pattern in PICTURES for name in names if fnmatchcase(name, pattern)), None)

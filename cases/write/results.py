@@ -13,7 +13,7 @@ from tetlux.cases.fitting.record import FitRecord
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.models.modulation import lag, modulus
 from tetlux.fem.outcome.exitance_field import ResolvedField
-from tetlux.fem.outcome.extremes import extreme_places
+from tetlux.fem.outcome.extremes import extremes
 from tetlux.fem.outcome.solution import Solution
 from tetlux.fem.outcome.surface_exitance import surface_exitance
 from tetlux.fem.planner.solve import AnySolution
@@ -157,12 +157,12 @@ def _shows_surface(case: Case) -> bool:
 
 def _extremes(solutions: list[Solution]) -> tuple[Surface, FloatArray]:
     """The surface with loose vertices where the exitance is largest and least, and the summed exitance there."""
-    first = solutions[0].surface
-    points, *others = [extreme_places(solution) for solution in solutions]
-    if others:
-        points = freeze(np.vstack([points, *others]))
-    total = sum(modulus(each.exitance_on(points)) for each in solutions)
-    return replace(first, points=points, repairs=(), warnings=(), shape=None), np.asarray(total)
+    found = [extremes(solution) for solution in solutions]
+    points, total = found[0]
+    if len(solutions) > 1:
+        points = freeze(np.vstack([each for each, _ in found]))
+        total = np.asarray(sum(modulus(solution.exitance_on(points)) for solution in solutions))
+    return replace(solutions[0].surface, points=points, repairs=(), warnings=(), shape=None), total
 
 
 def warnings_of(results: Results) -> list[str]:

@@ -74,6 +74,17 @@ class CurvedPatches:
         edges = along.mean(axis=(1, 2))
         return corners, along, edges + 0.5 * (edges - corners.mean(axis=1))
 
+    def bends(self) -> FloatArray:
+        """How far the middle of each side of the faces, from a corner to the next, is off the straight one, (m, 3, 3).
+
+        ``-(h n + h' n')/8`` by the normals at its ends and how far each end is above the other's tangential plane.
+        """
+        corners, normals = self._points[self._faces], self._corner_normals
+        reach = (corners[:, NEXT_CORNER] - corners) * self._smooth_sides[:, :, None]
+        ends = normals[:, NEXT_CORNER]
+        heights, heights_at_ends = (np.einsum("fij,fij->fi", reach, each)[:, :, None] for each in (normals, ends))
+        return np.asarray((heights_at_ends * ends - heights * normals) / 8.0)
+
     @cached_property
     def _corner_normals(self) -> FloatArray:
         """Unit normals at the corners of the faces, (m, 3, 3), common to faces at a vertex that no crease separates.

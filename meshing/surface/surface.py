@@ -189,11 +189,7 @@ class Surface:
         """
         if self.crease_angle <= 0 or len(self.faces) > MOST_TRIANGLES_THAT_BULGE:
             return 0.0
-        corners = self.points[self.faces]
-        faces, heights = np.arange(len(self.faces)), np.zeros(len(self.faces))
-        for i in range(3):
-            middle = 0.5 * (corners[:, i] + corners[:, i - 1])
-            heights += np.einsum("ij,ij->i", self.on_curve(faces, middle)[0] - middle, self.normals) / 3.0
+        heights = np.einsum("fij,fj->f", self._patches.bends(), self.normals) / 3.0
         return float(heights @ triangle_areas(self.points, self.faces)[1]) / self.volume
 
     def project(self, queries: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -44,10 +44,14 @@ class RunLogs:
 
     def _write(self, run: int) -> None:
         lines = self._lines.pop(run)
-        path = self._out / FOLDER / f"{self._names[run]}.log"
+        path, text = self._out / FOLDER / f"{self._names[run]}.log", "\n".join(lines) + "\n"
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
+            # Mostly the folder is there already.
+            try:
+                path.write_text(text, encoding="utf-8", errors="replace")
+            except FileNotFoundError:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8", errors="replace")
         except OSError:
             # What a full disk leaves of it is of no use.
             with suppress(OSError):
