@@ -13,10 +13,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.surface.subdivide import NEXT_CORNER
 
 # Corner i of a triangle is preceded by corner PREVIOUS_CORNER[i].
 PREVIOUS_CORNER = np.array([2, 0, 1])
+# Triangles of a surface whose patches are kept, at 240 bytes each.
+MOST_KEPT = 100_000
 
 
 class CurvedPatches:
@@ -42,37 +45,39 @@ class CurvedPatches:
 
         The area is that of the patch if its metric were the same throughout.
         """
-        distinct, index = np.unique(faces, return_inverse=True)
-        corners, along, middle = (part[index] for part in self._control_points(distinct))
-        w = weights[:, :, None]
-        after, before = w[:, NEXT_CORNER], w[:, PREVIOUS_CORNER]
-        # along[:, i, 0] is a third of the way to the next corner, along[:, i, 1] to the previous one.
-        value = w**3 * corners + 3.0 * w**2 * (after * along[:, :, 0] + before * along[:, :, 1])
-        position = value.sum(axis=1) + 6.0 * w.prod(axis=1) * middle
-        slope = 3.0 * w**2 * corners + 6.0 * w * (after * along[:, :, 0] + before * along[:, :, 1])
-        slope += (
-            3.0 * (after**2 * along[:, NEXT_CORNER, 1] + before**2 * along[:, PREVIOUS_CORNER, 0])
-            + 6.0 * after * before * middle[:, None]
-        )
-        normal = np.cross(slope[:, 1] - slope[:, 0], slope[:, 2] - slope[:, 0])
-        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        if len(self._faces) <= MOST_KEPT:
+            control = self._control[:, :, faces]
+        else:
+            distinct, index = np.unique(faces, return_inverse=True)
+            control = self._control_points(distinct)[:, :, index]
+        position, first, second = (np.einsum("kq,kjq->jq", basis, control) for basis in _bases(weights))
+        normal = cross(first, second)
+        length = np.sqrt(dot(normal, normal))
         flat = self._normals[faces]
         # Where a patch folds over its triangle, use the triangle's normal.
-        folded = np.einsum("ij,ij->i", normal, flat)[:, None] <= 0.5 * length
-        return position, np.where(folded, flat, normal / np.where(length > 0, length, 1.0)), 0.5 * length[:, 0]
+        folded = dot(normal, flat.T) <= 0.5 * length
+        unit = (normal / np.where(length > 0, length, 1.0)).T
+        return np.ascontiguousarray(position.T), np.where(folded[:, None], flat, unit), 0.5 * length
 
-    def _control_points(self, faces: IntArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Control points of faces (f,): corners (f, 3, 3), edge points (f, 3, 2, 3) and middle points (f, 3)."""
+    @cached_property
+    def _control(self) -> FloatArray:
+        """`_control_points` of all faces."""
+        return self._control_points(np.arange(len(self._faces)))
+
+    def _control_points(self, faces: IntArray) -> FloatArray:
+        """Control points of faces (f,) in the order of `_bases`, (10, 3, f)."""
         corners = self._points[self._faces[faces]]
         normals = self._corner_normals[faces]
         smooth = self._smooth_sides[faces]
-        along = np.empty((len(faces), 3, 2, 3))
+        along = np.empty((len(faces), 2, 3, 3))
         for side, (other, edge) in enumerate(((NEXT_CORNER, np.arange(3)), (PREVIOUS_CORNER, PREVIOUS_CORNER))):
             reach = corners[:, other] - corners
             height = np.einsum("fij,fij->fi", reach, normals) * smooth[:, edge]
-            along[:, :, side] = corners + (reach - height[:, :, None] * normals) / 3.0
+            along[:, side] = corners + (reach - height[:, :, None] * normals) / 3.0
         edges = along.mean(axis=(1, 2))
-        return corners, along, edges + 0.5 * (edges - corners.mean(axis=1))
+        middle = edges + 0.5 * (edges - corners.mean(axis=1))
+        every = np.concatenate([corners, along[:, 0], along[:, 1], middle[:, None]], axis=1)
+        return np.ascontiguousarray(every.transpose(1, 2, 0))
 
     def bends(self) -> FloatArray:
         """How far the middle of each side of the faces, from a corner to the next, is off the straight one, (m, 3, 3).
@@ -134,3 +139,20 @@ class CurvedPatches:
         # Faces that traverse their edge in the same direction are not neighbours on one surface.
         smooth = (cosine >= self._least_cosine) & (tail.ravel()[first] != tail.ravel()[second])
         return first[smooth], second[smooth]
+
+
+def _bases(weights: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Bernstein polynomials at barycentric weights (q, 3), and their slopes towards corners 1 and 2, three (10, q).
+
+    They are of the corners, of the points a third of the way from each corner to the next and to the previous one, and
+    of the middle.
+    """
+    a, b, c = weights.T
+    aa, bb, cc = 3.0 * a * a, 3.0 * b * b, 3.0 * c * c
+    ab, bc, ca = 6.0 * a * b, 6.0 * b * c, 6.0 * c * a
+    zero = np.zeros_like(a)
+    value = np.array([a * aa / 3.0, b * bb / 3.0, c * cc / 3.0, aa * b, bb * c, cc * a, aa * c, bb * a, cc * b, ab * c])
+    by_a = np.array([aa, zero, zero, ab, zero, cc, ca, bb, zero, bc])
+    by_b = np.array([zero, bb, zero, aa, bc, zero, zero, ab, cc, ca])
+    by_c = np.array([zero, zero, cc, zero, bb, ca, aa, zero, bc, ab])
+    return value, by_b - by_a, by_c - by_a

@@ -3,15 +3,16 @@
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray, sum_by_index
+from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.surface.subdivide import NEXT_CORNER
 
 
 def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, FloatArray]:
     """Unit normals (m, 3) and areas (m,) of triangles; the normal of a degenerate one is zero."""
-    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
-    cross = np.cross(b - a, c - a)
-    length = np.linalg.norm(cross, axis=1)
-    return cross / np.where(length > 0, length, 1.0)[:, None], 0.5 * length
+    a, b, c = np.ascontiguousarray(points.T)[:, faces.T].swapaxes(0, 1)
+    normal = cross(b - a, c - a)
+    length = np.sqrt(dot(normal, normal))
+    return np.ascontiguousarray((normal / np.where(length > 0, length, 1.0)).T), 0.5 * length
 
 
 def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
@@ -41,10 +42,10 @@ def signed_volume(points: FloatArray, faces: IntArray) -> float:
 
 def barycentric_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
     """Barycentric coordinates (q, 3) of points (q, 3) on triangles (q, 3, 3)."""
-    u, v, w = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0], points - triangles[:, 0]
-    normal = np.cross(u, v)
-    scale = np.einsum("ij,ij->i", normal, normal)
+    origin, second, third = np.ascontiguousarray(triangles.transpose(1, 2, 0))
+    u, v, w = second - origin, third - origin, points.T - origin
+    normal = cross(u, v)
+    scale = dot(normal, normal)
     scale = np.where(scale > 0, scale, 1.0)
-    second = np.einsum("ij,ij->i", np.cross(w, v), normal) / scale
-    third = np.einsum("ij,ij->i", np.cross(u, w), normal) / scale
-    return np.column_stack([1.0 - second - third, second, third])
+    to_second, to_third = dot(cross(w, v), normal) / scale, dot(cross(u, w), normal) / scale
+    return np.column_stack([1.0 - to_second - to_third, to_second, to_third])
