@@ -353,7 +353,7 @@ def test_the_estimate_with_regions_is_not_below_the_true_error() -> None:
 
 def test_no_number_of_charges_is_fitted_twice_where_the_ledger_asks_for_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """The residual of 245 charges says 4.7 %, their ledger 21 %, and that of 384 13 %."""
-    counts = []
+    counts: list[int] = []
 
     def counted(*given: Any) -> regions_of_charges.FittedRegions:
         found = fit_regions_at(*given)

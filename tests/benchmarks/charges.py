@@ -44,7 +44,7 @@ DARKER = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
 # Nodes of the mesh of the truth.
 FINE = 25_000
 # Charges of the truth at most, and how well it has to be known, as a share of the error.
-MOST_TRUTH, KNOWN_SHARE = 3_000, 0.3
+MOST_TRUTH, KNOWN_SHARE = 3_000, 0.5
 HARE = Path(__file__).parents[2] / "cases" / "library" / "hare.stl"
 
 
