@@ -126,7 +126,7 @@ def test_where_charges_were_off_by_more_than_predicted_more_of_them_are_planned(
         read_costs().learn("charges on box", 1.0, 6.0)
     after = plan(CUBE, TISSUE, [SOURCE], tolerance=0.001)["charges"]
     assert after.seconds > 1.5 * before.seconds
-    assert [before.error, after.error] == pytest.approx([0.001, 0.001])
+    assert max(before.error, after.error) <= 0.001
 
 
 def test_finite_elements_are_learned_from_and_their_mesh_is_found_in_the_cache(folder: Path) -> None:

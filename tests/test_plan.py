@@ -130,6 +130,9 @@ SOURCE = PointSource((0.0, 0.0, -1.0))
         (PLATE, [SOURCE], {"everywhere_tolerance": 0.05}, "full", "does not hold where it is dark"),
         (BALL, [SOURCE], {"everywhere_tolerance": 0.05}, "closed-form", "exact series of a ball"),
         (box((20.0, 20.0, 20.0)), [SOURCE], {}, "charges", "no ball and no slab"),
+        # Charges would have to be closer together than the light fades in.
+        (box((20.0, 20.0, 20.0)), [DiffuseLight(1.0)], {"tolerance": 0.02}, "charges", "no ball and no slab"),
+        (box((20.0, 20.0, 20.0)), [DiffuseLight(1.0)], {"tolerance": 0.001}, "full", "no ball and no slab"),
         (BALL, [BEAM], {"regions": [DISC]}, "charges", "one homogeneous medium"),
         (BALL, [CollimatedBeam((0.0, 0.0, -1.0), 1.0)], {}, "full", "no closed form for beams along lines"),
         (BALL, [Emission(0.1)], {}, "full", "no closed form of the fluence of a ball that emits"),

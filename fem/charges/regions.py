@@ -5,7 +5,7 @@ equation in it. They are fitted to ``D dphi/dn + phi/(2A) = 0`` on the body's su
 ``D dphi/dn`` on the surface of an inner region. Equations for phi are divided by 2A, so that all are in W/unit².
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -170,8 +170,8 @@ def fit_regions(
     tolerance: float | None,
     goal: ReadingGoal | None = None,
     most: int = MOST_CHARGES,
-) -> FittedRegions:
-    """Fit charges until the estimated errors are within their tolerances, or there are `most` charges.
+) -> Iterator[tuple[FittedRegions, float]]:
+    """Fit growing numbers of charges, the last of about `most`.
 
     Parameters
     ----------
@@ -185,12 +185,12 @@ def fit_regions(
     goal : ReadingGoal, optional
         Detectors on the body's surface, and the relative error of what each reads.
     most : int
-        Approximate number of charges at which fitting ends in any case.
+        Approximate number of charges at which fitting ends.
 
-    Returns
-    -------
-    FittedRegions
-        The fit that is nearest to the tolerances.
+    Yields
+    ------
+    FittedRegions and float
+        The fit so far that is nearest to the tolerances, and its largest estimated error over its tolerance.
     """
     count, height = min(FEWEST_CHARGES * (2 * len(interfaces) - 1), most), HEIGHT_ROUGH
     best, least = None, np.inf
@@ -199,8 +199,9 @@ def fit_regions(
         excess = _excess(fitted, tolerance, goal)
         if best is None or excess < least:
             best, least = fitted, excess
-        if least <= 1.0 or LEAST_LAST_FACTOR * count > most:
-            return best
+        yield best, least
+        if LEAST_LAST_FACTOR * count > most:
+            return
         count = min(round(COUNT_FACTOR * count), most)
         height = HEIGHT_SMOOTH if best.errors.estimate <= SMOOTH_ESTIMATE else HEIGHT_ROUGH
 

@@ -10,7 +10,7 @@ from tetlux.fem.charges.faint import fit_with_faint
 from tetlux.fem.charges.fit_readings import fit_for_readings
 from tetlux.fem.charges.kernel import equation_of
 from tetlux.fem.charges.readings import reading_goal
-from tetlux.fem.charges.regions import Interface, RegionSources, fit_regions
+from tetlux.fem.charges.regions import FittedRegions, Interface, RegionSources, fit_regions
 from tetlux.fem.inputs import DEFAULT_TOLERANCE
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.meshless.solution import ChargeSolution, LightLedger
@@ -19,10 +19,6 @@ from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.nesting import nesting
 from tetlux.meshing.tets.regions import region_at
-
-# With regions charges are fitted again where their ledger lacks too much power, at most so often, each time aiming this
-# factor below what would suffice.
-MOST_FITS, AIM_BELOW = 4, 0.7
 
 
 def charge_solution(
@@ -96,7 +92,7 @@ def _in_regions(
     readings: tuple[FloatArray, float] | None,
     most: int,
 ) -> ChargeSolution:
-    """Fit charges in a body with regions, again and aiming lower while the ledger lacks too much power."""
+    """Fit charges in a body with regions until the tolerances are met, also by the power that the ledger lacks."""
     surfaces = [each for each, _ in inner]
     parents = nesting(surface, surfaces).parents
     interfaces = [Interface(surface, 0, None)]
@@ -106,17 +102,24 @@ def _in_regions(
     goal = None
     if readings is not None:
         goal = reading_goal(surface, equations[0], points, powers.sum(axis=1), 0.0, *readings)
-    below = 1.0
-    for _ in range(MOST_FITS):
-        aim = None if tolerance is None else below * tolerance
-        fit = fit_regions(interfaces, equations, light, tolerance=aim, goal=goal, most=most)
+
+    def solved(fit: FittedRegions) -> ChargeSolution:
         samples_of_all = tuple(each.placement.fitted for each in fit.placements)
-        solved = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
-        solution = _with_imbalance(ChargeSolution(surface, medium, *solved, goal=goal))
-        if tolerance is None or solution.error_estimate <= tolerance or solution.charges >= most:
+        given = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
+        return _with_imbalance(ChargeSolution(surface, medium, *given, goal=goal))
+
+    found: ChargeSolution | None = None
+    for fit, excess in fit_regions(interfaces, equations, light, tolerance=tolerance, goal=goal, most=most):
+        best = fit
+        if excess > 1.0:
+            continue
+        # The power that is lacking takes as long to find as a smaller fit, and is looked at only now.
+        solution = solved(fit)
+        if found is None or tolerance is None or solution.error_estimate < found.error_estimate:
+            found = solution
+        if tolerance is None or found.error_estimate <= tolerance:
             break
-        below *= AIM_BELOW * min(tolerance / solution.error_estimate, 1.0)
-    return solution
+    return solved(best) if found is None else found
 
 
 def _with_imbalance(solution: ChargeSolution) -> ChargeSolution:

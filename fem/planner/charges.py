@@ -9,28 +9,39 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
 from tetlux.fem.outcome.plan import Candidate
 from tetlux.fem.planner.candidate import impossible, refuse_mesh
-from tetlux.fem.planner.effort import kind_of_body, largest_rate
+from tetlux.fem.planner.effort import kind_of_body, largest_rate, shape_of
 from tetlux.fem.planner.request import Request
 from tetlux.fem.validity.notes import check_size
 from tetlux.meshing.errors import InputError
-from tetlux.meshing.surface.solids import Sphere
 
 # Relative L2 error by 300 charges: of the built-in shapes and of others, as scans.
 ERROR_OF_SHAPE, ERROR_OF_SCAN = 2e-4, 6e-3
 # Powers of the number of charges with which it falls.
 RATE_OF_SHAPE, RATE_OF_SCAN = 2.0, 1.3
+# Relative L2 error under diffuse light, by one charge in each square of the length over which light fades, and the
+# power of charges per square with which it falls. Estimate of ten shapes by 85 to 1,540 charges: .7 to 1.6 times as
+# much; of a hare 1.1 and 1.7 times.
+ERROR_OF_DIFFUSE, RATE_OF_DIFFUSE = 0.02, 0.75
 # Charges that are tried at least on scans, some .9 s. Shapes need few, and any limit moves the steps of a fit, which
 # left the exitance of a torus below zero.
 FEWEST_TO_TRY = 600
 # Each further region multiplies the error.
 ERROR_OF_REGION = 4.0
-# Charges at least where points light a body that is no ball and that light fades much in: more of them are fitted until
-# the exitance is nowhere below zero.
-OF_FADING, FADING_LENGTHS = 200, 4.0
+# Charges where points light a body and their light fades on its way through it: more of them are fitted until the
+# exitance is nowhere below zero. In flat and round bodies few are needed.
+OF_FADING = {"sphere": 100.0, "slab": 130.0, "cylinder": 160.0, "box": 300.0, "torus": 300.0, "scan": 480.0}
+# Lengths over which light fades in the body's diagonal: below the first all bodies but those with shaded parts are lit
+# well everywhere, and beyond the last light is too faint to count.
+LEAST_FADING, MOST_FADING = 4.0, 40.0
+SHADED = ("torus", "scan")
+# Charges in bodies with regions, where the power that is lacking often asks for more of them than the tolerance.
+IN_REGIONS = 390.0
 # Charges for what detectors read in bodies with regions: 215 to 1,200 in balls in balls, 450 to 1,420 in fingers.
 OF_READINGS_IN_REGIONS = 700
-# Seconds that any fit takes, and those of 300 charges, with the smaller fits before it, and how they grow.
-SECONDS_OF_ANY, SECONDS_OF_300, RATE_OF_SECONDS = 0.07, 0.25, 1.5
+# Seconds that any fit takes, those for each triangle, those of 300 charges, with the smaller fits before it, and how
+# they grow with the number. Regions take so many times as long.
+SECONDS_OF_ANY, SECONDS_OF_TRIANGLE = 0.04, 1e-5
+SECONDS_OF_300, RATE_OF_SECONDS, FACTOR_OF_REGIONS = 0.25, 1.8, 1.8
 BYTES_OF_300 = 20e6
 
 
@@ -41,17 +52,18 @@ def charges_candidate(request: Request) -> Candidate:
     except InputError as why:
         return impossible("charges", why)
     first, rate = _first_error(request)
-    kind = f"charges on {kind_of_body(request)}"
+    kind = f"charges on {kind_of_body(request)}{' in diffuse light' if _is_diffuse(request) else ''}"
     learned = request.costs.factors(kind)
     first *= learned[1]
-    count = float(np.clip(300.0 * (first / request.exitance_tolerance) ** (1.0 / rate), FEWEST_CHARGES, MOST_CHARGES))
+    needed = 300.0 * (first / request.exitance_tolerance) ** (1.0 / rate)
+    suits = needed <= MOST_CHARGES
+    count = _next_count(needed)
     error = first * (300.0 / count) ** rate
-    suits = count < MOST_CHARGES or error <= request.exitance_tolerance
-    count = max(count * (1 + len(request.inner)), OF_FADING if _has_fading_points(request) else 0.0)
-    if request.tolerances.readings is not None and request.inner:
-        count = max(count, OF_READINGS_IN_REGIONS)
+    count = max(count * _share_of_regions(request), _of_fading(request))
+    if request.inner:
+        count = max(count, IN_REGIONS if request.tolerances.readings is None else OF_READINGS_IN_REGIONS)
     size = (count / 300.0) ** 2
-    seconds = learned[0] * seconds_of_charges(count) * len(request.bodies)
+    seconds = learned[0] * _seconds_of(request, count) * len(request.bodies)
     reason = f"about {round(count, -1):,.0f} charges, whose residual tells the error"
     if not suits:
         reason = f"{MOST_CHARGES:,} charges are not enough for the tolerance"
@@ -63,18 +75,45 @@ def seconds_of_charges(count: float) -> float:
     return SECONDS_OF_ANY + SECONDS_OF_300 * float((count / 300.0) ** RATE_OF_SECONDS)
 
 
+def _seconds_of(request: Request, count: float) -> float:
+    """Built-in prediction for fitting so many charges to the body."""
+    of_triangles = SECONDS_OF_TRIANGLE * sum(len(each.faces) for each in (request.surface, *request.inner))
+    return of_triangles + seconds_of_charges(count) * (FACTOR_OF_REGIONS if request.inner else 1.0)
+
+
+def _share_of_regions(request: Request) -> float:
+    """How many times as many charges as a body without regions a body needs, at least."""
+    return max(1.0, 0.5 * (1 + len(request.inner)))
+
+
+def _next_count(needed: float) -> float:
+    """The number of charges of the first fit, of those with growing numbers, that has as many as are needed."""
+    steps = round(np.log(MOST_CHARGES / FEWEST_CHARGES) / np.log(COUNT_FACTOR))
+    counts = np.geomspace(FEWEST_CHARGES, MOST_CHARGES, steps + 1)
+    return float(counts[min(np.searchsorted(counts, needed), steps)])
+
+
 def learn_charges(request: Request, candidate: Candidate, found: Sequence[ChargeSolution], seconds: float) -> None:
-    """Learn from a fit how long so many charges take, and by how much 300 of them are off."""
+    """Learn from a fit how long fits of its kind take, and by how much 300 charges are off."""
     first, rate = _first_error(request)
-    predicted = sum(seconds_of_charges(each.charges) for each in found)
-    error = max(each.error_estimate * (each.charges / (1 + len(request.inner)) / 300.0) ** rate for each in found)
-    request.costs.learn(candidate.kind, seconds / predicted, error / first)
+    built_in = candidate.seconds / candidate.learned[0]
+    error = max(each.error_estimate * (each.charges / _share_of_regions(request) / 300.0) ** rate for each in found)
+    request.costs.learn(candidate.kind, seconds / built_in, error / first)
 
 
 def _first_error(request: Request) -> tuple[float, float]:
     """Built-in relative L2 error by 300 charges, and the power of their number with which it falls."""
     first, rate = (ERROR_OF_SHAPE, RATE_OF_SHAPE) if _are_shapes(request) else (ERROR_OF_SCAN, RATE_OF_SCAN)
-    return first * ERROR_OF_REGION ** len(request.inner), rate
+    first *= ERROR_OF_REGION ** len(request.inner)
+    if _is_diffuse(request):
+        squares = request.surface.area * largest_rate(request) ** 2
+        return max(first, ERROR_OF_DIFFUSE * (squares / 300.0) ** RATE_OF_DIFFUSE), RATE_OF_DIFFUSE
+    return first, rate
+
+
+def _is_diffuse(request: Request) -> bool:
+    """Whether light enters everywhere."""
+    return any(bool(np.any(deposit.terms.irradiance)) for some in request.deposits for deposit in some)
 
 
 def most_charges(request: Request, candidate: Candidate, seconds: float) -> int:
@@ -91,12 +130,13 @@ def _are_shapes(request: Request) -> bool:
     return all(surface.shape is not None for surface in (request.surface, *request.inner))
 
 
-def _has_fading_points(request: Request) -> bool:
-    """Whether points light a body other than a ball, and their light fades much on its way through it."""
+def _of_fading(request: Request) -> float:
+    """Charges at least where points light a body that is faint elsewhere."""
+    lengths = request.surface.diagonal * largest_rate(request)
+    shape = shape_of(request.surface)
     has_points = any(len(deposit.terms.points) for some in request.deposits for deposit in some)
-    if not has_points or isinstance(request.surface.shape, Sphere):
-        return False
-    return request.surface.diagonal * largest_rate(request) > FADING_LENGTHS
+    is_faint = lengths > LEAST_FADING or shape in SHADED
+    return OF_FADING[shape] if has_points and is_faint and lengths < MOST_FADING else 0.0
 
 
 def _check(request: Request) -> None:

@@ -37,7 +37,7 @@ TOLERANCE = 0.02
 
 def kind_of_body(request: Request) -> str:
     """The built-in shape of the body, or "scan", and whether it has regions."""
-    name = _shape(request.surface)
+    name = shape_of(request.surface)
     return f"{name} with regions" if request.inner else name
 
 
@@ -46,14 +46,14 @@ def tetrahedra_needed(request: Request) -> float:
     if request.mesh is not None:
         return len(request.mesh.tetrahedra)
     needed = [tetrahedra_of(request, deposit) for some in request.deposits for deposit in some]
-    return float(min(FIRST_TETRAHEDRA[_shape(request.surface)] + max(needed), MOST_TETRAHEDRA))
+    return float(min(FIRST_TETRAHEDRA[shape_of(request.surface)] + max(needed), MOST_TETRAHEDRA))
 
 
 def seconds_of_mesher(surface: Surface, inner: Sequence[Surface]) -> float:
     """Seconds of the mesher, which grow with how small the regions are."""
     triangles = sum(len(each.faces) for each in (surface, *inner))
     ratio = max((surface.diagonal / region.diagonal for region in inner), default=0.0)
-    return SECONDS_OF_MESHER[_shape(surface)] + SECONDS_OF_TRIANGLE * triangles + SECONDS_OF_REGION * ratio
+    return SECONDS_OF_MESHER[shape_of(surface)] + SECONDS_OF_TRIANGLE * triangles + SECONDS_OF_REGION * ratio
 
 
 def seconds_of_elements(request: Request, tetrahedra: float) -> float:
@@ -114,6 +114,7 @@ def _largest_rate(media: Sequence[AnyMedium]) -> float:
     return max((medium.sigma_tr for medium in media if isinstance(medium, Medium)), default=0.0)
 
 
-def _shape(surface: Surface) -> str:
+def shape_of(surface: Surface) -> str:
+    """The name of a built-in shape, or "scan"."""
     name = type(surface.shape).__name__.lower()
     return name if name in SECONDS_OF_MESHER else "scan"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -20,6 +21,11 @@ SIDE_SAMPLES = 64
 # Regions below this share of the body's diagonal are refused. The mesher's time grows with the inverse of the size of
 # the smallest region: 8 s at 0.012, minutes at 0.0025.
 SMALLEST = 0.005
+
+
+# The inner surfaces that were last found nested in a body: a plan, its models and the mesher ask for the same.
+_Found = tuple[tuple[ref[Surface], ...], "Nesting"]
+_found: WeakKeyDictionary[Surface, _Found] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,15 @@ def nesting(surface: Surface, regions: Sequence[Surface]) -> Nesting:
     InputError
         As `check_regions` does, except for small surfaces.
     """
+    known = _found.get(surface)
+    if known is not None and [each() for each in known[0]] == list(regions):
+        return known[1]
+    found = _nest(surface, regions)
+    _found[surface] = tuple(map(ref, regions)), found
+    return found
+
+
+def _nest(surface: Surface, regions: Sequence[Surface]) -> Nesting:
     near = TOUCH_DISTANCE * surface.diagonal
     touching = np.zeros(len(regions) + 1, dtype=bool)
     around: list[list[int]] = [[0] for _ in regions]
