@@ -16,7 +16,7 @@ from tetlux.cases.file.case import Case
 from tetlux.cases.file.channels import ALL
 from tetlux.cases.file.detectors import describe_readings, read_detectors, write_readings
 from tetlux.cases.fitting.record import FIT_FILES, FitRecord
-from tetlux.cases.fitting.solve import fit_case, with_fitted_media
+from tetlux.cases.fitting.solve import fit_case, with_fitted
 from tetlux.cases.solve import solve_case, solve_pulse
 from tetlux.cases.viewer import PAGE
 from tetlux.cases.write.content import content_of_scene
@@ -154,7 +154,7 @@ def finish_case(
         with claim_folder(out, case.name) as folder:
             report(f"read in {case.start_seconds + case.reading_seconds:.2f} s")
             record = FitRecord(case, fit_case(case, report)) if case.fit else None
-            case = with_fitted_media(case, record.found) if record else case
+            case = with_fitted(case, record.found) if record else case
             transients = solve_pulse(case, report, cache=cache) if case.times else []
             solutions = [each.as_steady for each in transients] or solve_case(case, report, cache=cache, start=start)
             seconds = solutions[0].seconds

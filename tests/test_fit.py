@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tetlux.fem import FitProblem, Medium, PencilBeam, PointDetector, Region, fit, solve, tissue
-from tetlux.fem.inverse.unknowns import unknowns_of
+from tetlux.fem import FitProblem, Medium, PencilBeam, PointDetector, PointSource, Region, fit, solve, tissue
+from tetlux.fem.inverse.parameters import unknowns_of
+from tetlux.fem.lights import Light
 from tetlux.fem.sensitivity.sensitivity import sensitivity
 from tetlux.fem.system import System
 from tetlux.meshing import InputError, Surface, TetMesh, sphere, torus
@@ -20,9 +21,17 @@ COEFFICIENTS = ["sigma_a", "sigma_s_prime"]
 NOISE = 0.01
 
 
+def spread(count: int) -> FloatArray:
+    """Unit vectors evenly spread over all directions, (count, 3)."""
+    number = np.arange(count) + 0.5
+    height, angle = 1.0 - 2.0 * number / count, np.pi * (1.0 + np.sqrt(5.0)) * number
+    ring = np.sqrt(1.0 - height**2)
+    return np.column_stack([ring * np.cos(angle), ring * np.sin(angle), height])
+
+
 def problem_on(mesh: TetMesh, surface: Surface, readings: FloatArray, names: list[str]) -> FitProblem:
     measured = readings.reshape(1, 1, -1)
-    unknowns = unknowns_of(names, START, ())
+    unknowns = unknowns_of(names, START, (), [BEAM])
     return FitProblem(surface, mesh, [BEAM], DETECTORS, (), unknowns, measured, np.full(measured.shape, NOISE))
 
 
@@ -42,11 +51,13 @@ def test_coefficients_of_a_torus_are_found_again() -> None:
 
 
 def test_gradient_is_that_of_the_value(ball: Surface, ball_mesh: TetMesh) -> None:
-    problem = problem_on(ball_mesh, ball, np.geomspace(1e-2, 1e-4, 5), [*COEFFICIENTS, "gain"])
-    place, step = np.log([0.012, 0.9, 1.2]), 1e-4
+    problem = problem_on(ball_mesh, ball, np.geomspace(1e-2, 1e-4, 5), ["light1.y", *COEFFICIENTS, "gain"])
+    # By the mesh of one place the readings of others are found as smoothly.
+    problem.residuals(problem.start)
+    place, step = problem.unknowns.parameters(np.array([0.7, 0.012, 0.9, 1.2])), 1e-4
     _, gradient = problem.value_and_gradient(place)
-    for number in range(3):
-        way = step * np.eye(3)[number]
+    for number in range(4):
+        way = step * np.eye(4)[number]
         sides = [problem.value_and_gradient(place + side * way)[0] for side in (1.0, -1.0)]
         assert gradient[number] == pytest.approx((sides[0] - sides[1]) / (2.0 * step), rel=1e-5)
 
@@ -66,6 +77,47 @@ def test_covariance_is_that_of_repeated_fits(ball: Surface) -> None:
     assert ((share > 0.60) & (share < 0.75)).all()
     correlations = np.asarray(np.corrcoef(spread.T))
     assert correlations[0, 1] == pytest.approx(found.covariance[0, 1] / np.prod(list(found.errors.values())), abs=0.1)
+
+
+def test_places_of_lights_are_found(ball: Surface) -> None:
+    """A point from 4 mm away with the absorption, and a beam from 2 mm away, with readings of charges."""
+    truth = replace(START, sigma_a=0.02)
+    there = [PointDetector((10.0 * x, 10.0 * y, 10.0 * z)) for x, y, z in spread(12).tolist()]
+    point, beam = PointSource((1.0, 2.0, 3.0)), PencilBeam((1.0, 2.0, 20.0), (0.0, 0.0, -1.0))
+    read = [
+        [each.exitance for each in solve(ball, truth, [light], model="charges", detectors=there).readings]
+        for light in (point, beam)
+    ]
+    begin: list[Light] = [replace(point, position=(0.0, 0.0, 0.0)), replace(beam, origin=(-1.0, 2.0, 20.0))]
+    names = ["light1.x", "light2.x", "sigma_a", "light1.z", "light1.y"]
+    found = fit(ball, begin, there, read, names, replace(truth, sigma_a=0.014), noise=NOISE, detector_tolerance=0.02)
+    assert [found.values[f"light1.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 2.0, 3.0], abs=0.02)
+    assert found.values["light2.x"] == pytest.approx(1.0, abs=0.02)
+    assert found.values["sigma_a"] == pytest.approx(0.02, rel=0.02)
+    x, y, z = (found.values[f"light1.{axis}"] for axis in "xyz")
+    assert found.lights[0] == replace(point, position=(x, y, z))
+    assert found.undetermined == ()
+
+
+def test_moves_along_a_beam_are_not_told(ball: Surface, ball_mesh: TetMesh) -> None:
+    readings = sensitivity(System(ball_mesh, START, ball), [BEAM], DETECTORS[:3], per="region").readings
+    begin, names = replace(BEAM, origin=(0.1, 0.0, 20.0)), ["light1.x", "light1.z"]
+    found = fit(ball, [begin], DETECTORS[:3], readings, names, START, noise=NOISE, detector_tolerance=0.1)
+    assert found.values["light1.x"] == pytest.approx(0.0, abs=0.05)
+    assert found.values["light1.z"] == 20.0
+    assert found.undetermined == ("the readings do not tell light1.z.",)
+
+
+def test_a_light_outside_of_the_body_is_no_step(ball: Surface, ball_mesh: TetMesh) -> None:
+    point = PointSource((0.0, 0.0, 9.0))
+    measured = np.geomspace(1e-2, 1e-4, 5).reshape(1, 1, -1)
+    unknowns = unknowns_of(["light1.z"], START, (), [point])
+    problem = FitProblem(ball, ball_mesh, [point], DETECTORS, (), unknowns, measured, np.full(measured.shape, NOISE))
+    outside = unknowns.parameters(np.array([10.5]))
+    with pytest.raises(InputError, match="lies outside the body"):
+        problem.residuals(outside)
+    assert np.isfinite(problem.residuals(problem.start)).all()
+    assert np.isinf(problem.residuals(outside)).all()
 
 
 def test_a_region_is_fitted(ball: Surface) -> None:
@@ -118,7 +170,7 @@ def test_what_cannot_be_fitted_is_refused(ball: Surface) -> None:
     refused(
         "there are 3 unknowns and 2 readings", readings=[1e-2, 1e-3, *[np.nan] * 3], unknowns=[*COEFFICIENTS, "gain"]
     )
-    refused('"sigma_s" is no unknown of this fit; give some of sigma_a, sigma_s_prime, gain', unknowns=["sigma_s"])
+    refused('"sigma_s" is no unknown of this fit; give some of sigma_a, sigma_s_prime, gain, l', unknowns=["sigma_s"])
     refused('"hbo2" is no unknown', unknowns=["hbo2"])
     refused('the unknown "gain" is given twice', unknowns=["gain", "gain"])
     refused("unknowns are given in a list of names, and there is none", unknowns=[])
@@ -130,6 +182,8 @@ def test_what_cannot_be_fitted_is_refused(ball: Surface) -> None:
     refused("the light is steady; give real readings", readings=[1j] * 5)
     refused("the light is modulated; give complex readings", frequency=1e8)
     refused("bounds of sigma_a are 0.1 and 0.01; give two values", bounds={"sigma_a": (0.1, 0.01)})
+    refused("bounds of light1.x are 1 and 0; give two coord", unknowns=["light1.x"], bounds={"light1.x": (1.0, 0.0)})
+    refused('"light2.x" is no unknown', unknowns=["light2.x"])
     refused("bounds of sigma_a are 3; give two values", bounds={"sigma_a": 3})
     refused("start is 3.0; give a Medium, or the arguments of tissue", start=3.0)
     refused("start has 2 entries; give one for the body", start=[START, START])

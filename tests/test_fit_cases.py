@@ -133,6 +133,11 @@ def check_refused(tmp_path: Path, text: str, words: str) -> None:
         ),
         (("noise: 0.02", "bounds: {gain: [0.1, 0.2]}"), 'bounds of "gain", which is no unknown; give those of sigma_a'),
         (("noise: 0.02", "bounds: {sigma_a: [0.1]}"), "fit.bounds.sigma_a"),
+        (("sigma_s_prime], ", "pencil_2.x], "), 'fit.unknowns: "pencil_2.x" is no unknown of this fit; give some of'),
+        (
+            ("sigma_s_prime], ", "pencil_1.x], bounds: {pencil_1.x: [1, -1]}, "),
+            "fit.bounds: bounds of pencil_1.x are 1 and -1; give two coordinates, the lower one first",
+        ),
         (("noise: 0.02", "noises: 0.02"), 'fit.noises: unknown key; did you mean "noise"'),
         (("noise: 0.02}", "noise: 0.02}\nmodel: charges"), "fit: a fit is made by model full"),
         (("noise: 0.02}", "noise: 0.02}\npulse: {times: [1e-9]}"), "fit: a fit does not go with pulse"),
@@ -205,6 +210,23 @@ def test_chromophores_of_regions_are_unknowns(tmp_path: Path) -> None:
     assert before[0][1].sigma_a < after[0][1].sigma_a
     assert unknowns.media(case.fit.bounds[:, 1])[1][1].sigma_a > 0
     assert case.fit.bounds[2, 1] < 1.0
+
+
+def test_a_case_has_the_light_that_was_found(tmp_path: Path) -> None:
+    beam, there = PencilBeam((1, 0, 20), (0, 0, -1)), [PointDetector(place) for place in PLACES.values()]
+    medium = Medium(sigma_a=0.015, sigma_s_prime=1.3, eta=1.4)
+    read = solve(sphere(10.0), medium, [beam], model="charges", detectors=there, detector_tolerance=0.005).readings
+    values = ", ".join(str(reading.exitance) for reading in read)
+    fit = FIT.replace("[1e-3, 8e-5, 4e-5]", f"[{values}]").replace("[sigma_a, sigma_s_prime]", "[probe.x, sigma_a]")
+    text = CASE.replace("pencil:", "name: probe, pencil:").replace("0.05", "0.1") + fit + "outputs: [surface]\n"
+    (tmp_path / "case.yaml").write_text(text)
+    assert main(["run", str(tmp_path / "case.yaml"), "--out", str(tmp_path), "--quiet", "--jobs", "1"]) == 0
+    data = json.loads((tmp_path / "case" / "fit.json").read_text())
+    assert data["values"]["probe.x"]["value"] == pytest.approx(1.0, abs=0.05)
+    assert data["values"]["probe.x"]["start"] == 0.0
+    surface = meshio.read(tmp_path / "case" / "surface.ply")
+    brightest = surface.points[np.argmax(surface.point_data["exitance"])]
+    assert brightest[0] == pytest.approx(1.0, abs=0.4)
 
 
 def test_a_table_of_readings_is_read(tmp_path: Path) -> None:

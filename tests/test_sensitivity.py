@@ -23,7 +23,9 @@ from tetlux.fem import (
     sensitivity,
 )
 from tetlux.fem.exact import sphere as exact
+from tetlux.fem.known.split import Subtract
 from tetlux.fem.lights import Light
+from tetlux.fem.lights.places import MovedLight, at_place, place_of
 from tetlux.fem.outcome.detectors import read_all
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
 from tetlux.fem.sensitivity.products import multiply
@@ -82,6 +84,40 @@ def test_fitted_charges_are_differentiated_too(even: System) -> None:
     for coefficient, step in (("sigma_a", 2e-5), ("sigma_s_prime", 2e-3)):
         changes = [read_at(change_medium(even, 0, coefficient, side * step), [SOURCE]) for side in (-1.0, 1.0)]  # type: ignore[arg-type]
         assert found.derivatives[coefficient][..., 0] == pytest.approx((changes[1] - changes[0]) / (2 * step), rel=2e-5)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.006j])
+@pytest.mark.parametrize("subtract", ["fitted", "nothing"])
+def test_derivatives_to_places_are_differences_of_readings(even: System, subtract: Subtract, shift: complex) -> None:
+    """Of a point in any direction, and of a beam away from edges of the surface. Measured: 1e-9."""
+    system, step = replace(even, shift=shift), 5e-3
+    lights: list[Light] = [MovedLight(light, repr(light)) for light in (BEAM, PointSource((0.0, 2.0, 1.0)))]
+    found = sensitivity(system, lights, [*DETECTORS, FIBRE], positions=[0, 1], subtract=subtract)
+    assert found.derivatives["position"].shape == (2, 4, 3)
+    for light, axis in [(1, 0), (1, 1), (1, 2), (0, 2)]:
+        place, way, changes = place_of(lights[light]), step * np.eye(3)[axis], {}
+        assert place is not None
+        for steps in (-2, -1, 1, 2):
+            moved = list(lights)
+            moved[light] = at_place(lights[light], place + steps * way)
+            changes[steps] = read_at(system, moved, subtract)[light]
+        differences = (8.0 * (changes[1] - changes[-1]) - (changes[2] - changes[-2])) / (12.0 * step)
+        of_place = found.derivatives["position"][light, :, axis]
+        assert of_place == pytest.approx(differences, abs=1e-7 * float(np.abs(found.readings[light]).max()))
+
+
+def test_nothing_changes_along_a_beam(even: System) -> None:
+    found = sensitivity(even, [BEAM], DETECTORS, positions=[0], log=True)
+    changes = found.derivatives["position"][0] @ np.array(BEAM.direction)
+    assert changes == pytest.approx(np.zeros(3), abs=1e-12)
+    assert np.abs(found.derivatives["position"]).max() > 0.1
+
+
+def test_without_a_true_surface_the_half_space_is_subtracted(even: System) -> None:
+    bare = replace(even, surface=None)
+    found = sensitivity(bare, [SOURCE], DETECTORS, to=["sigma_a"], per="region").derivatives["sigma_a"]
+    changes = [read_at(change_medium(bare, 0, "sigma_a", side * 2e-5), [SOURCE])[:, :3] for side in (-1.0, 1.0)]
+    assert found[..., 0] == pytest.approx((changes[1] - changes[0]) / 4e-5, rel=2e-5)
 
 
 def test_derivatives_are_those_of_the_series(even: System) -> None:

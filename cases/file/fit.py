@@ -61,7 +61,7 @@ def read_fit(
     with document.at(KEY, {name: (name,) for name in FitSpec.model_fields}):
         return make_request(
             unit,
-            len(names.lights),
+            list(lights[0].values()),
             len(names.detectors),
             readings,
             spec.fit.unknowns,
@@ -71,6 +71,7 @@ def read_fit(
             bounds=spec.fit.bounds,
             frequency=frequencies[0],
             region_names=region_names,
+            light_names=names.lights,
         )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from tetlux.cases.file.case import Case
 from tetlux.cases.plain import finite
+from tetlux.fem.inverse.parameters import AXES
 from tetlux.fem.inverse.request import FitRequest
 from tetlux.fem.inverse.result import FitResult
 from tetlux.fem.inverse.unknowns import HAEMOGLOBIN, TissueUnknowns
@@ -100,7 +101,7 @@ class FitRecord:
         """The values with their errors, for the terminal."""
         unit = self.case.surface.unit
         units = {"sigma_a": f" 1/{unit}", "sigma_s_prime": f" 1/{unit}", "a": " 1/mm"}
-        units |= dict.fromkeys(("hbo2", "hhb", "total_haemoglobin"), " mol/l")
+        units |= dict.fromkeys(("hbo2", "hhb", "total_haemoglobin"), " mol/l") | dict.fromkeys(AXES, f" {unit}")
         return [
             f"{name}: {row['value']:.5g} ± {row['error']:.2g}{units.get(name.rpartition('.')[2], '')}"
             for name, row in self.values.items()
@@ -143,12 +144,13 @@ class FitRecord:
 
 def _haemoglobin(request: FitRequest, found: FitResult) -> dict[str, dict[str, float]]:
     """Oxygen saturation and all haemoglobin, mol/l, of parts in which some of it is unknown."""
-    unknowns, rows = request.unknowns, {}
+    unknowns, found_rows = request.unknowns.of_media, {}
     if not isinstance(unknowns, TissueUnknowns):
         return {}
-    values = list(found.values.values())
+    values, rows = list(found.values.values()), request.unknowns.media_rows.tolist()
     for number, part in enumerate(unknowns.parts):
-        columns = {quantity: row for row, (owner, quantity) in enumerate(unknowns.places) if owner == number}
+        places = zip(rows, unknowns.places, strict=True)
+        columns = {quantity: row for row, (owner, quantity) in places if owner == number}
         if isinstance(part, tuple) or columns.keys().isdisjoint(HAEMOGLOBIN):
             continue
         name = next(name for name, place in zip(unknowns.names, unknowns.places, strict=True) if place[0] == number)
@@ -167,8 +169,12 @@ def _haemoglobin(request: FitRequest, found: FitResult) -> dict[str, dict[str, f
                 slope[column] = slopes[quantity].get(kind, 0.0)
             error = math.sqrt(max(float(slope @ found.covariance @ slope), 0.0))
             begin = _at_start(part, quantity)
-            rows[f"{prefix}.{quantity}" if prefix else quantity] = {"value": value, "error": error, "start": begin}
-    return rows
+            found_rows[f"{prefix}.{quantity}" if prefix else quantity] = {
+                "value": value,
+                "error": error,
+                "start": begin,
+            }
+    return found_rows
 
 
 def _at_start(part: Mapping[str, Any], quantity: str) -> float:

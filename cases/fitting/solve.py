@@ -1,4 +1,4 @@
-"""`fit_case`: coefficients of a case from what its detectors have read, and the case with these."""
+"""`fit_case`: unknowns of a case from what its detectors have read, and the case with what was found."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -25,10 +25,10 @@ def fit_case(case: Case, report: Callable[[str], None]) -> FitResult:
     )
 
 
-def with_fitted_media(case: Case, found: FitResult) -> Case:
-    """The case with the media that were found."""
+def with_fitted(case: Case, found: FitResult) -> Case:
+    """The case with the media and the places of lights that were found."""
     channels = tuple(
-        replace(channel, medium=media[0], media=media[0])
+        replace(channel, medium=media[0], media=media[0], lights=dict(zip(channel.lights, found.lights, strict=True)))
         for channel, media in zip(case.channels, found.media, strict=True)
     )
     regions = tuple(

@@ -1,4 +1,4 @@
-"""`fit`: coefficients or chromophores of a body from what detectors read."""
+"""`fit`: coefficients or chromophores of a body, and places of lights, from what detectors read."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from tetlux.fem.inverse.parameters import FitUnknowns
 from tetlux.fem.inverse.problem import FitProblem
 from tetlux.fem.inverse.request import Bounds, FitRequest, Readings, Starts, make_request
 from tetlux.fem.inverse.result import FitResult, result_of
-from tetlux.fem.inverse.unknowns import Unknowns
 from tetlux.fem.known.split import check_lights
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region, check_list_of_regions
@@ -26,11 +26,13 @@ FAR = 1.25
 MOST_MESHES = 6
 # Of the first mesh, for media that are only guessed.
 FIRST_TOLERANCE = 0.03
-# Accuracies of logarithms of unknowns, on the first mesh and on others.
+# It is also once a light is farther from there than so many mean free paths.
+FAR_PLACE = 1.0
+# Accuracies of parameters of unknowns, on the first mesh and on others.
 ROUGH, FINE = 2e-2, 1e-3
 # Relative error of readings by the mesh.
 DETECTOR_TOLERANCE = 0.005
-# Values begin this share of the way between the logarithms of their bounds away from these.
+# Parameters begin this share of the way between their bounds away from these.
 INSET = 1e-6
 
 Report = Callable[[str], None]
@@ -51,10 +53,10 @@ def fit(
     outside_index: float = 1.0,
     detector_tolerance: float = DETECTOR_TOLERANCE,
 ) -> FitResult:
-    """Fit coefficients of a body to readings.
+    """Fit coefficients of a body and places of lights to readings.
 
     Logarithms of readings are fitted by least squares (Levenberg and Marquardt's, Moré 1978), with the derivatives of
-    `tetlux.fem.sensitivity`, on a fixed mesh. A mesh is made anew where coefficients have moved far.
+    `tetlux.fem.sensitivity`, on a fixed mesh. A mesh is made anew where coefficients or lights have moved far.
 
     Parameters
     ----------
@@ -69,6 +71,8 @@ def fit(
     unknowns : sequence of str
         Of the body ``"sigma_a"`` and ``"sigma_s_prime"``; of region 1 ``"1.sigma_a"`` and so on; of tissue ``"hbo2"``,
         ``"hhb"``, ``"water"``, ``"fat"``, ``"a"`` and ``"b"``. ``"gain"`` is an unknown factor of all readings.
+        ``"light1.x"``, ``"light1.y"`` and ``"light1.z"`` are the coordinates of the first light, if it is a point, or
+        of the origin of a pencil beam; they begin where the light is.
     start : Medium, mapping, or sequence of these
         The medium of the body to begin with; or the arguments of `tetlux.fem.tissue`, with its wavelengths. What is not
         unknown stays as it is there. A sequence is of the body and of each region, in place of the media of these.
@@ -77,7 +81,8 @@ def fit(
     noise : float or array_like, optional
         Relative standard deviation of all or of each reading. If it is not given, it is estimated by the residuals.
     bounds : mapping of str to (float, float), optional
-        Least and largest value of unknowns; of others a thousandth and a thousand times the start.
+        Least and largest value of unknowns; of others a thousandth and a thousand times the start, and no bounds of
+        coordinates.
     frequency : float
         Of modulated light, Hz.
     outside_index : float
@@ -112,7 +117,7 @@ def fit(
     check_list_of_regions(regions)
     request = make_request(
         surface.unit,
-        len(lights),
+        lights,
         len(detectors),
         readings,
         unknowns,
@@ -150,10 +155,10 @@ def fit_request(
     wanted = request.unknowns
     values, tolerance, evaluations = wanted.start, max(detector_tolerance, FIRST_TOLERANCE), 0
     for number in range(MOST_MESHES):
-        media = wanted.media(values)
-        mesh = _mesh(surface, media, lights, detectors, regions, frequency, outside_index, tolerance)
+        media, placed = wanted.media(values), wanted.lights(lights, values)
+        mesh = _mesh(surface, media, placed, detectors, regions, frequency, outside_index, tolerance)
         problem = FitProblem(
-            surface, mesh, lights, detectors, regions, wanted, request.readings, request.noise, frequency, outside_index
+            surface, mesh, placed, detectors, regions, wanted, request.readings, request.noise, frequency, outside_index
         )
         is_last_tolerance = tolerance <= detector_tolerance
         before, values = values, _least_squares(problem, request, values, FINE if is_last_tolerance else ROUGH)
@@ -161,7 +166,7 @@ def fit_request(
         found = ", ".join(f"{name} {value:.4g}" for name, value in zip(wanted.names, values.tolist(), strict=True))
         size = count(len(mesh.tetrahedra), "tetrahedron", "tetrahedra")
         report(f"fitted on mesh {number + 1}, {size}, by {count(problem.evaluations, 'evaluation')}: {found}")
-        if is_last_tolerance and _ratio(wanted, before, values) <= FAR:
+        if is_last_tolerance and not _is_far(wanted, before, values):
             break
         tolerance = detector_tolerance
     return result_of(problem, request, values, evaluations)
@@ -172,23 +177,24 @@ def _least_squares(problem: FitProblem, request: FitRequest, values: FloatArray,
     # Imported here, since SciPy's optimizers take a tenth of the time that tetlux.fem takes to import.
     from scipy.optimize import least_squares  # noqa: PLC0415
 
+    unknowns, limits = problem.unknowns, request.bounds.T
+    low, high = (unknowns.parameters(limit) for limit in limits)
     found = least_squares(
         problem.residuals,
-        np.log(_within(values, request.bounds)),
+        _within(unknowns.parameters(values), low, high),
         jac=problem.jacobian,
-        bounds=(np.log(request.bounds[:, 0]), np.log(request.bounds[:, 1])),
+        bounds=(low, high),
         xtol=accuracy,
         ftol=accuracy**2,
         gtol=None,
     )
-    logarithms: FloatArray = np.asarray(found.x, dtype=float)
-    return np.asarray(np.exp(logarithms))
+    return unknowns.values(np.asarray(found.x, dtype=float))
 
 
-def _within(values: FloatArray, bounds: FloatArray) -> FloatArray:
-    """Values (u,) moved strictly within bounds (u, 2), as the optimizer begins."""
-    inset = (bounds[:, 1] / bounds[:, 0]) ** INSET
-    return np.asarray(np.clip(values, bounds[:, 0] * inset, bounds[:, 1] / inset))
+def _within(parameters: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Parameters (u,) moved strictly within bounds (u,), as the optimizer begins."""
+    inset = np.where(np.isfinite(high - low), INSET * (high - low), 0.0)
+    return np.asarray(np.clip(parameters, low + inset, high - inset))
 
 
 def _mesh(
@@ -218,13 +224,14 @@ def _mesh(
     return mesh
 
 
-def _ratio(unknowns: Unknowns, before: FloatArray, after: FloatArray) -> float:
-    """The largest factor between coefficients by values (u,) before and after."""
+def _is_far(unknowns: FitUnknowns, before: FloatArray, after: FloatArray) -> bool:
+    """Whether coefficients or lights are far away from one another by values (u,) before and after."""
+    media, moved = unknowns.media(after), ~unknowns.positive
+    if moved.any() and np.abs(after - before)[moved].max() > FAR_PLACE * media[0][0].mean_free_path:
+        return True
     old, new = (
-        np.array(
-            [[medium.sigma_a, medium.reduced_scattering] for channel in unknowns.media(values) for medium in channel]
-        )
-        for values in (before, after)
+        np.array([[medium.sigma_a, medium.reduced_scattering] for channel in each for medium in channel])
+        for each in (unknowns.media(before), media)
     )
     there = (old > 0) & (new > 0)
-    return float(np.exp(np.abs(np.log(new[there] / old[there])).max(initial=0.0)))
+    return bool(np.abs(np.log(new[there] / old[there])).max(initial=0.0) > np.log(FAR))

@@ -6,7 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tetlux.fem.inverse.unknowns import GAIN, Unknowns, slopes_of_media
+from tetlux.fem.inverse.parameters import FitUnknowns
+from tetlux.fem.inverse.unknowns import GAIN, slopes_of_media
+from tetlux.fem.lights.places import MovedLight
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
 from tetlux.fem.models.modulation import shift_of_frequency
@@ -16,25 +18,28 @@ from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)
 class FitProblem:
-    """Least squares of logarithms of readings by logarithms of unknowns, on a fixed mesh.
+    """Least squares of logarithms of readings by parameters of unknowns, on a fixed mesh.
+
+    Parameters are logarithms of coefficients, and places of lights: `FitUnknowns.parameters` and `values` convert them.
 
     Attributes
     ----------
     surface : Surface
     mesh : TetMesh
     lights : sequence of Light
-        Each has readings of its own.
+        Each has readings of its own. Those that are moved are where the mesh was made for.
     detectors : sequence of detectors
         Where the readings were measured.
     regions : sequence of Region
         Only their surfaces are used; `unknowns` holds the media.
-    unknowns : Unknowns
+    unknowns : FitUnknowns
     readings : (c, l, d) ndarray
         Measured exitance of each channel, light and detector, W/unit²; nan where there is none.
     noise : (c, l, d) ndarray
@@ -51,7 +56,7 @@ class FitProblem:
     >>> def minimize_by_bfgs(problem):
     ...     from scipy.optimize import minimize
     ...
-    ...     return minimize(problem.value_and_gradient, np.log(problem.unknowns.start), jac=True, method="BFGS")
+    ...     return minimize(problem.value_and_gradient, problem.start, jac=True, method="BFGS")
     """
 
     surface: Surface
@@ -59,7 +64,7 @@ class FitProblem:
     lights: Sequence[Light]
     detectors: Sequence[Detector]
     regions: Sequence[Region]
-    unknowns: Unknowns
+    unknowns: FitUnknowns
     readings: NumberArray
     noise: FloatArray
     frequency: float = 0.0
@@ -72,49 +77,85 @@ class FitProblem:
         """How often readings and derivatives were computed."""
         return self._counter["evaluations"]
 
-    def residuals(self, logarithms: FloatArray) -> FloatArray:
-        """ln(fitted reading/measured reading) over the noise, (n,); real and imaginary parts of complex readings."""
-        return self._at(logarithms)[0]
+    @property
+    def start(self) -> FloatArray:
+        """Parameters to begin with, (u,)."""
+        return self.unknowns.parameters(self.unknowns.start)
 
-    def jacobian(self, logarithms: FloatArray) -> FloatArray:
-        """Derivatives of the residuals with respect to the logarithms of the unknowns, (n, u)."""
-        return self._at(logarithms)[1]
+    def residuals(self, parameters: FloatArray) -> FloatArray:
+        """ln(fitted reading/measured reading) over the noise, (n,); real and imaginary parts of complex readings.
 
-    def value_and_gradient(self, logarithms: FloatArray) -> tuple[float, FloatArray]:
+        Infinite where a light has been moved to where it does not light the body.
+        """
+        try:
+            return self._at(parameters)[0]
+        except InputError:
+            if not (self.unknowns.coordinates and self.evaluations):
+                raise
+            return np.full(self.number, np.inf)
+
+    @property
+    def number(self) -> int:
+        """Number of residuals."""
+        return int(np.isfinite(self.readings).sum()) * (2 if np.iscomplexobj(self.readings) else 1)
+
+    def jacobian(self, parameters: FloatArray) -> FloatArray:
+        """Derivatives of the residuals with respect to the parameters, (n, u)."""
+        return self._at(parameters)[1]
+
+    def value_and_gradient(self, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Half the sum of the squares of the residuals, and its gradient (u,)."""
-        residuals, jacobian, _ = self._at(logarithms)
+        residuals, jacobian, _ = self._at(parameters)
         return 0.5 * float(residuals @ residuals), residuals @ jacobian
 
-    def fitted(self, logarithms: FloatArray) -> NumberArray:
+    def fitted(self, parameters: FloatArray) -> NumberArray:
         """Readings of the model, times the gain, (c, l, d), W/unit²."""
-        return self._at(logarithms)[2]
+        return self._at(parameters)[2]
 
-    def _at(self, logarithms: FloatArray) -> tuple[FloatArray, FloatArray, NumberArray]:
-        key = np.asarray(logarithms, dtype=float).tobytes()
+    def _at(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray, NumberArray]:
+        key = np.asarray(parameters, dtype=float).tobytes()
         if key not in self._found:
-            self._found.clear()
+            found = self._evaluate(self.unknowns.values(np.asarray(parameters, dtype=float)))
             self._counter["evaluations"] += 1
-            self._found[key] = self._evaluate(np.exp(logarithms))
+            self._found.clear()
+            self._found[key] = found
         return self._found[key]
 
     def _evaluate(self, values: FloatArray) -> tuple[FloatArray, FloatArray, NumberArray]:
-        """Residuals (n,), their derivatives to logarithms (n, u), and readings (c, l, d), at values (u,)."""
-        slopes = slopes_of_media(self.unknowns, values)
-        gain = values[self.unknowns.names.index(GAIN)] if GAIN in self.unknowns.names else 1.0
+        """Residuals (n,), their derivatives to parameters (n, u), and readings (c, l, d), at values (u,)."""
+        unknowns, lights = self.unknowns, self._lights(values)
+        rows, moving = unknowns.media_rows, unknowns.moving
+        slopes = slopes_of_media(unknowns.of_media, values[rows])
+        gain = values[unknowns.names.index(GAIN)] if GAIN in unknowns.names else 1.0
         residuals, jacobians, fitted = [], [], []
-        for channel, media in enumerate(self.unknowns.media(values)):
-            found = sensitivity(self._system(media), self.lights, self.detectors, per="region", log=True)
+        for channel, media in enumerate(unknowns.media(values)):
+            system = self._system(media)
+            found = sensitivity(system, lights, self.detectors, per="region", log=True, positions=moving)
             fitted.append(found.readings * gain)
             difference = np.log(fitted[-1]) - np.log(self.readings[channel])
             by_medium = np.stack([found.derivatives["sigma_a"], found.derivatives["sigma_s_prime"]], axis=-1)
-            jacobian = np.tensordot(by_medium, slopes[channel], axes=2) * values
-            if GAIN in self.unknowns.names:
-                jacobian[..., self.unknowns.names.index(GAIN)] = 1.0
+            jacobian = np.zeros((*found.readings.shape, len(values)), by_medium.dtype)
+            jacobian[..., rows] = np.tensordot(by_medium, slopes[channel], axes=2)
+            for column, name in enumerate(unknowns.names):
+                if name in unknowns.coordinates:
+                    own = unknowns.coordinates[name]
+                    of_light = found.derivatives["position"][moving.index(own.light)]
+                    jacobian[own.light, :, column] = of_light[:, own.axis]
+            jacobian *= unknowns.slopes(values)
+            if GAIN in unknowns.names:
+                jacobian[..., unknowns.names.index(GAIN)] = 1.0
             measured = np.isfinite(self.readings[channel])
             noise = self.noise[channel][measured]
             residuals += _parts(_least_turn(difference[measured]) / noise)
             jacobians += _parts(jacobian[measured] / noise[:, None])
         return np.concatenate(residuals), np.concatenate(jacobians), np.array(fitted)
+
+    def _lights(self, values: FloatArray) -> list[Light]:
+        """The lights at their places by values (u,), with the charges and patches that they had when they began."""
+        return [
+            own if own is begun else MovedLight(own, repr(begun))
+            for own, begun in zip(self.unknowns.lights(self.lights, values), self.lights, strict=True)
+        ]
 
     def _system(self, media: Sequence[Medium]) -> System:
         regions = tuple(replace(region, medium=medium) for region, medium in zip(self.regions, media[1:], strict=True))

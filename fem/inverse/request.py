@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tetlux.fem.inverse.unknowns import FRACTIONS, HAEMOGLOBIN, Start, TissueUnknowns, Unknowns, unknowns_of
+from tetlux.fem.inverse.parameters import FitUnknowns, unknowns_of
+from tetlux.fem.inverse.unknowns import FRACTIONS, HAEMOGLOBIN, Start, TissueUnknowns, Unknowns
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.region import Region
 from tetlux.fem.media.tissue import MOST_HAEMOGLOBIN
 from tetlux.fem.outcome.reading import Reading
+from tetlux.fem.sources.light import Light
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
@@ -32,7 +34,7 @@ class FitRequest:
 
     Attributes
     ----------
-    unknowns : Unknowns
+    unknowns : FitUnknowns
     readings : (c, l, d) ndarray
         Measured exitance of each channel, light and detector, W/unit²; nan where there is none.
     noise : (c, l, d) ndarray
@@ -43,7 +45,7 @@ class FitRequest:
         Least and largest values of the unknowns.
     """
 
-    unknowns: Unknowns
+    unknowns: FitUnknowns
     readings: NumberArray
     noise: FloatArray
     noise_is_known: bool
@@ -54,7 +56,7 @@ class FitRequest:
 
 def make_request(
     unit: str,
-    lights: int,
+    lights: Sequence[Light],
     detectors: int,
     readings: Readings,
     unknowns: Sequence[str],
@@ -65,16 +67,19 @@ def make_request(
     bounds: Bounds | None = None,
     frequency: float = 0.0,
     region_names: Sequence[str] = (),
+    light_names: Sequence[str] = (),
 ) -> FitRequest:
-    """Check what `tetlux.fem.fit` is given, of a body in a unit of length and a number of lights and detectors.
+    """Check what `tetlux.fem.fit` is given, of a body in a unit of length and a number of detectors.
 
     Raises
     ------
     InputError
         If an argument is not sensible, or there are more unknowns than readings.
     """
-    wanted = unknowns_of(unknowns, _with_unit(start, unit), regions, region_names)
-    measured = _measured(readings, len(wanted.media(wanted.start)), lights, detectors)
+    wanted = unknowns_of(
+        unknowns, _with_unit(start, unit), regions, lights, region_names=region_names, light_names=light_names
+    )
+    measured = _measured(readings, len(wanted.media(wanted.start)), len(lights), detectors)
     if np.iscomplexobj(measured) != bool(frequency):
         kind = "complex readings, with their phases" if frequency else "real readings, or a frequency"
         raise InputError(f"the light is {'modulated' if frequency else 'steady'}; give {kind}.", field="readings")
@@ -101,10 +106,10 @@ def _with_unit(start: Starts, unit: str) -> Starts:
     return [_with_unit(each, unit) if isinstance(each, Mapping) else each for each in start]  # type: ignore[misc]
 
 
-def _bounds(unknowns: Unknowns, given: Bounds) -> FloatArray:
+def _bounds(unknowns: FitUnknowns, given: Bounds) -> FloatArray:
     """Least and largest values of the unknowns, (u, 2)."""
-    start = unknowns.start
-    bounds = np.column_stack([start / WIDEST, start * WIDEST])
+    start, positive = unknowns.start, unknowns.positive
+    bounds = np.column_stack([np.where(positive, start / WIDEST, -np.inf), np.where(positive, start * WIDEST, np.inf)])
     for name, limits in given.items():
         if name not in unknowns.names:
             raise InputError(
@@ -113,13 +118,13 @@ def _bounds(unknowns: Unknowns, given: Bounds) -> FloatArray:
             )
         number = unknowns.names.index(name)
         pair = np.asarray(limits)
-        if pair.shape != (2,) or pair.dtype.kind not in "if" or not 0 < pair[0] < pair[1] < np.inf:
+        least = 0.0 if positive[number] else -np.inf
+        if pair.shape != (2,) or pair.dtype.kind not in "if" or not least < pair[0] < pair[1] < np.inf:
             shown = (
                 " and ".join(f"{value:g}" for value in pair) if pair.dtype.kind in "if" and pair.ndim else f"{limits}"
             )
-            raise InputError(
-                f"bounds of {name} are {shown}; give two values greater than 0, the lower one first.", field="bounds"
-            )
+            values = "values greater than 0" if positive[number] else "coordinates"
+            raise InputError(f"bounds of {name} are {shown}; give two {values}, the lower one first.", field="bounds")
         low, high = pair.tolist()
         if not low <= start[number] <= high:
             raise InputError(
@@ -127,14 +132,15 @@ def _bounds(unknowns: Unknowns, given: Bounds) -> FloatArray:
                 field="bounds",
             )
         bounds[number] = low, high
-    _limit_amounts(unknowns, bounds)
+    rows = unknowns.media_rows
+    bounds[rows] = _limit_amounts(unknowns.of_media, bounds[rows])
     return bounds
 
 
-def _limit_amounts(unknowns: Unknowns, bounds: FloatArray) -> None:
-    """Limit amounts in place to those that `tissue` takes: fractions of a part never add up to more than 1."""
+def _limit_amounts(unknowns: Unknowns, bounds: FloatArray) -> FloatArray:
+    """Bounds (u, 2) within what `tissue` takes: fractions of a part never add up to more than 1."""
     if not isinstance(unknowns, TissueUnknowns):
-        return
+        return bounds
     for number, part in enumerate(unknowns.parts):
         if isinstance(part, tuple):
             continue
@@ -145,6 +151,7 @@ def _limit_amounts(unknowns: Unknowns, bounds: FloatArray) -> None:
         room = FULL - _filled(part)
         for row in rows:
             bounds[row, 1] = min(bounds[row, 1], unknowns.start[row] + max(room, 0.0) / len(rows))
+    return bounds
 
 
 def _filled(part: Mapping[str, Any]) -> float:

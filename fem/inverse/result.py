@@ -1,24 +1,26 @@
 """`FitResult`: values with their covariance, and what readings do not tell."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from tetlux.fem.inverse.parameters import FitUnknowns
 from tetlux.fem.inverse.problem import FitProblem
 from tetlux.fem.inverse.request import FitRequest
 from tetlux.fem.media.medium import Medium
+from tetlux.fem.sources.light import Light
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.mesh import TetMesh
 
-# A combination of unknowns is undetermined if its standard deviation is more than this share of the unknowns.
+# A combination of unknowns is undetermined if its standard deviation is more than this share of the unknowns, or of a
+# decay length.
 UNDETERMINED = 1.0
 # Without noise given it is if it changes no reading by this share of what others change.
 UNSEEN = 1e-6
 # Share of the largest component from which an unknown belongs to an undetermined combination.
 BELONGS = 0.3
-# An unknown is at a bound if it is within this factor of it.
+# An unknown is at a bound if it is within this factor of it, a coordinate within that less 1 of a decay length.
 AT_BOUND = 1.001
 
 
@@ -30,7 +32,7 @@ class FitResult:
     ----------
     values : dict of str to float
         The fitted value of each unknown, by its name. Absorption and scattering are in 1/unit, haemoglobin in mol/l,
-        water and fat in fractions of the volume.
+        water and fat in fractions of the volume, coordinates in unit.
     covariance : (u, u) ndarray
         Covariance matrix of the values, in their order. It follows from the noise that was given, or from the
         residuals.
@@ -48,6 +50,8 @@ class FitResult:
         that is an unknown.
     media : list of list of Medium
         ``media[c]`` are the fitted media at wavelength c: that of the body, then those of the regions.
+    lights : list of Light
+        At the places that were fitted.
 
     Examples
     --------
@@ -74,6 +78,7 @@ class FitResult:
     mesh: TetMesh
     readings: NumberArray
     media: list[list[Medium]]
+    lights: list[Light]
 
     @property
     def errors(self) -> dict[str, float]:
@@ -96,44 +101,51 @@ class FitResult:
 
 def result_of(problem: FitProblem, request: FitRequest, values: FloatArray, evaluations: int) -> FitResult:
     """The result at values (u,), with what is not determined."""
-    names, logarithms = problem.unknowns.names, np.log(values)
-    residuals, jacobian = problem.residuals(logarithms), problem.jacobian(logarithms)
+    unknowns = problem.unknowns
+    names, parameters, slopes = unknowns.names, unknowns.parameters(values), unknowns.slopes(values)
+    residuals, jacobian = problem.residuals(parameters), problem.jacobian(parameters)
     variance = 1.0
     if not request.noise_is_known:
         variance = float(residuals @ residuals) / max(len(residuals) - len(values), 1)
     _, sizes, ways = np.linalg.svd(jacobian, full_matrices=False)
     sizes = np.maximum(sizes, np.finfo(float).tiny ** 0.25)
-    of_logarithms = (ways.T * (variance / sizes**2)) @ ways
+    of_parameters = (ways.T * (variance / sizes**2)) @ ways
     lost = sizes <= UNSEEN * sizes[0]
     if request.noise_is_known:
         lost |= 1.0 / sizes > UNDETERMINED
     return FitResult(
         values=dict(zip(names, values.tolist(), strict=True)),
-        covariance=values[:, None] * of_logarithms * values,
+        covariance=slopes[:, None] * of_parameters * slopes,
         residuals=residuals,
-        undetermined=(*(_undetermined(names, way) for way in ways[lost]), *_at_bounds(request, values)),
+        undetermined=(*(_undetermined(unknowns, way) for way in ways[lost]), *_at_bounds(request, values)),
         evaluations=evaluations,
         mesh=problem.mesh,
-        readings=problem.fitted(logarithms),
-        media=problem.unknowns.media(values),
+        readings=problem.fitted(parameters),
+        media=unknowns.media(values),
+        lights=unknowns.lights(problem.lights, values),
     )
 
 
-def _undetermined(names: Sequence[str], way: FloatArray) -> str:
+def _undetermined(unknowns: FitUnknowns, way: FloatArray) -> str:
     """A sentence on a combination of unknowns (u,) that readings do not tell."""
-    belong = [
-        name for name, share in zip(names, np.abs(way).tolist(), strict=True) if share > BELONGS * np.abs(way).max()
-    ]
+    names, shares = unknowns.names, np.abs(way)
+    belong = [name for name, share in zip(names, shares.tolist(), strict=True) if share > BELONGS * shares.max()]
     if len(belong) == 1:
         return f"the readings do not tell {belong[0]}."
+    listed = ", ".join(belong[:-1]) + f" and {belong[-1]}"
+    if any(name in unknowns.coordinates for name in belong):
+        return f"the readings do not tell {listed} apart: a combination of them is free."
     signs = "a product" if len(set(np.sign(way[[names.index(name) for name in belong]]).tolist())) == 1 else "a ratio"
-    return f"the readings do not tell {' and '.join(belong)} apart: {signs} of their powers is free."
+    return f"the readings do not tell {listed} apart: {signs} of their powers is free."
 
 
 def _at_bounds(request: FitRequest, values: FloatArray) -> list[str]:
     """Sentences on unknowns that ended at a bound."""
-    found = []
-    for name, value, (low, high) in zip(request.unknowns.names, values.tolist(), request.bounds.tolist(), strict=True):
-        if value < AT_BOUND * low or value * AT_BOUND > high:
-            found.append(f"{name} ended at its bound {low if value < AT_BOUND * low else high:g}.")
+    unknowns, found = request.unknowns, []
+    # A factor of a value is a difference of parameters.
+    apart = unknowns.parameters(values)[:, None] - np.stack([unknowns.parameters(b) for b in request.bounds.T], axis=1)
+    for name, differences, limits in zip(unknowns.names, np.abs(apart), request.bounds.tolist(), strict=True):
+        nearest = int(differences.argmin())
+        if differences[nearest] < np.log(AT_BOUND):
+            found.append(f"{name} ended at its bound {limits[nearest]:g}.")
     return found

@@ -1,4 +1,4 @@
-"""What is fitted: coefficients of the body and of its regions, or what tissue consists of."""
+"""What is fitted of media: coefficients of the body and of its regions, or what tissue consists of."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ STEP = 1e-4
 
 
 class Unknowns(Protocol):
-    """Unknowns, and the media that follow from them."""
+    """Unknowns of media and the gain, and the media that follow from them."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,35 +121,17 @@ class TissueUnknowns:
     __repr__ = one_line
 
 
-def unknowns_of(
+def media_unknowns(
     names: Sequence[str],
     start: Start | Sequence[Start | Sequence[Medium]],
     regions: Sequence[Region],
     region_names: Sequence[str] = (),
+    others: Sequence[str] = (),
 ) -> Unknowns:
-    """The unknowns that names stand for.
+    """The unknowns of media and the gain that names stand for; `others` are names that a fit knows besides.
 
-    Parameters
-    ----------
-    names : sequence of str
-    start : Medium, mapping, or sequence of these
-        See `tetlux.fem.fit`.
-    regions : sequence of Region
-    region_names : sequence of str
-        What stands before the dot in names of unknowns of regions; by default their numbers from 1.
-
-    Raises
-    ------
-    InputError
-        If a name is not known or given twice, or a start is 0 or not sensible.
+    See `tetlux.fem.inverse.parameters.unknowns_of`.
     """
-    if isinstance(names, str) or len(names) == 0:
-        raise InputError(
-            "unknowns are given in a list of names, and there is none; give at least one.", field="unknowns"
-        )
-    repeated = next((name for name in names if list(names).count(name) > 1), None)
-    if repeated is not None:
-        raise InputError(f'the unknown "{repeated}" is given twice; give each once.', field="unknowns")
     parts = _parts(start, regions)
     of_tissue = [part for part in parts if isinstance(part, Mapping)]
     prefixes = ["", *(f"{name}." for name in region_names or range(1, len(parts)))]
@@ -161,7 +143,8 @@ def unknowns_of(
     known[GAIN] = 0, GAIN
     for name in names:
         if name not in known:
-            raise InputError(f'"{name}" is no unknown of this fit; give some of {", ".join(known)}.', field="unknowns")
+            every = ", ".join([*known, *others])
+            raise InputError(f'"{name}" is no unknown of this fit; give some of {every}.', field="unknowns")
     places = tuple(known[name] for name in names)
     found: Unknowns
     if of_tissue:
@@ -218,13 +201,13 @@ def _channels(of_tissue: Sequence[Mapping[str, Any]]) -> int:
 
 def slopes_of_media(unknowns: Unknowns, values: FloatArray) -> FloatArray:
     """Derivatives of the two coefficients of each medium of each channel to unknowns (u,), (c, r, 2, u)."""
-    columns = []
+    columns = [np.zeros((*_coefficients(unknowns.media(values)).shape, 0))]
     for number, value in enumerate(values.tolist()):
         step = np.zeros(len(values))
         step[number] = STEP * value
         sides = [_coefficients(unknowns.media(values + side * step)) for side in (1.0, -1.0)]
-        columns.append((sides[0] - sides[1]) / (2.0 * STEP * value))
-    return np.stack(columns, axis=-1)
+        columns.append(((sides[0] - sides[1]) / (2.0 * STEP * value))[..., None])
+    return np.concatenate(columns, axis=-1)
 
 
 def _coefficients(media: list[list[Medium]]) -> FloatArray:

@@ -18,6 +18,7 @@ are exact.
     products      products of solutions and duals in tetrahedra
     near_sources  what these miss of charges between nodes
     subtracted    derivatives of what is subtracted, and of loads
+    positions     the same to the places of lights
     entry_paths   the tetrahedra between the surface and the points of a light
     sensitivity   the function that puts all of this together
 """

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csr_array
 
-from tetlux.fem.known.split import Subtract, check_lights
+from tetlux.fem.known.split import Subtract, check_lights, replace_fitted
 from tetlux.fem.media.coefficients import by_label
 from tetlux.fem.models.diffusion import is_diffusion
 from tetlux.fem.outcome.detector_kinds import Detector
@@ -19,6 +19,7 @@ from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.sensitivity.entry_paths import entry_shares
 from tetlux.fem.sensitivity.near_sources import missing_charges
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
+from tetlux.fem.sensitivity.positions import check_places, derivatives_to_places
 from tetlux.fem.sensitivity.products import multiply
 from tetlux.fem.sensitivity.subtracted import Coefficient, Readout
 from tetlux.fem.sources.light import Light
@@ -42,7 +43,8 @@ class Sensitivity:
         Exitance, W/unit²; complex for modulated light.
     derivatives : dict of str to (l, d, p) ndarray
         By coefficient, ``sigma_a`` or ``sigma_s_prime``: derivatives of the readings, W/unit, or of their logarithms,
-        unit, to the coefficient of each parameter.
+        unit, to the coefficient of each parameter. With `positions`, ``position`` has (k, d, 3), the derivatives of
+        the readings of each of these k lights to its coordinates, W/unit³ or 1/unit.
     path_lengths : (l, d, r) ndarray
         Mean partial path lengths of the light of each reading in each medium, unit: ``-d ln y/d sigma_a`` at constant
         D. Their sum is the mean time of flight times the speed of light.
@@ -66,6 +68,7 @@ def sensitivity(
     to: Sequence[Coefficient] = COEFFICIENTS,
     per: Per = "node",
     log: bool = False,
+    positions: Sequence[int] = (),
     subtract: Subtract = "fitted",
     dtype: npt.DTypeLike = np.float64,
 ) -> Sensitivity:
@@ -89,6 +92,9 @@ def sensitivity(
         region.
     log : bool
         Whether of logarithms of readings, whose imaginary part is minus the phase lag in radians.
+    positions : sequence of int
+        Numbers, from 0, of lights whose readings are differentiated to their position, too: of points, and of the
+        origins of pencil beams.
     subtract : {"fitted", "half-space", "free-space", "nothing"}
         See `tetlux.fem.solve`.
     dtype : dtype
@@ -125,6 +131,9 @@ def sensitivity(
     True
     """
     _check(system, lights, detectors, to)
+    check_places(lights, positions)
+    if system.surface is None or system.surface is system.mesh.surface:
+        subtract = replace_fitted(subtract)
     labels, numbers = _media(system)
     media = parameter_shares(system.mesh, numbers, "region")
     shares = media if per == "region" else parameter_shares(system.mesh, numbers, per)
@@ -144,10 +153,11 @@ def sensitivity(
     if log:
         for name in derivatives:
             derivatives[name] /= readings.astype(dtype)
-    lengths = np.moveaxis(mass / readings, 0, -1)
-    return Sensitivity(
-        readings, {name: np.moveaxis(each, 0, -1) for name, each in derivatives.items()}, lengths, labels
-    )
+    found = {name: np.moveaxis(each, 0, -1) for name, each in derivatives.items()}
+    if len(positions):
+        of_places = derivatives_to_places(readout, positions)
+        found["position"] = of_places / readings[list(positions), :, None] if log else of_places
+    return Sensitivity(readings, found, np.moveaxis(mass / readings, 0, -1), labels)
 
 
 def _derivatives(

@@ -68,7 +68,7 @@ def _add(medium: AnyMedium, coefficient: Coefficient, step: float) -> AnyMedium:
 
 
 @dataclass(frozen=True, eq=False)
-class _Nearby:
+class Nearby:
     """Lights in a medium that is a little different, one of some, with a weight of the value for differences."""
 
     weight: float
@@ -129,10 +129,11 @@ class Readout:
         of_matrix = self._products[label]
 
         def work(light: int) -> None:
-            found[light] = self._of_load(nearby, light)
+            found[light] = self.of_load(nearby, light)
             for number, known in enumerate(self.scene.patches[light]):
-                charges = [_charges_of(each.split, light)[number] for each in nearby]
-                found[light] += self._of_charges(known, nearby, charges, label, coefficient)
+                charges = [charges_of(each.split, light)[number] for each in nearby]
+                own = coefficient if _is_in(known.patch, label) else None
+                found[light] += self.of_charges(known, nearby, charges, own)
                 if known in of_matrix:
                     mass, stiffness = of_matrix[known]
                     found[light] += mass - stiffness if coefficient == "sigma_a" else -stiffness
@@ -140,13 +141,13 @@ class Readout:
         map_in_threads(work, range(len(self.lights)))
         return found
 
-    def _nearby(self, label: int, coefficient: Coefficient, step: float) -> list[_Nearby]:
+    def _nearby(self, label: int, coefficient: Coefficient, step: float) -> list[Nearby]:
         """The lights with a coefficient a few steps away on both sides, as near as no charge comes or goes."""
         for _ in range(SHORTENINGS):
             found = []
             for steps, weight in WEIGHTS.items():
                 changed = change_medium(self.system, label, coefficient, steps * step)
-                found.append(_Nearby(weight / step, changed, self._split(changed)))
+                found.append(Nearby(weight / step, changed, self.split(self.lights, changed)))
             counts = {tuple(len(each.positions) for each in _every_charges(one.split)) for one in found}
             if len(counts) == 1:
                 break
@@ -164,15 +165,16 @@ class Readout:
         absorption, extinction = (at_cells(each, cells) for each in (coefficients.sigma_a, coefficients.sigma_t_prime))
         return float((absorption if coefficient == "sigma_a" else extinction - absorption).min())
 
-    def _split(self, system: System) -> SplitLights:
+    def split(self, lights: Sequence[Light], system: System) -> SplitLights:
+        """Lights in a system, with the charges that are kept with its mesh."""
         kept = fits_of(system.mesh)
-        return split_lights(self.lights, self._body(system), self.subtract, kept=kept, shift=system.shift)
+        return split_lights(lights, self._body(system), self.subtract, kept=kept, shift=system.shift)
 
     def _body(self, system: System) -> Body:
         return Body(system.true_surface, system.media, MeshPartition(system.mesh))
 
-    def _of_load(self, nearby: Sequence[_Nearby], light: int) -> NumberArray:
-        """Derivative of ``z.b`` of what is not subtracted of a light, (d,)."""
+    def of_load(self, nearby: Sequence[Nearby], light: int) -> NumberArray:
+        """Derivative of ``z.b`` of what is not subtracted of a light of theirs, (d,)."""
         rest = [each.split.remaining[light] for each in nearby]
         if not any(len(one.terms.points) or len(one.terms.segments) or one.on_mesh is not None for one in rest):
             return np.zeros(len(self.measurements))
@@ -184,22 +186,19 @@ class Readout:
             load = load + each.weight * quadratic_load(space, system.coefficients, deposit.terms, lines)
         return np.asarray(load @ self.duals)
 
-    def _of_charges(
-        self,
-        known: QuadraticPatch,
-        nearby: Sequence[_Nearby],
-        charges: Sequence[Charges],
-        label: int,
-        coefficient: Coefficient,
+    def of_charges(
+        self, known: QuadraticPatch, nearby: Sequence[Nearby], charges: Sequence[Charges], own: Coefficient | None
     ) -> NumberArray:
-        """Derivative of ``z.b + G(detector) - d.I G`` of the charges of a patch, (d,)."""
+        """Derivative of ``z.b + G(detector) - d.I G`` of the charges of a patch, (d,).
+
+        `own` is the coefficient of their medium that changes; None where that stays as it is.
+        """
         patch, operator = known.patch, self.scene.operator
         weights = [each.weight for each in nearby]
         if not patch.cells.any():
             points = [(each.positions[: each.sources], each.strengths[: each.sources].real) for each in charges]
             loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
             return np.asarray(np.sum(loads, axis=0) @ self.duals)
-        own = coefficient if _is_in(patch, label) else None
         if own is None and (change := _power_change(patch.charges, charges, weights)) is not None:
             value = known.load @ self.duals
             value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
@@ -247,7 +246,7 @@ def _read_missing(
     return discrete.scale * (weights @ (field.fluence(points) - discrete.values(interpolant)[inside])).item()
 
 
-def _charges_of(split: SplitLights, light: int) -> list[Charges]:
+def charges_of(split: SplitLights, light: int) -> list[Charges]:
     """The charges of a light, in the order of its patches."""
     found = [charges for charges, owner in zip(split.charges, split.owners, strict=True) if owner == light]
     return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]

@@ -32,7 +32,7 @@ from tetlux.fem import (
     sensitivity,
     solve,
 )
-from tetlux.fem.inverse.unknowns import unknowns_of
+from tetlux.fem.inverse.parameters import unknowns_of
 from tetlux.meshing import Surface, TetMesh, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 from tetlux.meshing.tets.refine import refine

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from tetlux.cases.file.schema.parts import Length, Section
+from tetlux.cases.file.schema.parts import Length, Number, Section
 
 # How deep lists of readings are: of wavelengths, of lights, of detectors.
 DEPTH = 3
@@ -57,14 +57,17 @@ class FitSpec(Section):
 
     unknowns: Annotated[list[str], Field(min_length=1)] = Field(
         description="sigma_a, sigma_s_prime, or of media by chromophores hbo2, hhb, water, fat, a, b; of a region with "
-        "its name, as bone.sigma_a; gain, a factor of all readings"
+        "its name, as bone.sigma_a; gain, a factor of all readings; coordinates of a point or pencil with its name, as "
+        "pencil_1.x"
     )
     readings: FitReadingsSpec
     noise: Length | None = Field(
         None, description="relative standard deviation of readings; default: the column noise, or by the residuals"
     )
-    bounds: dict[str, tuple[Length, Length]] = Field(
-        {}, description="least and largest value by unknown; default: a thousandth and a thousand times the start"
+    bounds: dict[str, tuple[Number, Number]] = Field(
+        {},
+        description="least and largest value by unknown; default: a thousandth and a thousand times the start, and no "
+        "bounds of coordinates",
     )
 
 
