@@ -10,7 +10,8 @@ from tetlux.meshing.errors import InputError
 from tetlux.meshing.repair.pipeline import LONGEST, surface_from_arrays
 from tetlux.meshing.surface.solids import Box, Cylinder, Shape, Slab, Sphere, Torus
 from tetlux.meshing.surface.subdivide import number_triangle_edges
-from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.surface import UNITS, Surface
+from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 
 BOX_CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 BOX_FACES = np.array(
@@ -30,6 +31,11 @@ ICOSAHEDRON_FACES = np.array(
         [8, 6, 7], [9, 8, 1],
     ]
 )  # fmt: skip
+
+# A shape is not checked like a surface of unknown origin if its sides are in this range, in any unit, its flattest is
+# more than a share of its longest, it is no farther from the origin than so many of its sides, and the area of each of
+# its triangles is more than a share of the square of its longest side.
+ORDINARY, FLATTEST, FARTHEST, NARROWEST = (1e-9, 1e9), 0.01, 1e3, 0.01
 
 
 def _check_lengths(**lengths: float) -> None:
@@ -258,7 +264,20 @@ def torus(
 def _make_surface(shape: Shape, points: FloatArray, faces: IntArray, unit: str) -> Surface:
     """Make a checked surface from a shape's triangles; its `shape` is that shape."""
     name = type(shape).__name__.lower()
+    if unit in UNITS and _is_regular(points, faces):
+        return Surface(np.array(points, dtype=np.float64), np.array(faces, dtype=np.int64), unit, name, shape=shape)
     return replace(surface_from_arrays(points, faces, unit=unit, name=name), shape=shape)
+
+
+def _is_regular(points: FloatArray, faces: IntArray) -> bool:
+    """Whether triangles of a shape are so even, and so near to the origin, that a check of them finds nothing."""
+    sides = np.ptp(points, axis=0)
+    if not (ORDINARY[0] < sides.min() and np.abs(points).max() < ORDINARY[1] and sides.min() > FLATTEST * sides.max()):
+        return False
+    if np.abs(points).max() > FARTHEST * sides.min():
+        return False
+    longest = longest_sides(points[faces])
+    return bool((triangle_areas(points, faces)[1] > NARROWEST * longest**2).all())
 
 
 def _to_vector(values: Vector) -> Vector:

@@ -426,3 +426,25 @@ def test_what_is_near_is_what_the_nearest_point_says(distance: float) -> None:
     near = surface.near(queries, distance)
     assert 0 < near.sum() < 200
     assert (near == (np.linalg.norm(surface.closest(queries)[0] - queries, axis=1) <= distance)).all()
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
+def test_a_check_of_a_built_in_surface_finds_nothing(size: float) -> None:
+    """Regular shapes are made without one."""
+    middle = (-300.0 * size, 20.0 * size, 100.0 * size)
+    shapes = [
+        sphere(size, center=middle),
+        sphere(size, subdivisions=1),
+        box((size, 2.0 * size, 30.0 * size), center=middle),
+        slab(40.0 * size, 2.0 * size),
+        cylinder(size, 30.0 * size),
+        cylinder(20.0 * size, size),
+        torus(10.0 * size, 2.0 * size),
+    ]
+    for made in shapes:
+        checked = surface_from_arrays(made.points, made.faces, unit=made.unit, name=made.name)
+        assert not checked.repairs
+        assert not checked.warnings
+        assert (checked.overlaps, checked.name, checked.unit) == (made.overlaps, made.name, made.unit)
+        np.testing.assert_array_equal(checked.points, made.points)
+        np.testing.assert_array_equal(checked.faces, made.faces)
