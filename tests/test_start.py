@@ -48,6 +48,15 @@ def test_garbage_is_collected_after_a_run(tmp_path: Path) -> None:
     assert imported(code, ("numpy",), str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")) == ["numpy"]
 
 
+def test_a_command_imports_no_translator_of_fortran(tmp_path: Path) -> None:
+    (tmp_path / "ball.yaml").write_text(CASE + "outputs: []\n")
+    code = "from tetlux.cases.cli import main\nmain(['run', *sys.argv[1:]])"
+    arguments = str(tmp_path / "ball.yaml"), "--out", str(tmp_path / "out")
+    assert imported(code, ("scipy", "numpy.f2py"), *arguments) == ["scipy"]
+    asked = f"{code}\nimport numpy\nassert callable(numpy.f2py.run_main)"
+    assert imported(asked, ("numpy.f2py",), *arguments) == ["numpy.f2py"]
+
+
 def test_the_solver_imports_no_pictures_and_no_readers() -> None:
     assert imported("import tetlux.fem", (*PICTURES, *READERS, *SOLVERS, "pydantic")) == []
 
