@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from tetlux.cases.shipped import library_folder
-from tetlux.meshing import Surface, box, cylinder, read_surface, sphere
+from tetlux.meshing import Surface, box, cylinder, read_surface, sphere, torus
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface import curved as patches
+from tetlux.meshing.surface.triangles import triangle_areas
 
 
 def places_on(surface: Surface, count: int = 2000) -> tuple[IntArray, FloatArray]:
@@ -39,7 +41,7 @@ def test_edges_that_are_meant_stay() -> None:
     np.testing.assert_allclose(normals, cube.normals[faces], atol=1e-12)
 
 
-def test_a_cylinder_is_round_between_flat_ends() -> None:
+def test_a_cylinder_is_curvedbetween_flat_ends() -> None:
     can = cylinder(5.0, 10.0)
     faces, flat = places_on(can)
     curved, _ = can.on_curve(faces, flat)
@@ -89,3 +91,25 @@ def test_twelve_sides_are_all_sharp() -> None:
     prism = cylinder(5.0, 20.0, segments=12)
     faces, flat = places_on(prism)
     np.testing.assert_allclose(prism.on_curve(faces, flat)[0], flat, atol=1e-9)
+
+
+def test_patches_of_a_large_surface_are_made_where_they_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    ring = torus(10.0, 4.0, segments=24)
+    faces, places = places_on(ring)
+    kept = ring.on_curve(faces, places)
+    monkeypatch.setattr(patches, "MOST_KEPT", 0)
+    for found, wanted in zip(replace(ring).on_curve(faces, places), kept, strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("surface", [sphere(3.0, subdivisions=2), cylinder(2.0, 5.0), torus(3.0, 1.0)])
+def test_the_volume_between_the_surface_and_its_triangles(surface: Surface) -> None:
+    """By the middles of the sides of each triangle, which integrate quadratic functions exactly."""
+    corners, faces = surface.points[surface.faces], np.arange(len(surface.faces))
+    heights = np.zeros(len(faces))
+    for corner in range(3):
+        middle = 0.5 * (corners[:, corner] + corners[:, corner - 1])
+        heights += np.einsum("ij,ij->i", surface.on_curve(faces, middle)[0] - middle, surface.normals) / 3.0
+    volume = float(heights @ triangle_areas(surface.points, surface.faces)[1])
+    assert volume > 0.0
+    assert surface.bulge == pytest.approx(volume / surface.volume, rel=1e-9)

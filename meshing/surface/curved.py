@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
+from tetlux.meshing.host.blocks import run_in_blocks
 from tetlux.meshing.host.corners import cross, dot
 from tetlux.meshing.surface.subdivide import NEXT_CORNER
 
@@ -45,19 +46,26 @@ class CurvedPatches:
 
         The area is that of the patch if its metric were the same throughout.
         """
-        if len(self._faces) <= MOST_KEPT:
-            control = self._control[:, :, faces]
-        else:
+        points, normals, areas = np.empty((len(faces), 3)), np.empty((len(faces), 3)), np.empty(len(faces))
+        if len(self._faces) > MOST_KEPT:
             distinct, index = np.unique(faces, return_inverse=True)
-            control = self._control_points(distinct)[:, :, index]
-        position, first, second = (np.einsum("kq,kjq->jq", basis, control) for basis in _bases(weights))
-        normal = cross(first, second)
-        length = np.sqrt(dot(normal, normal))
-        flat = self._normals[faces]
-        # Where a patch folds over its triangle, use the triangle's normal.
-        folded = dot(normal, flat.T) <= 0.5 * length
-        unit = (normal / np.where(length > 0, length, 1.0)).T
-        return np.ascontiguousarray(position.T), np.where(folded[:, None], flat, unit), 0.5 * length
+            control = self._control_points(distinct)
+        else:
+            index, control = faces, self._control
+
+        def work(block: slice) -> None:
+            own = control[:, :, index[block]]
+            position, first, second = (np.einsum("kq,kjq->jq", basis, own) for basis in _bases(weights[block]))
+            normal, flat = cross(first, second), self._normals[faces[block]]
+            length = np.sqrt(dot(normal, normal))
+            # Where a patch folds over its triangle, use the triangle's normal.
+            folded = dot(normal, flat.T) <= 0.5 * length
+            unit = normal / np.where(length > 0, length, 1.0)
+            points[block], normals[block] = position.T, np.where(folded[:, None], flat, unit.T)
+            areas[block] = 0.5 * length
+
+        run_in_blocks(work, len(faces))
+        return points, normals, areas
 
     @cached_property
     def _control(self) -> FloatArray:
