@@ -134,7 +134,8 @@ def _are_shapes(request: Request) -> bool:
 
 def _of_contrast(request: Request) -> float:
     """Charges at least in a body with regions."""
-    rates = [medium.sigma_tr for body in request.bodies for medium in body.by_label.values()]
+    media = [homogeneous_medium(medium) for body in request.bodies for medium in body.by_label.values()]
+    rates = [medium.sigma_tr for medium in media]
     contrast = max(rates) / max(min(rates), np.finfo(float).tiny)
     return float(np.clip(OF_CONTRAST * contrast, FEWEST_IN_REGIONS, MOST_IN_REGIONS))
 

@@ -14,10 +14,10 @@ from tetlux.meshing.surface.surface import Surface
 
 # Seconds of the mesher, and tetrahedra of its mesh, by shape; "scan" is any other. All figures of this file are least
 # squares of what `python -m tests.benchmarks.plans` measures.
-SECONDS_OF_MESHER = {"sphere": 0.8, "slab": 0.7, "box": 1.0, "torus": 1.4, "cylinder": 3.5, "scan": 1.8}
+SECONDS_OF_MESHER = {"sphere": 0.7, "slab": 0.7, "box": 1.0, "torus": 1.2, "cylinder": 3.5, "scan": 1.6}
 FIRST_TETRAHEDRA = {"sphere": 3_000, "slab": 3_000, "box": 6_000, "torus": 2_500, "cylinder": 4_200, "scan": 3_000}
 # Seconds of the mesher for each triangle, and for each diagonal of the smallest region in that of the body.
-SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-6, 0.4
+SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-5, 0.4
 # Seconds for each tetrahedron of the last mesh, of all meshes together, and with quadratic elements.
 SECONDS_OF_TETRAHEDRON, SECONDS_WITH_QUADRATIC = 2.2e-5, 2e-4
 # Seconds of reading a mesh from the cache.
