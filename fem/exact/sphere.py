@@ -10,6 +10,7 @@ which follows from the expansion of ``e^{-k d}/d`` (DLMF 10.60.3) and the bounda
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -166,11 +167,17 @@ def point_total(medium: Medium, *, radius: float, source_radius: float) -> float
 
 def _sum_directly(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:
     """``4 pi a² M`` by the series."""
+    return legendre_sum(_coefficients(medium, a, t, order), gamma)
+
+
+@lru_cache(maxsize=4)
+def _coefficients(medium: Medium, a: float, t: float, order: int) -> FloatArray:
+    """Those of the series, which takes most of its time for few points."""
     x = np.array([medium.sigma_tr * a])
     ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
     growth = wall_rates(order, x, SPHERICAL).growth[:, 0]
     beta = medium.extrapolation_length / a
-    return legendre_sum((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth), gamma)
+    return np.asarray((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth))
 
 
 def _sum_split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:

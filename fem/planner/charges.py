@@ -9,7 +9,13 @@ from tetlux.fem.meshless.solution import ChargeSolution
 from tetlux.fem.meshless.solve import check_deposit, check_simple, homogeneous_medium
 from tetlux.fem.outcome.plan import Candidate
 from tetlux.fem.planner.candidate import impossible, refuse_mesh
-from tetlux.fem.planner.effort import kind_of_body, largest_rate, shape_of
+from tetlux.fem.planner.effort import (
+    RATE_OF_DIFFUSE,
+    error_in_diffuse_light,
+    kind_of_body,
+    largest_rate,
+    shape_of,
+)
 from tetlux.fem.planner.request import Request
 from tetlux.fem.validity.notes import check_size
 from tetlux.meshing.errors import InputError
@@ -18,10 +24,6 @@ from tetlux.meshing.errors import InputError
 ERROR_OF_SHAPE, ERROR_OF_SCAN = 2e-4, 6e-3
 # Powers of the number of charges with which it falls.
 RATE_OF_SHAPE, RATE_OF_SCAN = 2.0, 1.3
-# Relative L2 error under diffuse light, by one charge in each square of the length over which light fades, and the
-# power of charges per square with which it falls. Estimate of ten shapes by 85 to 1,540 charges: .7 to 1.6 times as
-# much; of a hare 1.1 and 1.7 times.
-ERROR_OF_DIFFUSE, RATE_OF_DIFFUSE = 0.02, 0.75
 # Charges that are tried at least on scans, some .9 s. Shapes need few, and any limit moves the steps of a fit, which
 # left the exitance of a torus below zero.
 FEWEST_TO_TRY = 600
@@ -29,18 +31,19 @@ FEWEST_TO_TRY = 600
 ERROR_OF_REGION = 4.0
 # Charges where points light a body and their light fades on its way through it: more of them are fitted until the
 # exitance is nowhere below zero. In flat and round bodies few are needed.
-OF_FADING = {"sphere": 100.0, "slab": 130.0, "cylinder": 160.0, "box": 300.0, "torus": 300.0, "scan": 480.0}
+OF_FADING = {"sphere": 100.0, "slab": 130.0, "cylinder": 120.0, "box": 300.0, "torus": 300.0, "scan": 480.0}
 # Lengths over which light fades in the body's diagonal: below the first all bodies but those with shaded parts are lit
 # well everywhere, and beyond the last light is too faint to count.
-LEAST_FADING, MOST_FADING = 4.0, 40.0
+LEAST_FADING, MOST_FADING = 5.0, 40.0
 SHADED = ("torus", "scan")
-# Charges in bodies with regions, where the power that is lacking often asks for more of them than the tolerance.
-IN_REGIONS = 390.0
+# Charges in bodies with regions, where the power that is lacking often asks for more of them than the tolerance: so
+# many for each time that light fades faster in one medium than in another, from the fewest to the most.
+OF_CONTRAST, FEWEST_IN_REGIONS, MOST_IN_REGIONS = 75.0, 240.0, 900.0
 # Charges for what detectors read in bodies with regions: 215 to 1,200 in balls in balls, 450 to 1,420 in fingers.
 OF_READINGS_IN_REGIONS = 700
 # Seconds that any fit takes, those for each triangle, those of 300 charges, with the smaller fits before it, and how
 # they grow with the number. Regions take so many times as long.
-SECONDS_OF_ANY, SECONDS_OF_TRIANGLE = 0.04, 1e-5
+SECONDS_OF_ANY, SECONDS_OF_TRIANGLE = 0.03, 1e-5
 SECONDS_OF_300, RATE_OF_SECONDS, FACTOR_OF_REGIONS = 0.25, 1.8, 1.8
 BYTES_OF_300 = 20e6
 
@@ -61,7 +64,7 @@ def charges_candidate(request: Request) -> Candidate:
     error = first * (300.0 / count) ** rate
     count = max(count * _share_of_regions(request), _of_fading(request))
     if request.inner:
-        count = max(count, IN_REGIONS if request.tolerances.readings is None else OF_READINGS_IN_REGIONS)
+        count = max(count, _of_contrast(request) if request.tolerances.readings is None else OF_READINGS_IN_REGIONS)
     size = (count / 300.0) ** 2
     seconds = learned[0] * _seconds_of(request, count) * len(request.bodies)
     reason = f"about {round(count, -1):,.0f} charges, whose residual tells the error"
@@ -106,8 +109,7 @@ def _first_error(request: Request) -> tuple[float, float]:
     first, rate = (ERROR_OF_SHAPE, RATE_OF_SHAPE) if _are_shapes(request) else (ERROR_OF_SCAN, RATE_OF_SCAN)
     first *= ERROR_OF_REGION ** len(request.inner)
     if _is_diffuse(request):
-        squares = request.surface.area * largest_rate(request) ** 2
-        return max(first, ERROR_OF_DIFFUSE * (squares / 300.0) ** RATE_OF_DIFFUSE), RATE_OF_DIFFUSE
+        return max(first, error_in_diffuse_light(request, 300.0)), RATE_OF_DIFFUSE
     return first, rate
 
 
@@ -128,6 +130,14 @@ def most_charges(request: Request, candidate: Candidate, seconds: float) -> int:
 def _are_shapes(request: Request) -> bool:
     """Whether the body and its regions are built-in shapes, of which few charges are needed."""
     return all(surface.shape is not None for surface in (request.surface, *request.inner))
+
+
+def _of_contrast(request: Request) -> float:
+    """Charges at least in a body with regions."""
+    media = [homogeneous_medium(medium) for body in request.bodies for medium in body.by_label.values()]
+    rates = [medium.sigma_tr for medium in media]
+    contrast = max(rates) / max(min(rates), np.finfo(float).tiny)
+    return float(np.clip(OF_CONTRAST * contrast, FEWEST_IN_REGIONS, MOST_IN_REGIONS))
 
 
 def _of_fading(request: Request) -> float:

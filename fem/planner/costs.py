@@ -8,6 +8,7 @@ time. Lines that cannot be read do not count; without the file the built-in pred
 import json
 import math
 import os
+import statistics
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -23,7 +24,7 @@ SWITCH = "TETLUX_LEARN"
 # The file is cut to its last half at this size, bytes: some 1,600 runs. It is read in a millisecond or two.
 LARGEST_FILE = 100_000
 # Runs of a kind that count, the last ones, and how many runs a built-in prediction is worth.
-MOST_RUNS, WORTH_OF_BUILT_IN = 30, 2.0
+MOST_RUNS, WORTH_OF_BUILT_IN = 30, 2
 # A run counts as at most this many times slower or faster, or farther off or nearer, than predicted.
 LARGEST_FACTOR = 8.0
 
@@ -46,10 +47,11 @@ class Costs:
     def factors(self, kind: str) -> tuple[float, float]:
         """Factors on the built-in seconds and error of a kind of candidate.
 
-        Few runs of a kind are completed, for the seconds by those of all kinds, which tell how fast the machine is.
+        Few runs of a kind are completed, for the seconds by the median of all runs, which tells how fast the machine
+        is also where some kinds are predicted badly.
         """
         of_all = [seconds for runs in self.runs.values() for seconds, _ in runs]
-        speed = sum(of_all) / (len(of_all) + WORTH_OF_BUILT_IN)
+        speed = statistics.median(of_all + [0.0] * WORTH_OF_BUILT_IN)
         runs = self.runs.get(kind, ())
         weight = len(runs) + WORTH_OF_BUILT_IN
         seconds = (sum(each for each, _ in runs) + WORTH_OF_BUILT_IN * speed) / weight

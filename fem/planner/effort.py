@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tetlux.fem.adapt import MOST_TETRAHEDRA
+from tetlux.fem.charges.adapt import MOST_CHARGES_WITH_FEM
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.planner.request import Request
@@ -13,10 +14,10 @@ from tetlux.meshing.surface.surface import Surface
 
 # Seconds of the mesher, and tetrahedra of its mesh, by shape; "scan" is any other. All figures of this file are least
 # squares of what `python -m tests.benchmarks.plans` measures.
-SECONDS_OF_MESHER = {"sphere": 0.8, "slab": 0.7, "box": 1.0, "torus": 1.4, "cylinder": 3.5, "scan": 1.8}
+SECONDS_OF_MESHER = {"sphere": 0.7, "slab": 0.7, "box": 1.0, "torus": 1.2, "cylinder": 3.5, "scan": 1.6}
 FIRST_TETRAHEDRA = {"sphere": 3_000, "slab": 3_000, "box": 6_000, "torus": 2_500, "cylinder": 4_200, "scan": 3_000}
 # Seconds of the mesher for each triangle, and for each diagonal of the smallest region in that of the body.
-SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-6, 0.5
+SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-5, 0.4
 # Seconds for each tetrahedron of the last mesh, of all meshes together, and with quadratic elements.
 SECONDS_OF_TETRAHEDRON, SECONDS_WITH_QUADRATIC = 2.2e-5, 2e-4
 # Seconds of reading a mesh from the cache.
@@ -28,8 +29,15 @@ OF_SPOT, RATE_OF_SPOT = 110_000.0, 1.35
 # Those of the first mesh for each square of the length to resolve where light enters, and the tolerance below which it
 # is refined.
 OF_ENTRY, TOLERANCE_OF_ENTRY = 110.0, 0.015
-# Those of the layer below uniform light for each square of the length over which light fades, at a tolerance of .02.
-OF_LAYER = 330.0
+# Those of the layer below uniform light for each square of the length over which light fades, at a tolerance of .02,
+# and the share of them that a wide beam needs at least, which lights one side.
+OF_LAYER, SHARE_OF_BEAM = 330.0, 0.5
+# The share of them that light takes to which charges are fitted, but do not follow it closely enough.
+SHARE_OF_FITTED = 0.45
+# Relative L2 error of charges under diffuse light, of one charge in each square of the length over which light fades,
+# and the power of charges per square with which it falls. Estimate of ten shapes by 85 to 1,540 charges: .7 to 1.6
+# times as much; of a hare 1.1 and 1.7 times.
+ERROR_OF_DIFFUSE, RATE_OF_DIFFUSE = 0.02, 0.75
 # Points of a light to which charges are fitted, at most.
 MOST_FITTED_POINTS = 30
 TOLERANCE = 0.02
@@ -68,6 +76,12 @@ def largest_rate(request: Request) -> float:
     return _largest_rate([medium for body in request.bodies for medium in body.by_label.values()])
 
 
+def error_in_diffuse_light(request: Request, charges: float) -> float:
+    """Relative L2 error of so many charges under diffuse light."""
+    squares = request.surface.area * largest_rate(request) ** 2
+    return float(ERROR_OF_DIFFUSE * (squares / charges) ** RATE_OF_DIFFUSE)
+
+
 def kind_of_light(request: Request) -> str:
     """The kind of the light that needs most tetrahedra."""
     every = [deposit for some in request.deposits for deposit in some]
@@ -83,11 +97,20 @@ def tetrahedra_of(request: Request, deposit: Deposit) -> float:
     if kind == "spot":
         return OF_SPOT * float(ratio**RATE_OF_SPOT) + _squares_of_entry(deposit) * OF_ENTRY
     if kind == "beam":
-        return _squares_of_entry(deposit) * OF_ENTRY * max(1.0, TOLERANCE_OF_ENTRY / TOLERANCE * ratio)
+        of_entry = _squares_of_entry(deposit) * OF_ENTRY * max(1.0, TOLERANCE_OF_ENTRY / TOLERANCE * ratio)
+        return max(of_entry, SHARE_OF_BEAM * _of_layer(request, ratio))
     if kind == "layer":
-        outer = [body.outer for body in request.bodies]
-        return OF_LAYER * request.surface.area * _largest_rate(outer) ** 2 * ratio
+        return _of_layer(request, ratio)
+    if kind == "fitted" and np.any(deposit.terms.irradiance):
+        left = error_in_diffuse_light(request, MOST_CHARGES_WITH_FEM) * ratio / TOLERANCE
+        return SHARE_OF_FITTED * min(left, 1.0) * _of_layer(request, ratio)
     return 0.0
+
+
+def _of_layer(request: Request, ratio: float) -> float:
+    """Tetrahedra of the layer of the whole surface in which light fades."""
+    outer = [body.outer for body in request.bodies]
+    return OF_LAYER * request.surface.area * _largest_rate(outer) ** 2 * ratio
 
 
 def _kind(request: Request, deposit: Deposit) -> str:
