@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.error.estimate import Estimate
 from tetlux.fem.quadratic.reading_error import ReadingError
-from tetlux.meshing.arrays import IntArray
+from tetlux.meshing.arrays import FloatArray, IntArray
 from tetlux.meshing.errors import InputError
 
 # Share of their error that splitting tetrahedra is assumed to remove.
@@ -15,6 +15,9 @@ ERROR_REMOVED_SHARE = 0.4
 LEAST_SPLIT_SHARE = 0.3
 # Tetrahedra that hold at most this share of the error are split at once.
 LARGEST_SPLIT_SHARE = 0.8
+# Rounds of splitting before the next solution: with two, meshes are as large as with one, and half as many are solved
+# on; three overshoot.
+MOST_ROUNDS = 2
 # The error of the exitance that refinement aims at, as a share of the tolerance.
 AIM_SHARE = 0.65
 # The error of the total exited power that refinement aims at, as a share of the tolerance.
@@ -57,15 +60,24 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
     ]
     splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
     for indicators, aim, often in wanted:
-        error = float(indicators.sum())
-        if error <= REFINE_ABOVE * aim:
-            continue
-        part = float(np.clip((1.0 - aim / error) / ERROR_REMOVED_SHARE, LEAST_SPLIT_SHARE, LARGEST_SPLIT_SHARE))
-        order = np.argsort(-indicators)
-        reached = np.cumsum(indicators[order])
-        chosen = order[: int(np.searchsorted(reached, part * reached[-1])) + 1]
-        splits[chosen] = np.maximum(splits[chosen], often[chosen])
+        splits = np.maximum(splits, often * _rounds(indicators, aim))
     return splits
+
+
+def _rounds(indicators: FloatArray, aim: float) -> IntArray:
+    """How many rounds split each tetrahedron, (m,), so that the sum of indicators (m,) is expected to be `aim`."""
+    left, rounds = np.array(indicators), np.zeros(len(indicators), dtype=np.int64)
+    for _ in range(MOST_ROUNDS):
+        error = float(left.sum())
+        if error <= REFINE_ABOVE * aim:
+            break
+        part = float(np.clip((1.0 - aim / error) / ERROR_REMOVED_SHARE, LEAST_SPLIT_SHARE, LARGEST_SPLIT_SHARE))
+        order = np.argsort(-left)
+        reached = np.cumsum(left[order])
+        chosen = order[: int(np.searchsorted(reached, part * reached[-1])) + 1]
+        left[chosen] *= 1.0 - ERROR_REMOVED_SHARE
+        rounds[chosen] += 1
+    return rounds
 
 
 def splits_for_readings(readings: Iterable[ReadingError], tolerance: float, cells: int) -> IntArray:
