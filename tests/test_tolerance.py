@@ -1,11 +1,15 @@
 """The tolerance is met, and the estimate is honest, on bodies that have a closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.benchmarks.scenes import SCENES
 from tetlux.fem import PointSource, System, solve, solve_each
 from tetlux.fem.body.body import Body
+from tetlux.fem.error.estimate import Estimate
+from tetlux.fem.error.tolerance import cells_to_split
 from tetlux.fem.known.split import split_lights
 from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing import Surface, TetMesh, refine, sphere
@@ -32,6 +36,21 @@ def test_a_smaller_tolerance_costs_what_second_order_costs() -> None:
     assert scene.error(fine) <= 0.002
     # Measured: 14 times for a tolerance ten times smaller.
     assert len(fine.mesh.points) < 10**1.5 * len(coarse.mesh.points)
+
+
+@pytest.mark.parametrize(("error", "most"), [(0.006, 0), (0.008, 1), (0.5, 2)])
+def test_tetrahedra_are_split_as_often_as_the_error_asks_for(error: float, most: int) -> None:
+    """Of those that have half of it each is split, of the others few or none."""
+    large = np.arange(100) < 5
+    indicators = error * np.where(large, 0.1, 0.5 / 95.0)
+    none = np.zeros(100)
+    once = Estimate(indicators, none, np.ones(100, dtype=np.int64), np.zeros((0, 2)))
+    splits = cells_to_split([once], 0.01)
+    assert splits.max() == most
+    assert (splits[large] == most).all()
+    assert (splits[~large] < max(most, 1)).any()
+    # What has to be split three times at once is not split six times.
+    assert cells_to_split([replace(once, splits=3 * once.splits)], 0.01).max() == (3 if most else 0)
 
 
 def test_every_scene_of_several_meets_the_tolerance(ball: Surface) -> None:

@@ -54,13 +54,13 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
         aim
         for estimate in estimates
         for aim in (
-            (estimate.exitance_indicators, AIM_SHARE * tolerance, np.minimum(estimate.splits, MOST_SPLITS)),
+            (estimate.exitance_indicators, AIM_SHARE * tolerance, estimate.splits),
             (estimate.power_indicators, POWER_AIM_SHARE * tolerance, np.ones_like(estimate.splits)),
         )
     ]
     splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
     for indicators, aim, often in wanted:
-        splits = np.maximum(splits, often * _rounds(indicators, aim))
+        splits = np.maximum(splits, np.minimum(often * _rounds(indicators, aim), MOST_SPLITS))
     return splits
 
 
