@@ -271,10 +271,8 @@ def _make_surface(shape: Shape, points: FloatArray, faces: IntArray, unit: str) 
 
 def _is_regular(points: FloatArray, faces: IntArray) -> bool:
     """Whether triangles of a shape are so even, and so near to the origin, that a check of them finds nothing."""
-    sides = np.ptp(points, axis=0)
-    if not (ORDINARY[0] < sides.min() and np.abs(points).max() < ORDINARY[1] and sides.min() > FLATTEST * sides.max()):
-        return False
-    if np.abs(points).max() > FARTHEST * sides.min():
+    sides, far = np.ptp(points, axis=0), np.abs(points).max()
+    if sides.min() < max(ORDINARY[0], FLATTEST * sides.max(), far / FARTHEST) or far > ORDINARY[1]:
         return False
     longest = longest_sides(points[faces])
     return bool((triangle_areas(points, faces)[1] > NARROWEST * longest**2).all())

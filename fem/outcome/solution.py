@@ -178,9 +178,7 @@ class Solution(Shown):
         if np.ndim(transmitted) > 0:
             transmitted = (np.asarray(transmitted)[self.mesh.boundary_triangles[face]] * weights).sum(axis=1)
         fluence = interpolate(self.fluence, self.patches, queries, cells, corners, weights)
-        is_far = np.ones(len(queries), dtype=bool)
-        for patch in self.patches:
-            is_far &= ~patch.cells[cells]
+        is_far = ~np.any([np.zeros(len(queries), bool), *(patch.cells[cells] for patch in self.patches)], axis=0)
         if is_far.any():
             fluence[is_far] = follow_fading(fluence[is_far], self.fluence[corners[is_far]], weights[is_far])
         linear = self.boundary_condition.exitance(fluence, transmitted)
