@@ -56,7 +56,13 @@ def main() -> None:
     begin = time.process_time()
     times = np.union1d(np.geomspace(0.05, 2.2, 300), [0.05, 0.1, 0.2, 0.5, 1.0, 2.0])
     pulse = solve(
-        ball, TISSUE, light, times=(1e-9 * times).tolist(), detectors=detectors, tolerance=None, detector_tolerance=0.003
+        ball,
+        TISSUE,
+        light,
+        times=(1e-9 * times).tolist(),
+        detectors=detectors,
+        tolerance=None,
+        detector_tolerance=0.003,
     )
     _print_pulse(pulse, times, angles, time.process_time() - begin)
     before = np.geomspace(0.005, 0.05, 80)
