@@ -143,6 +143,8 @@ def _solve_with_charges(case: Case, report: Report) -> list[ChargeSolution]:
             detectors=[entry.detector for entry in case.detectors] if case.detector_tolerance else (),
             detector_tolerance=case.detector_tolerance,
             model="charges",
+            frequency=channel.frequency,
+            outside_index=case.outside_index,
         )
         where = f"{channel.name}: " if len(case.channels) > 1 else ""
         report(f"{where}fitted {solution.charges:,} charges: estimated error {solution.error_estimate:.2%}")

@@ -217,8 +217,8 @@ def solve(
         The method: all solve the diffusion approximation. "full" solves by finite elements. "charges" fits screened
         charges outside the body to its boundary condition and makes no mesh, see `tetlux.fem.charges`. It takes points,
         beams that are points, and diffuse light, in one homogeneous medium and in homogeneous regions; of the other
-        arguments it takes `regions`, `tolerance`, `detectors`, `detector_tolerance` and, without regions, `frequency`,
-        and refuses the rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with
+        arguments it takes `regions`, `tolerance`, `detectors`, `detector_tolerance` and `frequency`, and refuses the
+        rest. "closed-form" is the exact series of balls and slabs of one homogeneous medium, with
         points, beams that are points, and in balls diffuse light; it takes `tolerance` and `detectors`.
         "truncated" solves by finite elements on the part that light reaches, of bodies of any size, see
         `tetlux.fem.truncated`. "auto" takes the fastest of these that gives what is asked for, see `tetlux.fem.plan`.

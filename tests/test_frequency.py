@@ -221,9 +221,18 @@ def test_charges_alone_solve_for_modulated_light(frequency: float) -> None:
     assert solution.frequency == frequency
 
 
-def test_charges_alone_refuse_a_frequency_in_regions() -> None:
-    with pytest.raises(InputError, match='model "charges" takes a frequency in a body without regions only'):
-        solve(sphere(10.0), TISSUE, SOURCE, regions=[Region(sphere(5.0), TISSUE)], model="charges", frequency=1e8)
+def test_charges_in_regions_are_what_finite_elements_have() -> None:
+    """Readings, and power that each region stores for a while; .005 is .3 degrees."""
+    core = Region(sphere(5.0, center=(0.0, 1.0, 0.0)), Medium(sigma_a=0.04, sigma_s_prime=1.4, eta=1.4))
+    options = {"regions": [core], "frequency": 500e6, "detectors": DETECTORS[1:], "detector_tolerance": 0.005}
+    charges = solve(sphere(10.0), TISSUE, SOURCE, model="charges", **options)  # type: ignore[call-overload]
+    elements = solve(sphere(10.0), TISSUE, SOURCE, **options)  # type: ignore[call-overload]
+    found, expected = readings(charges), readings(elements)
+    assert abs(found) == pytest.approx(abs(expected), rel=0.01)
+    assert lags(found) == pytest.approx(lags(expected), abs=0.3)
+    for name in ("absorbed", "exited", "stored"):
+        assert getattr(charges.power, name) == pytest.approx(getattr(elements.power, name), rel=0.01)
+    assert abs(charges.power.balance_error) < 1e-3
 
 
 def test_modulation_that_is_too_fast_for_diffusion_is_reported() -> None:

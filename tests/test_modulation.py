@@ -130,8 +130,16 @@ def test_the_planner_takes_a_mesh(tmp_path: Path) -> None:
     assert summary["detectors"][0]["phase"] == pytest.approx(11.118, abs=0.1)
 
 
-def test_charges_alone_refuse_modulation(tmp_path: Path) -> None:
-    text = CASE.replace("FREQUENCY", "1e8").replace("tolerance: {exitance: 0.05, detectors: 0.01}", "model: charges")
-    (tmp_path / "ball.yaml").write_text(text)
-    with pytest.raises(InputError, match='modulation needs finite elements, which model "charges" does not use'):
-        load_cases(tmp_path / "ball.yaml")
+def test_charges_alone_read_modulated_light(tmp_path: Path) -> None:
+    """And the closed form of steady light does not."""
+    text = CASE.replace("FREQUENCY", "1e8").replace("exitance: 0.05, detectors: 0.01", "detectors: 0.005")
+    path = tmp_path / "ball.yaml"
+    path.write_text(text + "model: charges\noutputs: [surface]\n")
+    assert main(["run", str(path), "--out", str(tmp_path), "--quiet", "--jobs", "1"]) == 0
+    summary = json.loads((tmp_path / "ball" / "summary.json").read_text())
+    assert summary["model"] == "charges"
+    assert summary["detectors"][0]["phase"] == pytest.approx(11.118, abs=0.1)
+    assert summary["channels"][0]["power"]["stored"] > 0.05
+    path.write_text(text.replace("detectors: 0.005", "exitance: 0.01") + "model: closed-form\n")
+    with pytest.raises(InputError, match='modulation needs finite elements, which model "closed-form" does not use'):
+        load_cases(path)

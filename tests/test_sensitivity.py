@@ -27,10 +27,10 @@ from tetlux.fem.known.split import Subtract
 from tetlux.fem.lights import Light
 from tetlux.fem.lights.places import MovedLight, at_place, place_of
 from tetlux.fem.outcome.detectors import read_all
+from tetlux.fem.sensitivity.nearby import Coefficient, change_medium
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
 from tetlux.fem.sensitivity.products import multiply
 from tetlux.fem.sensitivity.sensitivity import check_readings
-from tetlux.fem.sensitivity.subtracted import Coefficient, change_medium
 from tetlux.meshing import InputError, Surface, TetMesh, sphere, tetrahedralize
 from tetlux.meshing.arrays import NumberArray
 

@@ -56,13 +56,13 @@ def charge_solution(
     most : int
         Approximate number of charges at which fitting ends in any case.
     shift : complex
-        What is added to sigma_a, 1/unit, in a body without regions: 0 for steady light.
+        What is added to sigma_a, 1/unit: 0 for steady light.
 
     Returns
     -------
     ChargeSolution
     """
-    sources = powers.sum(axis=0)
+    sources = powers.sum(axis=0)[None]
     if not inner:
         transmitted, condition = np.array([ledger.transmitted for ledger in ledgers]), boundary_condition_of(medium)
         boundary_source = np.asarray(condition.inflow(transmitted))
@@ -78,7 +78,7 @@ def charge_solution(
         samples, interface = fitted.placement.fitted, Interface(surface, 0, None)
         given = (interface,), (fitted.field,), (samples,), sources, tuple(ledgers), fitted.errors
         return ChargeSolution(surface, medium, *given, goal=goal)
-    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, readings, most)
+    return _in_regions(surface, medium, points, powers, ledgers, inner, tolerance, readings, most, shift)
 
 
 def _in_regions(
@@ -91,6 +91,7 @@ def _in_regions(
     tolerance: float | None,
     readings: tuple[FloatArray, float] | None,
     most: int,
+    shift: complex,
 ) -> ChargeSolution:
     """Fit charges in a body with regions until the tolerances are met, also by the power that the ledger lacks."""
     surfaces = [each for each, _ in inner]
@@ -98,14 +99,15 @@ def _in_regions(
     interfaces = [Interface(surface, 0, None)]
     interfaces += [Interface(own, region, parents[region - 1]) for region, own in enumerate(surfaces, 1)]
     light = RegionSources(points, region_at(points, surfaces), powers)
-    equations = [equation_of(each) for each in (medium, *(medium for _, medium in inner))]
+    of_regions = np.array([powers[light.regions == region].sum(axis=0) for region in range(len(inner) + 1)])
+    equations = [equation_of(each, shift) for each in (medium, *(medium for _, medium in inner))]
     goal = None
     if readings is not None:
         goal = reading_goal(surface, equations[0], points, powers.sum(axis=1), 0.0, *readings)
 
     def solved(fit: FittedRegions) -> ChargeSolution:
         samples_of_all = tuple(each.placement.fitted for each in fit.placements)
-        given = tuple(interfaces), fit.fields, samples_of_all, powers.sum(axis=0), tuple(ledgers), fit.errors
+        given = tuple(interfaces), fit.fields, samples_of_all, of_regions, tuple(ledgers), fit.errors
         return _with_imbalance(ChargeSolution(surface, medium, *given, goal=goal))
 
     found: ChargeSolution | None = None

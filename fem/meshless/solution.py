@@ -64,8 +64,8 @@ class ChargeSolution(Shown):
         In the region around all others, and in regions 1, 2, ...; each with a column of strengths for each light.
     samples : tuple of Samples
         Points of each interface at which charges were fitted.
-    sources : (s,) ndarray
-        Power of the point sources of each light, W.
+    sources : (r, s) ndarray
+        Power of the point sources of each light in each region, W.
     ledgers : tuple of LightLedger
         The ledger of each light.
     errors : ErrorEstimates
@@ -205,7 +205,7 @@ class ChargeSolution(Shown):
         return replace(
             self,
             fields=fields,
-            sources=self.sources[[light]],
+            sources=self.sources[:, [light]],
             ledgers=(self.ledgers[light],),
             errors=ErrorEstimates(np.nan, np.nan),
             warnings=[],
@@ -221,15 +221,17 @@ class ChargeSolution(Shown):
         sources plus the net inflow of each region. The ledger balances as far as the interface conditions hold.
         """
         area, diffused, inflow = self._flows
-        taken, shift = float(self.sources.sum()) + inflow, self.fields[0].equation.shift
-        stored = taken * shift / (self.medium.sigma_a + shift) if shift else 0.0
+        taken = self.sources.sum(axis=1) + inflow
+        removals = np.array([each.equation.wave_number**2 * each.equation.diffusion for each in self.fields])
+        shift = self.fields[0].equation.shift
+        stored = (taken * shift / removals).sum().item() if shift else 0.0
         known = [ledger.ledger for ledger in self.ledgers]
         irradiance = sum(ledger.irradiance for ledger in self.ledgers)
         transmitted = sum(ledger.transmitted for ledger in self.ledgers)
         return Power(
             incident=sum(each.incident for each in known) + area * irradiance,
             specular=sum(each.specular for each in known) + area * (irradiance - transmitted),
-            absorbed=sum(each.absorbed for each in known) + taken - stored,
+            absorbed=sum(each.absorbed for each in known) + taken.sum().item() - stored,
             exited=diffused + area * self._unscattered,
             ballistic=sum(each.ballistic for each in known),
             stored=stored,
@@ -241,19 +243,18 @@ class ChargeSolution(Shown):
         return self._flows[0]
 
     @cached_property
-    def _flows(self) -> tuple[float, Number, Number]:
-        """Area of the body, integral of ``phi/(2A)`` over it, and the net inflow of all regions, unit² and W."""
+    def _flows(self) -> tuple[float, Number, NumberArray]:
+        """Area of the body, integral of ``phi/(2A)`` over it, and the net inflow of each region (r,), unit² and W."""
         diffused: Number
-        inflow: Number
-        area, diffused, inflow = 0.0, 0.0, 0.0
+        area, diffused, inflow = 0.0, 0.0, np.zeros(len(self.fields), self.fields[0].equation.dtype)
         for interface, (points, _) in zip(self.interfaces, self._quadratures, strict=True):
             exitance, residual = self._sums[interface.inside].exitance_and_residual(points.points, points.normals)
-            inflow += (points.areas @ (residual - exitance)).item()
+            inflow[interface.inside] += points.areas @ (residual - exitance)
             if interface.outside is None:
                 area, diffused = float(points.areas.sum()), (points.areas @ exitance).item()
             else:
                 exitance, residual = self._sums[interface.outside].exitance_and_residual(points.points, points.normals)
-                inflow -= (points.areas @ (residual - exitance)).item()
+                inflow[interface.outside] -= points.areas @ (residual - exitance)
         return area, diffused, inflow
 
     @cached_property

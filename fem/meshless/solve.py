@@ -74,7 +74,7 @@ def solve_with_charges(
     most : int
         Charges at which fitting ends even if the tolerance is not met; the solution then carries a warning.
     frequency : float
-        Of modulated light, Hz, in a body without regions; 0 for steady light.
+        Of modulated light, Hz; 0 for steady light.
     outside_index : float
         Refractive index of what surrounds the body.
 
@@ -108,7 +108,7 @@ def solve_with_charges(
         check_regions(surface, [each for each, _ in inner])
         whole = Body(surface, (body, *(each for _, each in inner)), SurfacePartition([each for each, _ in inner]))
         check_media(whole)
-        shift = _shift_of(frequency, whole, outside_index)
+        shift = shift_of_frequency(frequency, body, surface.unit, outside_index)
         deposits = [light.deposit_in(whole) for light in lights]
         for light, deposit in zip(lights, deposits, strict=True):
             check_deposit(light, deposit, whole, [each for each, _ in inner])
@@ -135,7 +135,7 @@ def solve_with_charges(
         solution = replace(solution, readings=read_all(detectors, solution))
     warnings = [*surface.warnings, *(warning for deposit in deposits for warning in deposit.warnings)]
     warnings += _notes_on_tolerances(solution, tolerance, detector_tolerance)
-    warnings += notes_on_frequency(frequency, shift, [body])
+    warnings += notes_on_frequency(frequency, shift, [body, *(own for _, own in inner)])
     if tolerance is not None and shift == 0:
         warnings += _below_zero(solution)
     return replace(solution, seconds=watch.read(), warnings=list(dict.fromkeys(warnings)))
@@ -156,21 +156,6 @@ def _check_arguments(
     check_lights(lights)
     if len(lights) == 0:
         raise InputError("there is no light; give at least one.")
-
-
-def _shift_of(frequency: float, body: Body, outside_index: float) -> complex:
-    """What modulation adds to sigma_a, 1/unit.
-
-    Raises
-    ------
-    InputError
-    """
-    shift = shift_of_frequency(frequency, body.outer, body.surface.unit, outside_index)
-    if shift != 0 and body.only_medium is None:
-        raise InputError(
-            f'model "charges" takes a frequency in a body without regions only; leave it out, or {_INSTEAD}'
-        )
-    return shift
 
 
 def _point_sources(deposits: Sequence[Deposit]) -> tuple[FloatArray, FloatArray]:

@@ -233,8 +233,11 @@ class QuadraticOperator:
 
 
 def _in_order(matrix: csr_array, order: IntArray) -> csr_array:
-    """A matrix with rows and columns in another order; columns of a row are not sorted."""
+    """A matrix with rows and columns in another order."""
     rows = csr_array(matrix[order])
     places = np.empty(len(order), dtype=rows.indices.dtype)
     places[order] = np.arange(len(order))
-    return csr_array((rows.data, places[rows.indices], rows.indptr), shape=matrix.shape)
+    found = csr_array((rows.data, places[rows.indices], rows.indptr), shape=matrix.shape)
+    # Products with columns in their order take four fifths of the time.
+    found.sort_indices()
+    return found

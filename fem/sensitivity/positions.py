@@ -6,7 +6,8 @@ import numpy as np
 
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.lights.places import free_direction, move_to, place_of
-from tetlux.fem.sensitivity.subtracted import STEP, WEIGHTS, Nearby, Readout, charges_of
+from tetlux.fem.sensitivity.nearby import STEP, WEIGHTS, Nearby, charges_of
+from tetlux.fem.sensitivity.subtracted import Readout
 from tetlux.fem.sources.light import Light
 from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.errors import InputError

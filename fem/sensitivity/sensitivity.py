@@ -1,7 +1,7 @@
 """`sensitivity`: derivatives of what detectors read to the coefficients of a body."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,15 +13,15 @@ from tetlux.fem.models.diffusion import is_diffusion
 from tetlux.fem.outcome.detector_kinds import Detector
 from tetlux.fem.outcome.detectors import MOST_TETRAHEDRA_TO_READ, place_detector
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
-from tetlux.fem.quadratic.operator import STOP_RESIDUAL
 from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.quadratic.solution import QuadraticSolution
 from tetlux.fem.sensitivity.entry_paths import entry_shares
 from tetlux.fem.sensitivity.near_sources import missing_charges
+from tetlux.fem.sensitivity.nearby import Coefficient
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
 from tetlux.fem.sensitivity.positions import check_places, derivatives_to_places
 from tetlux.fem.sensitivity.products import multiply
-from tetlux.fem.sensitivity.subtracted import Coefficient, Readout
+from tetlux.fem.sensitivity.subtracted import Readout
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
@@ -29,6 +29,9 @@ from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
 
 COEFFICIENTS: tuple[Coefficient, ...] = ("sigma_a", "sigma_s_prime")
+# Relative residual at which iterations stop: readings are corrected by the product of those of lights and duals, and
+# derivatives are off by about one of them. Iterations to 1e-10 are a quarter more.
+STOP_RESIDUAL = 1e-8
 # A reading below this share of the brightest place of the surface is rounding.
 RESOLVED = 1e-14
 
@@ -139,7 +142,7 @@ def sensitivity(
     shares = media if per == "region" else parameter_shares(system.mesh, numbers, per)
     solution = system.solve(lights, subtract=subtract)
     assert solution.quadratic is not None
-    scene = solution.quadratic.scene
+    scene = replace(solution.quadratic.scene, stop_residual=STOP_RESIDUAL)
     measured = [scene.operator.discretise(place_detector(each, solution).measurement) for each in detectors]
     _check_layers(scene, measured)
     duals = scene.operator.solve(np.column_stack([each.load for each in measured]), STOP_RESIDUAL)

@@ -5,9 +5,8 @@ and strengths of charges are differentiated by central differences, their fields
 (`tetlux.fem.charges.derivative`). No system is solved for that.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,14 +17,27 @@ from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.kept_fits import fits_of
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.known.split import SplitLights, Subtract, split_lights
-from tetlux.fem.media.coefficients import AnyMedium, at_cells, by_label
-from tetlux.fem.media.medium import Medium
-from tetlux.fem.media.varying import VaryingMedium
+from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.quadratic.loads import line_load, point_load, quadratic_load
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
 from tetlux.fem.quadratic.patches import QuadraticPatch, field_load, interpolant_of
 from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.quadratic.solution import QuadraticSolution
+from tetlux.fem.sensitivity.nearby import (
+    SHORTENINGS,
+    SHORTER,
+    STEP,
+    STEP_OF_PAIR,
+    WEIGHTS,
+    WEIGHTS_OF_PAIR,
+    Coefficient,
+    Nearby,
+    change_medium,
+    charges_of,
+    every_charges,
+    has_rest,
+    power_change,
+)
 from tetlux.fem.sensitivity.products import multiply_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
@@ -33,47 +45,6 @@ from tetlux.fem.system import System
 from tetlux.meshing.arrays import Number, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
-
-Coefficient = Literal["sigma_a", "sigma_s_prime"]
-# Step of central differences of four points, as a share of the coefficient, and how it is shortened where a charge
-# comes or goes: those of images do at some ratios of coefficients.
-STEP = 2e-3
-SHORTER, SHORTENINGS = 0.1, 3
-# Weights of the values one and two steps to each side (Fornberg 1988).
-WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
-# Positions and strengths that differ by less than this share are the same.
-SAME = 1e-13
-
-
-def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
-    """A system with a coefficient of one medium larger by a step, 1/unit."""
-    changed = dict(by_label(system.media))
-    changed[label] = _add(changed[label], coefficient, step)
-    if isinstance(system.medium, Mapping):
-        return replace(system, medium=changed)
-    regions = tuple(replace(region, medium=changed[number]) for number, region in enumerate(system.regions, 1))
-    return replace(system, medium=changed[0], regions=regions)
-
-
-def _add(medium: AnyMedium, coefficient: Coefficient, step: float) -> AnyMedium:
-    if isinstance(medium, VaryingMedium):
-        varying, base = getattr(medium, coefficient), _add(medium.base, coefficient, step)
-        assert isinstance(base, Medium)
-        return replace(medium, base=base, **({} if varying is None else {coefficient: lambda at: varying(at) + step}))
-    if coefficient == "sigma_s_prime" and medium.sigma_s is not None:
-        return replace(medium, sigma_s=medium.sigma_s + step / (1.0 - medium.mean_cosine))
-    if coefficient == "sigma_s_prime":
-        return replace(medium, sigma_s_prime=medium.reduced_scattering + step)
-    return replace(medium, sigma_a=medium.sigma_a + step)
-
-
-@dataclass(frozen=True, eq=False)
-class Nearby:
-    """Lights in a medium that is a little different, one of some, with a weight of the value for differences."""
-
-    weight: float
-    system: System
-    split: SplitLights
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +90,11 @@ class Readout:
     def derivative(self, label: int, coefficient: Coefficient) -> NumberArray:
         """Derivative of readings to the coefficient of a medium by loads and charges alone, (l, d), W/unit."""
         found = np.zeros((len(self.lights), len(self.measurements)), self.scene.fluence.dtype)
-        step = STEP * self._least(label, coefficient)
-        if step == 0:
+        least = self._least(label, coefficient)
+        if least == 0:
             # Where nothing is absorbed a charge has no derivative, while readings do: that of the mesh is left.
             return found
-        nearby = self._nearby(label, coefficient, step)
+        nearby = self._nearby(label, coefficient, least)
         if label not in self._products:
             self._products[label] = self._multiply(label)
         of_matrix = self._products[label]
@@ -141,14 +112,18 @@ class Readout:
         map_in_threads(work, range(len(self.lights)))
         return found
 
-    def _nearby(self, label: int, coefficient: Coefficient, step: float) -> list[Nearby]:
+    def _nearby(self, label: int, coefficient: Coefficient, least: float) -> list[Nearby]:
         """The lights with a coefficient a few steps away on both sides, as near as no charge comes or goes."""
+        if any(patch.is_fitted for own in self.scene.patches for patch in own):
+            step, weights = STEP * least, WEIGHTS
+        else:
+            step, weights = STEP_OF_PAIR * least, WEIGHTS_OF_PAIR
         for _ in range(SHORTENINGS):
-            found = []
-            for steps, weight in WEIGHTS.items():
+            found: list[Nearby] = []
+            for steps, weight in weights.items():
                 changed = change_medium(self.system, label, coefficient, steps * step)
                 found.append(Nearby(weight / step, changed, self.split(self.lights, changed)))
-            counts = {tuple(len(each.positions) for each in _every_charges(one.split)) for one in found}
+            counts = {tuple(len(each.positions) for each in every_charges(one.split)) for one in found}
             if len(counts) == 1:
                 break
             step *= SHORTER
@@ -176,7 +151,7 @@ class Readout:
     def of_load(self, nearby: Sequence[Nearby], light: int) -> NumberArray:
         """Derivative of ``z.b`` of what is not subtracted of a light of theirs, (d,)."""
         rest = [each.split.remaining[light] for each in nearby]
-        if not any(len(one.terms.points) or len(one.terms.segments) or one.on_mesh is not None for one in rest):
+        if not any(has_rest(one) for one in rest):
             return np.zeros(len(self.measurements))
         space, load = self.scene.operator.space, np.zeros(self.scene.operator.space.size)
         for each, remaining in zip(nearby, rest, strict=True):
@@ -199,7 +174,7 @@ class Readout:
             points = [(each.positions[: each.sources], each.strengths[: each.sources].real) for each in charges]
             loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
             return np.asarray(np.sum(loads, axis=0) @ self.duals)
-        if own is None and (change := _power_change(patch.charges, charges, weights)) is not None:
+        if own is None and (change := power_change(patch.charges, charges, weights)) is not None:
             value = known.load @ self.duals
             value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
             return np.asarray(change * value)
@@ -246,16 +221,6 @@ def _read_missing(
     return discrete.scale * (weights @ (field.fluence(points) - discrete.values(interpolant)[inside])).item()
 
 
-def charges_of(split: SplitLights, light: int) -> list[Charges]:
-    """The charges of a light, in the order of its patches."""
-    found = [charges for charges, owner in zip(split.charges, split.owners, strict=True) if owner == light]
-    return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
-
-
-def _every_charges(split: SplitLights) -> list[Charges]:
-    return [*split.charges, *(each.charges for each in split.fitted.values())]
-
-
 def _differentiate(
     known: Charges, nearby: Sequence[Charges], weights: Sequence[float], coefficient: Coefficient | None
 ) -> ChargeDerivative:
@@ -273,17 +238,3 @@ def _differentiate(
     if coefficient == "sigma_a":
         of_wave_number += 0.5 / (k * diffusion)
     return ChargeDerivative(known, positions, strengths, of_wave_number, of_diffusion, closest)
-
-
-def _power_change(known: Charges, nearby: Sequence[Charges], weights: Sequence[float]) -> float | None:
-    """The relative derivative of power where nothing else of charges changes; None if anything does."""
-    change = 0.0
-    for weight, each in zip(weights, nearby, strict=True):
-        power = (each.strengths[0] / known.strengths[0]).item()
-        change += weight * power
-        if not (
-            np.allclose(each.positions, known.positions, rtol=SAME, atol=0.0)
-            and np.allclose(each.strengths, power * known.strengths, rtol=SAME, atol=0.0)
-        ):
-            return None
-    return change

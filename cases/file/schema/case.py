@@ -163,7 +163,7 @@ class CaseSpec(Section):
                 ("mesh", "a mesh", self.mesh),
                 ("outputs", "volume", "volume" in self.outputs),
                 ("compare", "compare", self.compare),
-                ("modulation", "modulation", self.modulation),
+                ("modulation", "modulation", self.modulation and self.model != "charges"),
             ):
                 if given:
                     raise PydanticCustomError(

@@ -1,0 +1,88 @@
+"""Lights and media a little different, for differences of what charges and loads follow from."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from tetlux.fem.known.charges import Charges
+from tetlux.fem.known.split import SplitLights
+from tetlux.fem.media.coefficients import AnyMedium, by_label
+from tetlux.fem.media.medium import Medium
+from tetlux.fem.media.varying import VaryingMedium
+from tetlux.fem.sources.deposit import Deposit
+from tetlux.fem.system import System
+
+Coefficient = Literal["sigma_a", "sigma_s_prime"]
+# Step of central differences of four points, as a share of the coefficient, and how it is shortened where a charge
+# comes or goes: those of images do at some ratios of coefficients.
+STEP = 2e-3
+SHORTER, SHORTENINGS = 0.1, 3
+# Weights of the values one and two steps to each side (Fornberg 1988).
+WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
+# Places and strengths that are not fitted have less rounding, and two points closer together are accurate enough.
+STEP_OF_PAIR, WEIGHTS_OF_PAIR = 2e-4, {1.0: 0.5, -1.0: -0.5}
+# Positions and strengths that differ by less than this share are the same.
+SAME = 1e-13
+
+
+@dataclass(frozen=True, eq=False)
+class Nearby:
+    """Lights in a medium that is a little different, one of some, with a weight of the value for differences."""
+
+    weight: float
+    system: System
+    split: SplitLights
+
+
+def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
+    """A system with a coefficient of one medium larger by a step, 1/unit."""
+    changed = dict(by_label(system.media))
+    changed[label] = _add(changed[label], coefficient, step)
+    if isinstance(system.medium, Mapping):
+        return replace(system, medium=changed)
+    regions = tuple(replace(region, medium=changed[number]) for number, region in enumerate(system.regions, 1))
+    return replace(system, medium=changed[0], regions=regions)
+
+
+def _add(medium: AnyMedium, coefficient: Coefficient, step: float) -> AnyMedium:
+    if isinstance(medium, VaryingMedium):
+        varying, base = getattr(medium, coefficient), _add(medium.base, coefficient, step)
+        assert isinstance(base, Medium)
+        return replace(medium, base=base, **({} if varying is None else {coefficient: lambda at: varying(at) + step}))
+    if coefficient == "sigma_s_prime" and medium.sigma_s is not None:
+        return replace(medium, sigma_s=medium.sigma_s + step / (1.0 - medium.mean_cosine))
+    if coefficient == "sigma_s_prime":
+        return replace(medium, sigma_s_prime=medium.reduced_scattering + step)
+    return replace(medium, sigma_a=medium.sigma_a + step)
+
+
+def has_rest(deposit: Deposit) -> bool:
+    """Whether a deposit has points or beams, or anything that only a mesh tells."""
+    return len(deposit.terms.points) > 0 or len(deposit.terms.segments) > 0 or deposit.on_mesh is not None
+
+
+def charges_of(split: SplitLights, light: int) -> list[Charges]:
+    """The charges of a light, in the order of its patches."""
+    found = [charges for charges, owner in zip(split.charges, split.owners, strict=True) if owner == light]
+    return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
+
+
+def every_charges(split: SplitLights) -> list[Charges]:
+    """The charges of all lights."""
+    return [*split.charges, *(each.charges for each in split.fitted.values())]
+
+
+def power_change(known: Charges, nearby: Sequence[Charges], weights: Sequence[float]) -> float | None:
+    """The relative derivative of power where nothing else of charges changes; None if anything does."""
+    change = 0.0
+    for weight, each in zip(weights, nearby, strict=True):
+        power = (each.strengths[0] / known.strengths[0]).item()
+        change += weight * power
+        if not (
+            np.allclose(each.positions, known.positions, rtol=SAME, atol=0.0)
+            and np.allclose(each.strengths, power * known.strengths, rtol=SAME, atol=0.0)
+        ):
+            return None
+    return change
