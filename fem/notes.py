@@ -57,23 +57,44 @@ def notes_on(solution: Solution, split: SplitLights, tolerance: float | None, wh
 
 
 def notes_on_readings(readings: Sequence[Reading], tolerance: float | None, where: str) -> list[Note]:
-    """A note on the readings that miss their tolerance, if there are any."""
+    """Notes on readings that are less than their error, and on others that miss their tolerance."""
     errors = [reading.relative_error for reading in readings]
-    if tolerance is None:
-        return []
-    missed = [number for number, error in enumerate(errors, 1) if error is None or not error <= tolerance]
-    if not missed:
-        return []
-    worst = max((error for error in errors if error is not None), default=np.inf)
-    which = f"{'reading' if len(missed) == 1 else 'readings'} {', '.join(map(str, missed))}"
-    return [
-        Note(
-            "detector-tolerance-missed",
-            f"the tolerance of {tolerance:g} for detectors was not met by "
-            f"{which}: the largest estimated error is {worst:.2g}, {where}.",
-            value=float(worst),
+    dark = [number for number, error in enumerate(errors, 1) if error is not None and not error < 1.0]
+    notes = []
+    if dark:
+        is_, it, they = ("is", "it", "it") if len(dark) == 1 else ("are", "each", "them")
+        remedy = "give a tolerance for detectors" if tolerance is None else f"leave {they} out"
+        notes.append(
+            Note(
+                "reading-dark",
+                f"{_numbered(dark)} {is_} in the dark: {it} is less than its estimated error; {remedy}, or bring light "
+                f"nearer to {they}.",
+                value=max(error for error in errors if error is not None),
+            )
         )
-    ]
+    if tolerance is None:
+        return notes
+    missed = {
+        number: error
+        for number, error in enumerate(errors, 1)
+        if number not in dark and (error is None or not error <= tolerance)
+    }
+    if missed:
+        worst = max((error for error in missed.values() if error is not None), default=np.inf)
+        notes.append(
+            Note(
+                "detector-tolerance-missed",
+                f"the tolerance of {tolerance:g} for detectors was not met by "
+                f"{_numbered(list(missed))}: the largest estimated error is {worst:.2g}, {where}.",
+                value=float(worst),
+            )
+        )
+    return notes
+
+
+def _numbered(numbers: Sequence[int]) -> str:
+    """Readings by their numbers, for a sentence."""
+    return f"{'reading' if len(numbers) == 1 else 'readings'} {', '.join(map(str, numbers))}"
 
 
 def notes_on_fields(solution: Solution, everywhere: float | None, volume: float | None, where: str) -> list[Note]:

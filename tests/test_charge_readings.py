@@ -196,3 +196,16 @@ def test_case_files_take_the_tolerance(tmp_path: Path) -> None:
     file.write_text(CASE.replace("detectors: 0.01", "volume: 0.01"))
     with pytest.raises(InputError, match=r"tolerance.volume is for finite elements"):
         load_cases(file)
+
+
+def test_readings_in_the_dark_are_told() -> None:
+    """Behind ten decades of absorption, where charges resolve nothing."""
+    dark = Medium(sigma_a=3.0, sigma_s_prime=1.0, eta=1.4)
+    detectors = [PointDetector((0.0, 0.0, 10.0)), PointDetector((0.0, 0.0, -10.0))]
+    light = [PointSource((0.0, 0.0, 9.0))]
+    found = solve_with_charges(sphere(10.0), dark, light, tolerance=0.05, detectors=detectors)
+    (note,) = (each for each in found.warnings if getattr(each, "code", "") == "reading-dark")
+    assert note.startswith("reading 2 is in the dark: it is less than its estimated error; give a tolerance for detect")
+    found = solve_with_charges(sphere(10.0), dark, light, tolerance=None, detectors=detectors, detector_tolerance=0.01)
+    (note,) = (each for each in found.warnings if getattr(each, "code", "") == "reading-dark")
+    assert note.endswith("leave it out, or bring light nearer to it.")

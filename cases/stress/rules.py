@@ -15,6 +15,7 @@ DIP, LEDGER, RESIDUAL, OVERSHOOT, SCALING = 1e-12, 1e-9, 1e-8, 1e-9, 1e-8
 REASONS = {
     "tolerance-missed",
     "detector-tolerance-missed",
+    "reading-dark",
     "fluence-negative",
     "power-moved",
     "exitance-negative",
