@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from tetlux.fem.assessment import Tolerances
+from tetlux.fem.error.tolerance import MOST_ROUNDS
 from tetlux.fem.grading.layers import Layers, refine_below, with_layers
 from tetlux.fem.grading.near_sources import (
     LONGEST_EDGE,
@@ -52,7 +53,6 @@ class Emitter(Protocol):
     @property
     def lit_in(self) -> int:
         """The number of the scene that lights it."""
-        ...
 
     def lights_on(self, lit: MeshSolution, system: System) -> SplitLights:
         """Its light on a mesh, by the solution of the scene that lights it and the system of that."""
@@ -275,7 +275,8 @@ def solve_and_refine(
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            found = tolerances.assess(steps)
+            # Below layers in one round, since it may be layers that limit the error.
+            found = tolerances.assess(steps, rounds=MOST_ROUNDS if layers is None else 1)
         if layers is not None and found.largest_error_ratio > SLOW * least_ratio:
             layers = layers.thinner()
         if found.largest_error_ratio < least_ratio:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import cells_to_split, splits_for_fields, splits_for_readings
+from tetlux.fem.error.tolerance import MOST_ROUNDS, cells_to_split, splits_for_fields, splits_for_readings
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
 from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
@@ -65,15 +65,18 @@ class Tolerances:
         """Whether quadratic elements are solved for on each mesh."""
         return self.readings is not None or len(self.fields) > 0
 
-    def assess(self, by_scene: Mapping[int, MeshSolution]) -> "Assessment":
-        """Compare the errors of solutions of scenes, by their number, on one mesh with the tolerances."""
+    def assess(self, by_scene: Mapping[int, MeshSolution], *, rounds: int = MOST_ROUNDS) -> "Assessment":
+        """Compare the errors of solutions of scenes, by their number, on one mesh with the tolerances.
+
+        Tetrahedra are split for the exitance in so many rounds at most.
+        """
         steps = list(by_scene.values())
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
         largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
             largest_ratio = error / self.exitance
-            splits += cells_to_split((step.estimate for step in steps), self.exitance)
+            splits += cells_to_split((step.estimate for step in steps), self.exitance, rounds)
         if self.readings is not None:
             readings = [reading for scene, step in by_scene.items() for reading in self._read(scene, step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)

@@ -48,8 +48,11 @@ def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
         raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
-def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
-    """How often to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims."""
+def cells_to_split(estimates: Iterable[Estimate], tolerance: float, rounds: int = MOST_ROUNDS) -> IntArray:
+    """How often to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims.
+
+    Each round splits those with the largest errors that are left.
+    """
     wanted = [
         aim
         for estimate in estimates
@@ -60,14 +63,14 @@ def cells_to_split(estimates: Iterable[Estimate], tolerance: float) -> IntArray:
     ]
     splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
     for indicators, aim, often in wanted:
-        splits = np.maximum(splits, np.minimum(often * _rounds(indicators, aim), MOST_SPLITS))
+        splits = np.maximum(splits, np.minimum(often * _rounds(indicators, aim, rounds), MOST_SPLITS))
     return splits
 
 
-def _rounds(indicators: FloatArray, aim: float) -> IntArray:
+def _rounds(indicators: FloatArray, aim: float, most: int) -> IntArray:
     """How many rounds split each tetrahedron, (m,), so that the sum of indicators (m,) is expected to be `aim`."""
     left, rounds = np.array(indicators), np.zeros(len(indicators), dtype=np.int64)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(most):
         error = float(left.sum())
         if error <= REFINE_ABOVE * aim:
             break

@@ -19,6 +19,8 @@ from tetlux.meshing.surface.subdivide import NEXT_CORNER
 
 # Corner i of a triangle is preceded by corner PREVIOUS_CORNER[i].
 PREVIOUS_CORNER = np.array([2, 0, 1])
+# How far a flat patch may be off its triangle, relative to a side.
+ROUNDING = 1e-13
 # Triangles of a surface whose patches are kept, at 240 bytes each.
 MOST_KEPT = 100_000
 
@@ -86,6 +88,12 @@ class CurvedPatches:
         middle = edges + 0.5 * (edges - corners.mean(axis=1))
         every = np.concatenate([corners, along[:, 0], along[:, 1], middle[:, None]], axis=1)
         return np.ascontiguousarray(every.transpose(1, 2, 0))
+
+    @cached_property
+    def are_flat(self) -> BoolArray:
+        """Whether the patch over each face is the face itself, within rounding, (m,)."""
+        sides = np.abs(self._points[self._faces] - self._points[self._faces[:, NEXT_CORNER]]).max(axis=(1, 2))
+        return np.asarray(np.abs(self.bends()).max(axis=(1, 2)) <= ROUNDING * sides)
 
     def bends(self) -> FloatArray:
         """How far the middle of each side of the faces, from a corner to the next, is off the straight one, (m, 3, 3).

@@ -158,7 +158,11 @@ class Surface:
         """
         if self.crease_angle <= 0 or len(faces) == 0:
             return points, self.normals[faces]
-        return self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))[:2]
+        curved, normals, _ = self._patches(faces, barycentric_on_triangles(points, self.points[self.faces[faces]]))
+        # Exact where there is nothing to bend.
+        flat = self._patches.are_flat[faces]
+        curved[flat], normals[flat] = points[flat], self.normals[faces[flat]]
+        return curved, normals
 
     @cached_property
     def groups(self) -> TriangleGroups:
