@@ -35,6 +35,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 MOST_TETRAHEDRA = 1_000_000
 # Where a finer mesh has more than this share of the error, it is the layers that have to be finer.
 SLOW = 0.8
+# With room for fewer than this many times as many tetrahedra, and below layers, they are split in one round at a time.
+ROOM = 5
 # A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
 SLACK = 1.3
 # After this many seconds in the mesher a progress line appears.
@@ -56,11 +58,9 @@ class Emitter(Protocol):
 
     def lights_on(self, lit: MeshSolution, system: System) -> SplitLights:
         """Its light on a mesh, by the solution of the scene that lights it and the system of that."""
-        ...
 
     def add_error(self, found: MeshSolution, lit: MeshSolution, system: System) -> MeshSolution:
         """The solution for its light with the error that comes from the scene that lights it."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,8 +275,8 @@ def solve_and_refine(
     least_ratio = np.inf
     while True:
         with problem.watch.stage("solve"):
-            # Below layers in one round, since it may be layers that limit the error.
-            found = tolerances.assess(steps, rounds=MOST_ROUNDS if layers is None else 1)
+            once = layers is not None or ROOM * len(mesh.tetrahedra) > most_tetrahedra
+            found = tolerances.assess(steps, rounds=1 if once else MOST_ROUNDS)
         if layers is not None and found.largest_error_ratio > SLOW * least_ratio:
             layers = layers.thinner()
         if found.largest_error_ratio < least_ratio:
