@@ -21,7 +21,7 @@ from tetlux.fem.exact.numerics.bessel import SPHERICAL, TABLE_SIZE, inner_ratios
 from tetlux.fem.exact.numerics.legendre import legendre_sum
 from tetlux.fem.exact.numerics.quadrature import CUTOFF, graded_rule
 from tetlux.fem.media.medium import Medium
-from tetlux.meshing.arrays import FloatArray
+from tetlux.meshing.arrays import FloatArray, freeze
 
 # Above this order, the singular part of the exitance is separated from the series.
 DIRECT_ORDERS = 20_000
@@ -177,7 +177,7 @@ def _coefficients(medium: Medium, a: float, t: float, order: int) -> FloatArray:
     ratio = inner_ratios(order, x, np.array([t]), SPHERICAL)[:, 0]
     growth = wall_rates(order, x, SPHERICAL).growth[:, 0]
     beta = medium.extrapolation_length / a
-    return np.asarray((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth))
+    return freeze((2.0 * np.arange(order + 1) + 1.0) * ratio / (1.0 + beta * growth))
 
 
 def _sum_split(medium: Medium, a: float, t: float, gamma: FloatArray, order: int) -> FloatArray:

@@ -21,13 +21,12 @@ from tetlux.meshing.describe import count
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# The mesh is made anew once a coefficient is farther from that which it was made for than this factor.
-FAR = 1.25
+# The mesh is made anew once a coefficient is farther from that which it was made for than this factor, or a light from
+# its place there than so many mean free paths.
+FAR, FAR_PLACE = 1.25, 1.0
 MOST_MESHES = 6
 # Of the first mesh, for media that are only guessed.
 FIRST_TOLERANCE = 0.03
-# It is also once a light is farther from there than so many mean free paths.
-FAR_PLACE = 1.0
 # Accuracies of parameters of unknowns, on the first mesh and on others.
 ROUGH, FINE = 2e-2, 1e-3
 # Relative error of readings by the mesh.

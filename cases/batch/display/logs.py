@@ -44,14 +44,11 @@ class RunLogs:
 
     def _write(self, run: int) -> None:
         lines = self._lines.pop(run)
-        path, text = self._out / FOLDER / f"{self._names[run]}.log", "\n".join(lines) + "\n"
+        path = self._out / FOLDER / f"{self._names[run]}.log"
         try:
-            # Mostly the folder is there already.
-            try:
-                path.write_text(text, encoding="utf-8", errors="replace")
-            except FileNotFoundError:
+            if not path.parent.is_dir():
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8", errors="replace")
+            path.write_text("\n".join(lines) + "\n", encoding="utf-8", errors="replace")
         except OSError:
             # What a full disk leaves of it is of no use.
             with suppress(OSError):
