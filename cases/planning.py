@@ -8,7 +8,7 @@ from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.media.region import Region
 from tetlux.fem.outcome.plan import Plan
 from tetlux.fem.planner.choose import plan_of
-from tetlux.fem.planner.request import MODULATED, Request, make_request
+from tetlux.fem.planner.request import Request, make_request
 
 AUTO = "auto"
 
@@ -57,6 +57,8 @@ def request_of(case: Case, runs: int = 1, *, cache: bool = True) -> Request:
         need_of_mesh=_need_of_mesh(case),
         runs=runs,
         cache=cache,
+        frequency=case.frequencies,
+        outside_index=case.outside_index,
     )
 
 
@@ -71,7 +73,7 @@ def _need_of_mesh(case: Case) -> str:
         return "what dyes emit is solved for on a mesh"
     if case.fit is not None:
         return "a fit is made by finite elements"
-    return MODULATED if any(case.frequencies) else ""
+    return ""
 
 
 def _groups(numbers: Sequence[int], cases: Sequence[Case]) -> list[list[int]]:
@@ -88,7 +90,7 @@ def _key(case: Case) -> Hashable:
     kinds = tuple((type(channel.medium), *map(type, channel.lights.values())) for channel in case.channels)
     kinds_of_regions = tuple(type(medium) for region in case.regions for medium in _media_of(region))
     tolerances = (case.tolerance, case.detector_tolerance, case.everywhere_tolerance, case.volume_tolerance)
-    needs = (_need_of_mesh(case), len(case.detectors))
+    needs = (_need_of_mesh(case), len(case.detectors), tuple(map(bool, case.frequencies)))
     return case.spec.model, tuple(map(id, surfaces)), kinds, kinds_of_regions, tolerances, needs
 
 

@@ -19,6 +19,7 @@ from tetlux.fem import (
     Region,
     Solution,
     System,
+    plan,
     solve,
 )
 from tetlux.fem.charges.kernel import equation_of
@@ -250,11 +251,18 @@ def test_modulation_that_is_too_fast_for_diffusion_is_reported() -> None:
     )
 
 
-def test_modulated_light_is_planned_for_finite_elements() -> None:
+def test_modulated_light_is_planned_for_charges_or_finite_elements() -> None:
+    """Closed forms and parts of bodies are for steady light; plans are those of `solve`."""
     ball, lights = sphere(10.0), [PointSource((0.0, 0.0, 5.0))]
-    planned = solve(ball, TISSUE, lights, tolerance=0.1, frequency=1e8, model="auto")
-    assert isinstance(planned, Solution)
+    planned = solve(ball, TISSUE, lights, tolerance=0.01, frequency=1e8, outside_index=1.33, model="auto")
+    given = solve(ball, TISSUE, lights, tolerance=0.01, frequency=1e8, outside_index=1.33, model="charges")
+    places = ball.points[::500]
+    assert planned.exitance_at(places) == pytest.approx(given.exitance_at(places), rel=1e-12)
+    assert np.abs(planned.exitance_at(places).imag).min() > 0
     assert planned.plan is not None
-    assert planned.plan["closed-form"].reason == "modulated light is solved on a mesh"
+    assert {planned.plan[model].reason for model in ("closed-form", "truncated")} == {"it is for steady light alone"}
+    assert str(plan(ball, TISSUE, lights, tolerance=0.01, frequency=1e8)) == str(planned.plan)
+    on_mesh = plan(ball, TISSUE, lights, frequency=1e8, everywhere_tolerance=0.05)
+    assert on_mesh.chosen == "full"
     with pytest.raises(InputError, match='model "closed-form" does not take frequency'):
         solve(ball, TISSUE, lights, frequency=1e8, model="closed-form")  # type: ignore[call-overload]

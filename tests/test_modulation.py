@@ -122,11 +122,12 @@ def test_what_does_not_go_together_is_refused(tmp_path: Path, frequency: str, mo
         load_cases(tmp_path / "ball.yaml")
 
 
-def test_the_planner_takes_a_mesh(tmp_path: Path) -> None:
-    (tmp_path / "ball.yaml").write_text(CASE.replace("FREQUENCY", "1e8") + "model: auto\noutputs: []\n")
+@pytest.mark.parametrize(("outputs", "model"), [("[]", "charges"), ("[volume]", "fem")])
+def test_the_planner_takes_charges_unless_a_mesh_is_needed(tmp_path: Path, outputs: str, model: str) -> None:
+    (tmp_path / "ball.yaml").write_text(CASE.replace("FREQUENCY", "1e8") + f"model: auto\noutputs: {outputs}\n")
     assert main(["run", str(tmp_path / "ball.yaml"), "--out", str(tmp_path), "--quiet", "--jobs", "1"]) == 0
     summary = json.loads((tmp_path / "ball" / "summary.json").read_text())
-    assert summary["model"] == "fem"
+    assert summary["model"] == model
     assert summary["detectors"][0]["phase"] == pytest.approx(11.118, abs=0.1)
 
 

@@ -40,3 +40,14 @@ def refuse_mesh(request: Request) -> None:
     """
     if request.need_of_mesh:
         raise InputError(request.need_of_mesh)
+
+
+def refuse_modulated(request: Request) -> None:
+    """Refuse modulated light, which only finite elements on the whole body and charges solve for.
+
+    Raises
+    ------
+    InputError
+    """
+    if request.is_modulated:
+        raise InputError("it is for steady light alone")

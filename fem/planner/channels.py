@@ -7,7 +7,7 @@ from tetlux.fem.assessment import Tolerances
 from tetlux.fem.labels import GivenMedia
 from tetlux.fem.media.coefficients import AnyMedium
 from tetlux.fem.planner.options import Options
-from tetlux.fem.planner.request import MODULATED, make_request
+from tetlux.fem.planner.request import make_request
 from tetlux.fem.planner.solve import AnySolution, FiniteElements, solve_by_plan, solve_closed_forms, solve_on_part
 from tetlux.fem.scenes import media_by_channel
 from tetlux.fem.solve_scenes import solve_each
@@ -75,8 +75,9 @@ def solve_channels(
             ),
             detectors=options["detectors"],
             mesh=options["mesh"],
-            need_of_mesh=MODULATED if options["frequency"] else "",
             cache=options["cache"],
+            frequency=options["frequency"],
+            outside_index=options["outside_index"],
         )
         elements = FiniteElements(
             lambda: solve_each(body, channels, scenes, **options),

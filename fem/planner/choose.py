@@ -37,6 +37,8 @@ def plan(
     everywhere_tolerance: float | None = None,
     volume_tolerance: float | None = None,
     mesh: TetMesh | None = None,
+    frequency: float = 0.0,
+    outside_index: float = 1.0,
 ) -> Plan:
     """Say how ``solve(..., model="auto")`` would solve a scene, and why, without solving it.
 
@@ -45,7 +47,7 @@ def plan(
 
     Parameters
     ----------
-    body, medium, lights, regions, detectors, mesh
+    body, medium, lights, regions, detectors, mesh, frequency, outside_index
         As for `tetlux.fem.solve`.
     tolerance, detector_tolerance, everywhere_tolerance, volume_tolerance
         As for `tetlux.fem.solve`.
@@ -72,9 +74,18 @@ def plan(
     wanted = Tolerances(tolerance, detector_tolerance, (), everywhere_tolerance, volume_tolerance)
     channels, _ = media_by_channel(body, mesh, medium)
     scenes = [lights] * len(channels)
-    return plan_of(
-        make_request(body, channels, scenes, regions=regions, tolerances=wanted, detectors=detectors, mesh=mesh)
+    request = make_request(
+        body,
+        channels,
+        scenes,
+        regions=regions,
+        tolerances=wanted,
+        detectors=detectors,
+        mesh=mesh,
+        frequency=frequency,
+        outside_index=outside_index,
     )
+    return plan_of(request)
 
 
 def plan_of(request: Request) -> Plan:

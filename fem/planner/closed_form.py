@@ -7,7 +7,7 @@ import numpy as np
 
 from tetlux.fem.meshless.exact_field import ExactField
 from tetlux.fem.outcome.plan import Candidate
-from tetlux.fem.planner.candidate import impossible, refuse_mesh
+from tetlux.fem.planner.candidate import impossible, refuse_mesh, refuse_modulated
 from tetlux.fem.planner.request import Request
 from tetlux.fem.quadratic.field_error import DARKEST
 from tetlux.meshing.errors import InputError
@@ -20,6 +20,7 @@ def closed_form_candidate(request: Request) -> Candidate:
     """What a closed form would cost, and whether it is close enough to the body."""
     try:
         refuse_mesh(request)
+        refuse_modulated(request)
         fields = request.exact_fields
     except InputError as why:
         return impossible("closed-form", why)

@@ -28,9 +28,6 @@ from tetlux.meshing.mesher.api import is_cached
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
-# Why modulated light needs a mesh.
-MODULATED = "modulated light is solved on a mesh"
-
 
 @dataclass(frozen=True, eq=False)
 class Request:
@@ -59,6 +56,10 @@ class Request:
         What past runs took.
     is_meshed : bool
         Whether the cache has the mesher's mesh of the body.
+    frequencies : tuple of float
+        Of the light of each scene, Hz; 0 where it is steady.
+    outside_index : float
+        Refractive index of what surrounds the body.
     """
 
     surface: Surface
@@ -73,11 +74,18 @@ class Request:
     runs: int = 1
     costs: Costs = field(default_factory=Costs)
     is_meshed: bool = False
+    frequencies: tuple[float, ...] = ()
+    outside_index: float = 1.0
 
     @property
     def exitance_tolerance(self) -> float:
         """The tolerance of the exitance, or the default where there is none."""
         return self.tolerances.exitance or DEFAULT_TOLERANCE
+
+    @property
+    def is_modulated(self) -> bool:
+        """Whether light is modulated in some scene."""
+        return any(self.frequencies)
 
     @property
     def points(self) -> int:
@@ -124,6 +132,8 @@ def make_request(
     need_of_mesh: str = "",
     runs: int = 1,
     cache: bool = True,
+    frequency: float | Sequence[float] = 0.0,
+    outside_index: float = 1.0,
 ) -> Request:
     """Check what is asked for: arguments of `tetlux.fem.solve_each`, and `need_of_mesh` and `runs` of `Request`.
 
@@ -139,7 +149,7 @@ def make_request(
     if any(len(each) == 0 for each in scenes):
         raise InputError("there is no light; give at least one.")
     given = body if isinstance(body, TetMesh) else mesh
-    built = build_scenes(body, given, medium, regions, len(scenes), any_size=True)
+    built = build_scenes(body, given, medium, regions, len(scenes), frequency, outside_index, any_size=True)
     dark = Dark(built.surface, built.bodies[0].outer)
     placed: tuple[PlacedDetector, ...] = tuple(place_detector(detector, dark) for detector in detectors)
     deposits = tuple(
@@ -160,4 +170,6 @@ def make_request(
         runs,
         costs,
         costs.directory is not None and given is None and is_cached(built.surface, built.inner),
+        built.frequencies,
+        outside_index,
     )

@@ -187,7 +187,7 @@ def _try_charges(request: Request, plan: Plan) -> tuple[list[ChargeSolution], st
 def _fit_charges(request: Request, most: int) -> list[ChargeSolution]:
     """Fit charges to each scene, at most as many as take as long as finite elements are expected to."""
     found = []
-    for body, lights in zip(request.bodies, request.lights, strict=True):
+    for body, lights, frequency in zip(request.bodies, request.lights, request.frequencies, strict=True):
         outer, *media = body.by_label.values()
         regions = [Region(surface, medium) for surface, medium in zip(request.inner, media, strict=True)]
         found.append(
@@ -200,6 +200,8 @@ def _fit_charges(request: Request, most: int) -> list[ChargeSolution]:
                 detectors=request.detectors,
                 detector_tolerance=request.tolerances.readings,
                 most=most,
+                frequency=frequency,
+                outside_index=request.outside_index,
             )
         )
     return found

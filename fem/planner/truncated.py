@@ -3,7 +3,7 @@
 import numpy as np
 
 from tetlux.fem.outcome.plan import Candidate
-from tetlux.fem.planner.candidate import corrected, impossible, refuse_mesh
+from tetlux.fem.planner.candidate import corrected, impossible, refuse_mesh, refuse_modulated
 from tetlux.fem.planner.effort import (
     SECONDS_OF_MESHER,
     SECONDS_OF_REGION,
@@ -25,6 +25,7 @@ def truncated_candidate(request: Request) -> Candidate:
     """What finite elements on the part that light reaches would cost."""
     try:
         refuse_mesh(request)
+        refuse_modulated(request)
         if request.tolerances.fields or request.detectors:
             raise InputError("the error of the cut is known for the exitance as a whole only")
         box = request.dark_box
