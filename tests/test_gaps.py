@@ -5,6 +5,7 @@ import pytest
 
 from tests.meshes_made import cube_of_cubes
 from tetlux.fem import Medium, PointDetector, PointSource, solve
+from tetlux.fem.exact import box as of_box
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.media.coefficients import coefficients_on
 from tetlux.fem.quadratic import gaps
@@ -15,7 +16,7 @@ from tetlux.fem.quadratic.gaps import find_gaps, gap_contributions
 from tetlux.fem.quadratic.measurement import Measurement
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.space import quadratic_space
-from tetlux.meshing import Surface, TetMesh, box, mesh_from_arrays, sphere, tetrahedralize
+from tetlux.meshing import Surface, TetMesh, box, cylinder, mesh_from_arrays, sphere, tetrahedralize
 from tetlux.meshing.arrays import FloatArray
 
 CLEAR = Medium(sigma_a=0.02, sigma_s_prime=1.0, eta=1.4)
@@ -132,3 +133,36 @@ def test_edges_of_a_tetrahedron_under_a_smooth_surface_are_bent_as_far_as_can_be
     assert 0.02 * straight < left < 0.3 * straight
     shares = np.linalg.det(space.jacobians(np.arange(3), np.vstack([np.eye(4), cell_rule().points])))
     assert 0.15 <= shares.min() < 0.25
+
+
+@pytest.mark.parametrize("place", [(10.0, 10.0, 10.0), (9.5, 9.5, 10.0), (10.0, 10.0, 2.0), (10.0, -10.0, 9.0)])
+def test_readings_at_edges_and_corners_of_a_box(place: tuple[float, float, float]) -> None:
+    """Of eight meshes within .1 %; with facets across the edges 8 % off in a corner, with a bar of .3 %."""
+    reduced = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
+    found = solve(
+        box((20.0, 20.0, 20.0)),
+        reduced,
+        [PointSource((3.0, 2.0, 9.0))],
+        tolerance=None,
+        detectors=[PointDetector(place)],
+        detector_tolerance=0.02,
+        cache=False,
+    )
+    (reading,) = found.readings
+    exact = of_box.point_exitance(reduced, size=(20.0, 20.0, 20.0), source=(3.0, 2.0, 9.0), points=np.array([place]))
+    assert reading.exitance == pytest.approx(exact[0], rel=0.004)
+
+
+def test_edges_along_the_rim_of_a_cylinder_are_bent_onto_it() -> None:
+    can = cylinder(8.0, 12.0)
+    mesh = tetrahedralize(can)
+    space = quadratic_space(mesh, can)
+    at_rim = (np.abs(np.hypot(*mesh.points[:, :2].T) - 8.0) < 1e-2) & (np.abs(np.abs(mesh.points[:, 2]) - 6.0) < 1e-6)
+    along = at_rim[mesh.edges].all(axis=1) & (mesh.edge_lengths < 4.0)
+    assert along.sum() > 30
+    assert can.creases is not None
+    middles = space.middles[along]
+    off = np.linalg.norm(can.creases.closest(middles) - middles, axis=1)
+    straight = mesh.points[mesh.edges[along]].mean(axis=1)
+    assert np.median(8.0 - np.hypot(*straight[:, :2].T)) > 1e-2
+    assert np.median(off) < 1e-9

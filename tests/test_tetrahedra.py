@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from tetlux.meshing import (
     Surface,
     TetMesh,
     box,
+    cylinder,
     refine,
     sphere,
     surface_from_arrays,
@@ -199,6 +201,36 @@ def test_a_move_to_the_surface_does_not_shrink_tetrahedra_away() -> None:
     moved = move_to_surface(cube, sphere(0.17, center=(0.0, 0.0, -1.0)))
     assert (moved.volumes >= 0.399 * cube.volumes).all()
     assert moved.volume < 0.9 * cube.volume
+
+
+def test_nodes_near_edges_and_corners_are_moved_onto_them() -> None:
+    """Nodes of a cube that lie beside its corners and edges; those in the middle of a face stay."""
+    cube = block((4, 4, 4), (2.0, 2.0, 2.0))
+    surface = box((2.0, 2.0, 2.0), center=(0.0, 0.0, -1.0))
+    at_edges = (np.isin(cube.points - (0.0, 0.0, -1.0), (-1.0, 1.0)).sum(axis=1) > 1)[:, None]
+    shift = np.random.default_rng(3).uniform(0.0, 0.08, cube.points.shape) * -np.sign(cube.points - (0.0, 0.0, -1.0))
+    moved = move_to_surface(replace(cube, points=cube.points + at_edges * shift), surface)
+    assert moved.points[at_edges[:, 0]] == pytest.approx(cube.points[at_edges[:, 0]], abs=0.12)
+    assert moved.volume == pytest.approx(8.0, rel=1e-12)
+    corners = {tuple(corner) for corner in cube.points[np.abs(cube.points - (0.0, 0.0, -1.0)).min(axis=1) == 1.0]}
+    assert len(corners) == 8
+    assert corners <= {tuple(point) for point in moved.points}
+    inside = move_to_surface(cube, surface).points
+    assert inside == pytest.approx(cube.points, abs=1e-15)
+
+
+def test_meshes_follow_edges_and_rims() -> None:
+    """Of twenty meshes of the box, and eight of the cylinder; otherwise one corner in eight is cut off."""
+    cube = box((20.0, 20.0, 20.0))
+    assert tetrahedralize(cube).volume == pytest.approx(cube.volume, rel=1e-9)
+    can = cylinder(5.0, 12.0)
+    mesh = tetrahedralize(can)
+    points = mesh.boundary_points
+    assert can.creases is not None
+    off = np.linalg.norm(can.creases.closest(points) - points, axis=1)
+    beside = off < 0.2
+    assert beside.sum() > 20
+    assert (off[beside] < 1e-9).mean() > 0.95
 
 
 def test_a_second_attempt_is_closer_to_the_surface(monkeypatch: pytest.MonkeyPatch) -> None:

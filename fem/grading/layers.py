@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.host.blocks import THREADS
-from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.layers import REACH, add_layers
 from tetlux.meshing.tets.mesh import TetMesh
@@ -121,7 +120,7 @@ class Layers:
 
     def places_without(self, surface: Surface) -> tuple[FloatArray, FloatArray]:
         """Rims and lit creases (c, 3), for which layers do not serve, and the lengths to resolve there, (c,)."""
-        ends = CurvedPatches(surface.points, surface.faces, surface.normals, surface.crease_angle).creases
+        ends = surface.creases.ends if surface.creases else np.empty((0, 2, 3))
         lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         parts = np.ceil(lengths / max(self.depth, LEAST_SPACING * surface.diagonal)).astype(np.int64)
         own = np.repeat(np.arange(len(ends)), parts)

@@ -12,6 +12,7 @@ from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, cell_rule, shape_deriv
 from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.surface.triangles import triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import corner_groups, owners
 
@@ -170,10 +171,10 @@ def _space(mesh: TetMesh, surface: Surface, inner: Sequence[Surface]) -> Quadrat
         owner = owners(pairs, inner)
         unbent = QuadraticSpace(mesh, bends)
         for number, each in enumerate(inner, 1):
-            edges = np.unique(unbent.faces(faces[owner == number])[:, 3:]) - len(mesh.points)
-            _bend(mesh, bends, edges, each)
+            some = faces[owner == number]
+            _bend(mesh, bends, some, unbent.faces(some)[:, 3:] - len(mesh.points), each)
     if surface is not mesh.surface:
-        _bend(mesh, bends, np.unique(mesh.boundary_edges), surface)
+        _bend(mesh, bends, mesh.boundary_faces, mesh.boundary_edges.astype(np.int64), surface)
     for reductions in count():
         space = QuadraticSpace(mesh, bends)
         inverted = _inverted_cells(space)
@@ -184,10 +185,18 @@ def _space(mesh: TetMesh, surface: Surface, inner: Sequence[Surface]) -> Quadrat
     return space
 
 
-def _bend(mesh: TetMesh, bends: FloatArray, edges: IntArray, surface: Surface) -> None:
-    """Bend edges onto a surface, in place."""
+def _bend(mesh: TetMesh, bends: FloatArray, faces: IntArray, edges_of_faces: IntArray, surface: Surface) -> None:
+    """Bend edges (f, 3) of triangles (f, 3) onto a surface, and those along its creases onto these, in place."""
+    edges, places = np.unique(edges_of_faces, return_inverse=True)
     straight = mesh.points[mesh.edges[edges]].mean(axis=1)
     displacements = surface.project(straight)[0] - straight
+    if surface.crease_angle > 0 and surface.creases is not None:
+        normals, _ = triangle_areas(mesh.points, faces)
+        # The sum of the normals of both triangles at an edge.
+        sums = np.zeros((len(edges), 3))
+        np.add.at(sums, places.reshape(-1, 3), normals[:, None])
+        sharp = np.linalg.norm(sums, axis=1) < 2.0 * np.cos(0.5 * np.radians(surface.crease_angle))
+        displacements[sharp] = surface.creases.closest(straight[sharp]) - straight[sharp]
     length = np.linalg.norm(displacements, axis=1)
     displacements[(length > LARGEST_BEND * mesh.edge_lengths[edges]) | (length < SMALLEST_BEND * mesh.diagonal)] = 0.0
     bends[edges] = displacements

@@ -16,7 +16,7 @@ from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Increase it when the same settings give another mesh, or when the files change.
-FORMAT = 2
+FORMAT = 3
 # Largest cache size, bytes; the least recently used entries are removed first.
 LARGEST_CACHE = 1_000_000_000
 

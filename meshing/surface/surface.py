@@ -11,6 +11,7 @@ from tetlux.meshing.html import surface_html
 from tetlux.meshing.search.closest import ClosestPoint
 from tetlux.meshing.search.proximity import cross_segments, winding_number
 from tetlux.meshing.search.rays import RayCaster
+from tetlux.meshing.surface.creases import Creases
 from tetlux.meshing.surface.curved import CurvedPatches
 from tetlux.meshing.surface.groups import TriangleGroups, cut_long_triangles, group_triangles
 from tetlux.meshing.surface.solids import Shape, lies_on
@@ -165,6 +166,12 @@ class Surface:
         return curved, normals
 
     @cached_property
+    def creases(self) -> Creases | None:
+        """The edges that bend by more than `crease_angle`, all if it is 0; None if there are none."""
+        ends = self._patches.creases
+        return Creases(ends, self.crease_angle) if len(ends) else None
+
+    @cached_property
     def groups(self) -> TriangleGroups:
         """Groups of neighbouring triangles."""
         faces, corners = cut_long_triangles(self.points[self.faces])
@@ -242,14 +249,9 @@ class Surface:
         faces : (k,) ndarray
             The triangle at each.
         """
-        count = len(self.faces)
-        distances, _ = cross_segments(
-            np.broadcast_to(origin, (count, 3)),
-            np.broadcast_to(direction, (count, 3)),
-            self.points[self.faces],
-            # The slack keeps a ray through an edge from passing between two triangles.
-            slack=1e-10,
-        )
+        starts, ways = (np.broadcast_to(each, (len(self.faces), 3)) for each in (origin, direction))
+        # The slack keeps a ray through an edge from passing between two triangles.
+        distances, _ = cross_segments(starts, ways, self.points[self.faces], slack=1e-10)
         faces = np.flatnonzero(distances > 1e-9 * self.diagonal)
         order = np.argsort(distances[faces], kind="stable")
         return distances[faces[order]], faces[order]

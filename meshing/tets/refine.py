@@ -5,8 +5,10 @@ from dataclasses import replace
 from itertools import count
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from tetlux.meshing.arrays import BoolArray, FloatArray, IndexArray, IntArray
+from tetlux.meshing.surface.creases import Creases
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.geometry import tetrahedron_volumes
 from tetlux.meshing.tets.mesh import TetMesh
@@ -19,8 +21,14 @@ SMALLEST_SHARE = 0.4
 LEAST_QUALITY = 0.1
 # A part is split often enough if its volume is at most this many times what halving makes of it.
 FULLY_SPLIT = 1.5
+# How often moves of nodes to a surface are halved before they are given up.
+MOST_HALVINGS = 6
+# Moves below this share of the body's diagonal are rounding errors.
+ROUNDING = 1e-9
 # A node on two surfaces is projected on each in turn, this many times: the projections converge to their intersection.
 PROJECTION_ROUNDS = 10
+# Nodes are moved onto a crease or corner that is nearer to them than this share of their shortest edge.
+NEAR_CREASE = 0.35
 # The edges of a tetrahedron, and of each of its faces.
 _GROUPS = [list(range(6)), *EDGES_OF_FACES.tolist()]
 # Even permutations of the corners that put each edge first, and the resulting permutations of the edges.
@@ -158,6 +166,9 @@ def move_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] 
     A node where surfaces touch moves to a point of both. A node whose move would invert or flatten a tetrahedron moves
     only part of the way or not at all: 0 to 5 % of the nodes of fTetWild's meshes. A worst quality above 0.1 stays so.
 
+    Nodes near creases and corners are then moved onto these: facets that cut off a corner by a thirtieth of their size
+    change the exitance there by 8 %, however fine charges and elements are.
+
     Parameters
     ----------
     mesh : TetMesh
@@ -179,8 +190,34 @@ def move_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] 
         for target, nodes in targets:
             some = nodes[surfaces_at[nodes] > 1] if again else nodes
             aim[some], _ = target.project(aim[some])
+    moved = _move(mesh, aim - mesh.points, (surfaces_at > 0).astype(np.float64), MOST_HALVINGS)
+    for target, nodes in targets:
+        own = nodes[surfaces_at[nodes] == 1]
+        if target.crease_angle > 0 and target.creases is not None and len(own):
+            moved = _move_to_creases(moved, target.creases, own)
+    return moved
+
+
+def _move_to_creases(mesh: TetMesh, creases: Creases, nodes: IntArray) -> TetMesh:
+    """Move those of some nodes of a surface that are near creases and corners onto these, or leave them."""
+    shortest = np.full(len(mesh.points), np.inf)
+    np.minimum.at(shortest, mesh.edges, mesh.edge_lengths[:, None])
+    reach, places = NEAR_CREASE * shortest[nodes], mesh.points[nodes]
+    aim = mesh.points.copy()
+    closest = creases.closest(places)
+    near = np.linalg.norm(closest - places, axis=1) < reach
+    aim[nodes[near]] = closest[near]
+    if len(creases.corners):
+        distances, found = (np.asarray(each) for each in cKDTree(places).query(creases.corners))
+        near = distances < reach[found]
+        aim[nodes[found[near]]] = creases.corners[near]
     step = aim - mesh.points
-    share = (surfaces_at > 0).astype(np.float64)
+    share = (np.abs(step).max(axis=1) > ROUNDING * mesh.diagonal).astype(np.float64)
+    return _move(mesh, step, share, 0) if share.any() else mesh
+
+
+def _move(mesh: TetMesh, step: FloatArray, share: FloatArray, halvings: int) -> TetMesh:
+    """Move nodes by shares (n,) of steps (n, 3), halved so often, and then left, where they would spoil tetrahedra."""
     touched = mesh.tetrahedra[(share[mesh.tetrahedra] > 0).any(axis=1)]
     least = SMALLEST_SHARE * tetrahedron_volumes(mesh.points, touched)
     before = TetMesh(mesh.points, touched).quality
@@ -194,5 +231,5 @@ def move_to_surface(mesh: TetMesh, surface: Surface, regions: Sequence[Surface] 
             squashed[sound] = TetMesh(moved, touched[sound]).quality < (1.0 - 1e-9) * lowest[sound]
         if not squashed.any():
             break
-        share[np.unique(touched[squashed])] *= 0.5 if attempt < 6 else 0.0
+        share[np.unique(touched[squashed])] *= 0.5 if attempt < halvings else 0.0
     return replace(mesh, points=moved)
