@@ -154,4 +154,5 @@ def cell(value: Any) -> str:
         return ""
     if isinstance(value, str):
         return value
-    return repr(value) if isinstance(value, float) else json.dumps(value, ensure_ascii=False)
+    # `True` is no number here.
+    return repr(value) if type(value) in (float, int) else json.dumps(value, ensure_ascii=False)

@@ -41,14 +41,18 @@ def content_of_scene(scene: dict[str, Any]) -> str:
     return hashlib.blake2b(text.encode(), digest_size=LENGTH // 2).hexdigest()
 
 
-def _by_content(value: Any) -> Any:
+def _by_content(value: dict[str, Any] | list[Any]) -> Any:
     """Plain data with a hash of the content in place of each path."""
     if isinstance(value, dict):
-        return {
-            key: _hash_of_files(entry) if key in PATHS and isinstance(entry, str) else _by_content(entry)
-            for key, entry in value.items()
-        }
-    return [_by_content(entry) for entry in value] if isinstance(value, list) else value
+        return {key: _content_at(key, entry) for key, entry in value.items()}
+    return [_by_content(entry) if isinstance(entry, dict | list) else entry for entry in value]
+
+
+def _content_at(key: str, entry: Any) -> Any:
+    """`_by_content` of the entry under a key."""
+    if isinstance(entry, dict | list):
+        return _by_content(entry)
+    return _hash_of_files(entry) if key in PATHS and isinstance(entry, str) else entry
 
 
 def _hash_of_files(pattern: str) -> list[str]:

@@ -43,14 +43,11 @@ def _case_file_of(case: Case) -> dict[str, Any]:
     return scene
 
 
-def _make_paths_absolute(value: object, folder: Path) -> None:
+def _make_paths_absolute(value: dict[str, Any] | list[Any], folder: Path) -> None:
     """Replace relative paths anywhere within plain data, in place."""
-    if isinstance(value, dict):
-        for key, entry in value.items():
-            if key in PATHS and isinstance(entry, str):
-                value[key] = os.path.abspath(folder / entry)  # noqa: PTH100
-            else:
-                _make_paths_absolute(entry, folder)
-    elif isinstance(value, list):
-        for entry in value:
+    entries = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, entry in entries:
+        if isinstance(entry, dict | list):
             _make_paths_absolute(entry, folder)
+        elif key in PATHS and isinstance(entry, str):
+            value[key] = os.path.abspath(folder / entry)  # noqa: PTH100
