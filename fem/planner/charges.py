@@ -164,7 +164,7 @@ def _of_fading(request: Request) -> float:
     """Charges at least where points light a body that is faint elsewhere."""
     count, least, most = OF_FADING.get(shape_of(request.surface), (0.0, 0.0, 0.0))
     has_points = any(len(deposit.terms.points) for some in request.deposits for deposit in some)
-    return count if has_points and least <= _lengths(request) < most else 0.0
+    return count if has_points and not request.is_modulated and least <= _lengths(request) < most else 0.0
 
 
 def _check_regions(request: Request) -> None:
@@ -177,7 +177,8 @@ def _check_regions(request: Request) -> None:
     if not request.inner or request.tolerances.exitance is None:
         return
     shape, lengths = shape_of(request.surface), _lengths(request)
-    if shape in SHADED and lengths < MOST_FADING_IN_SHADE:
+    # Amplitudes of modulated light may be below zero.
+    if shape in SHADED and lengths < MOST_FADING_IN_SHADE and not request.is_modulated:
         raise InputError("with regions in a body that shades parts of itself charges leave light below zero")
     if shape == "slab" and lengths >= LEAST_FADING and _contrast(request) > MOST_CONTRAST_OF_SLAB:
         raise InputError("regions of so much contrast in a slab need too many charges")
