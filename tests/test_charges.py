@@ -34,7 +34,7 @@ from tetlux.fem.exact import half_space, layered_ball, sphere_light
 from tetlux.fem.exact import sphere as exact_sphere
 from tetlux.fem.meshless import ChargeSolution, solve_with_charges
 from tetlux.fem.outcome.surface_exitance import surface_exitance
-from tetlux.meshing import InputError, Surface, box, read_surface, slab, sphere, torus
+from tetlux.meshing import InputError, Surface, box, cylinder, read_surface, slab, sphere, torus
 from tetlux.meshing.arrays import FloatArray, Vector
 
 TISSUE = Medium(sigma_a=0.01, sigma_s_prime=1.0, eta=1.4)
@@ -128,6 +128,19 @@ def test_fitting_goes_on_where_the_exitance_is_below_zero() -> None:
     assert enough.errors.estimate < 0.02
     # As many charges with equations weighted by the distance leave 3.3 %.
     assert enough.negative_share < 0.01
+
+
+@pytest.mark.parametrize(
+    ("body", "sigma_a", "x"), [(box((126.0, 126.0, 126.0)), 0.0644, 20.0), (cylinder(21.133, 52.83), 0.0054, 5.283)]
+)
+def test_few_charges_more_leave_nothing_of_a_smooth_body_below_zero(body: Surface, sigma_a: float, x: float) -> None:
+    """Light fades ninety-nine times in the box; on the cylinder only points that are fitted are below zero at first."""
+    medium = Medium(sigma_a=sigma_a, sigma_s_prime=1.0, eta=1.4)
+    beam = PencilBeam((x, 0.0, 1e3), (0.0, 0.0, -1.0))
+    found = solve_with_charges(body, medium, [beam], tolerance=0.02)
+    assert [str(note) for note in found.warnings if getattr(note, "code", "") == "exitance-negative"] == []
+    assert found.error_estimate < 0.002
+    assert found.charges < 300
 
 
 def test_where_nothing_is_below_zero_no_more_are_fitted(ball: Surface) -> None:

@@ -4,13 +4,16 @@ import json
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tetlux.fem import DiffuseLight, Medium, PointSource, plan, solve
 from tetlux.fem.planner import charges, costs, effort
-from tetlux.fem.planner.costs import FILE, LARGEST_FACTOR, Costs, read_costs
+from tetlux.fem.planner.costs import FILE, LARGEST_FACTOR, Costs, PastRun, read_costs
+from tetlux.fem.stopwatch import Stopwatch
 from tetlux.meshing import box, sphere
 from tetlux.meshing.mesher.api import is_cached
 
@@ -59,9 +62,27 @@ def test_the_last_runs_count_and_none_counts_too_much() -> None:
     past = read_costs()
     for ratio in (2.0,) * 40 + (0.5,) * 40 + (1e9,) * 1:
         past.learn("kind", ratio, 1.0)
-    runs = read_costs().runs["kind"]
-    assert len(runs) == costs.MOST_RUNS
-    assert {round(math.exp(seconds), 6) for seconds, _ in runs} == {0.5, LARGEST_FACTOR}
+    assert read_costs().factors("kind")[0] == pytest.approx(0.5, rel=0.15)
+    assert max(run.seconds for run in read_costs().runs) == pytest.approx(math.log(LARGEST_FACTOR))
+
+
+def test_plans_follow_a_slower_machine_also_for_kinds_that_have_not_run_on_it() -> None:
+    rng, past = np.random.default_rng(0), read_costs()
+    own = {"full spot on box": 1.5, "charges on scan": 0.6, "full beam on torus": 1.0}
+    for host, kinds in ((1.0, list(own)), (2.0, list(own)[1:])):
+        for number in range(30):
+            kind = kinds[number % len(kinds)]
+            past.learn(kind, host * own[kind] * float(np.exp(rng.normal(0.0, 0.1))), 1.0)
+    now = read_costs()
+    for kind, ratio in own.items():
+        assert now.factors(kind)[0] == pytest.approx(2.0 * ratio, rel=0.3)
+
+
+def test_seconds_of_waiting_for_other_programs_are_not_learned() -> None:
+    watch = Stopwatch()
+    time.sleep(0.3)
+    assert watch.read_undisturbed() < 0.2
+    assert watch.read()["total"] >= 0.3
 
 
 @pytest.mark.parametrize(
@@ -70,15 +91,14 @@ def test_the_last_runs_count_and_none_counts_too_much() -> None:
 )
 def test_what_cannot_be_read_does_not_count(text: bytes, folder: Path) -> None:
     (folder / FILE).write_bytes(text + b'\n["good", 2.0, 1.0]\n')
-    assert set(read_costs().runs) <= {"good"}
-    assert list(read_costs().runs["good"]) == [(math.log(2.0), 0.0)]
+    assert list(read_costs().runs) == [PastRun("good", math.log(2.0), 0.0)]
     assert plan(CUBE, TISSUE, [SOURCE]).chosen == "charges"
 
 
 def test_a_folder_in_place_of_the_file_is_no_error(folder: Path) -> None:
     (folder / FILE).mkdir()
     read_costs().learn("kind", 2.0, 1.0)
-    assert read_costs().runs == {}
+    assert list(read_costs().runs) == []
 
 
 def test_figures_that_are_no_ratios_are_not_written(folder: Path) -> None:

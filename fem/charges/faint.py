@@ -14,6 +14,8 @@ from tetlux.fem.charges.adapt import (
     FEWEST_CHARGES,
     LEAST_CHANGE,
     MOST_CHANGE,
+    NEGLIGIBLE_DIP,
+    SMOOTH_ESTIMATE,
     FittedCharges,
     LightSources,
     error_of_each,
@@ -23,7 +25,13 @@ from tetlux.fem.charges.adapt import (
     refine_spacing,
 )
 from tetlux.fem.charges.kernel import Equation
-from tetlux.fem.charges.placement import distance_from, place_charges, spacing_by_fading, weight_by_fading
+from tetlux.fem.charges.placement import (
+    distance_from,
+    place_charges,
+    spacing_by_fading,
+    weight_by_distance,
+    weight_by_fading,
+)
 from tetlux.meshing.surface.surface import Surface
 
 # Where the exitance is below zero on at most this share of the surface, no more charges are fitted.
@@ -60,14 +68,38 @@ def fit_with_faint(
         return best
     distance = distance_from(surface, lights.points)
     fading = float(np.real(equation.wave_number))
+    share, most = _share_below_zero(best), min(most, MOST_FOR_FAINT)
+    if share > 0.0 and best.errors.estimate <= SMOOTH_ESTIMATE:
+        count = COUNT_FACTOR * len(best.placement.charges)
+        if count <= most:
+            spacing = refine_spacing(best.placement.checked, error_of_each(best))
+            weight = weight_by_distance(distance)
+            placement = place_charges(surface, spacing, weight, round(count), height_after(best))
+            best, share = _better(best, share, fit_placed_charges(placement, equation, lights), tolerance)
     spacing, weight = spacing_by_fading(distance, fading), weight_by_fading(distance, fading)
     count, fitted = COUNT_FACTOR * FEWEST_CHARGES, best
-    while best.negative_share > LARGEST_NEGATIVE_SHARE and count <= min(most, MOST_FOR_FAINT):
+    while share > LARGEST_NEGATIVE_SHARE and count <= most:
         placement = place_charges(surface, spacing, weight, round(count), height_after(fitted))
         fitted = fit_placed_charges(placement, equation, lights)
-        if fitted.errors.estimate <= tolerance and fitted.negative_share < best.negative_share:
-            best = fitted
+        best, share = _better(best, share, fitted, tolerance)
         checked = placement.checked
         errors = error_of_each(fitted) * weight(checked.points)
         spacing, count = refine_spacing(checked, errors, LEAST_CHANGE, MOST_CHANGE), COUNT_FACTOR * count
     return best
+
+
+def _better(best: FittedCharges, share: float, fitted: FittedCharges, tolerance: float) -> tuple[FittedCharges, float]:
+    """Of two fits, of which the first is below zero on a share, the better one and its share."""
+    if fitted.errors.estimate > tolerance or (other := _share_below_zero(fitted)) >= share:
+        return best, share
+    return fitted, other
+
+
+def _share_below_zero(fitted: FittedCharges) -> float:
+    """The largest share of the surface where the exitance is below zero, by points that are fitted and by others."""
+    samples = fitted.placement.fitted
+    exitance = fitted.field.exitance(samples.points).sum(axis=1)
+    if np.iscomplexobj(exitance):
+        return fitted.negative_share
+    below = exitance < -NEGLIGIBLE_DIP * exitance.max(initial=0.0)
+    return max(fitted.negative_share, float(samples.areas[below].sum() / samples.areas.sum()))

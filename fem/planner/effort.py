@@ -14,26 +14,27 @@ from tetlux.meshing.surface.surface import Surface
 
 # Seconds of the mesher, and tetrahedra of its mesh, by shape; "scan" is any other. All figures of this file are least
 # squares of what `python -m tests.benchmarks.plans` measures.
-SECONDS_OF_MESHER = {"sphere": 0.7, "slab": 0.7, "box": 1.0, "torus": 1.2, "cylinder": 3.5, "scan": 1.6}
+SECONDS_OF_MESHER = {"sphere": 0.7, "slab": 0.7, "box": 1.0, "torus": 1.4, "cylinder": 3.2, "scan": 2.0}
 FIRST_TETRAHEDRA = {"sphere": 3_000, "slab": 3_000, "box": 6_000, "torus": 2_500, "cylinder": 4_200, "scan": 3_000}
 # Seconds of the mesher for each triangle, and for each diagonal of the smallest region in that of the body.
-SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-5, 0.4
+SECONDS_OF_TRIANGLE, SECONDS_OF_REGION = 3e-5, 0.25
 # Seconds for each tetrahedron of the last mesh, of all meshes together, and with quadratic elements.
-SECONDS_OF_TETRAHEDRON, SECONDS_WITH_QUADRATIC = 2.2e-5, 2e-4
+SECONDS_OF_TETRAHEDRON, SECONDS_WITH_QUADRATIC = 1.9e-5, 2e-4
 # Seconds of reading a mesh from the cache.
 SECONDS_OF_CACHE = 0.02
 # Tetrahedra that a light needs in addition to the mesher's own at a tolerance of .02, and the power of the inverse of
 # the tolerance by which they grow.
 OF_POINTS, RATE_OF_POINTS = 15_000.0, 1.0
 OF_SPOT, RATE_OF_SPOT = 110_000.0, 1.35
-# Those of the first mesh for each square of the length to resolve where light enters, and the tolerance below which it
-# is refined.
-OF_ENTRY, TOLERANCE_OF_ENTRY = 110.0, 0.015
+# Those of the first mesh for each square of the length to resolve where light enters, how many times as many a wide
+# beam takes at a tolerance of .02, on shapes and on scans, which get no layers, and their rate.
+OF_ENTRY = 110.0
+OF_BEAM, OF_BEAM_ON_SCAN, RATE_OF_BEAM = 0.45, 1.5, 1.5
 # Those of the layer below uniform light for each square of the length over which light fades, at a tolerance of .02,
 # and the share of them that a wide beam needs at least, which lights one side.
-OF_LAYER, SHARE_OF_BEAM = 330.0, 0.5
+OF_LAYER, SHARE_OF_BEAM = 220.0, 0.5
 # The share of them that light takes to which charges are fitted, but do not follow it closely enough.
-SHARE_OF_FITTED = 0.45
+SHARE_OF_FITTED = 0.9
 # Relative L2 error of charges under diffuse light, of one charge in each square of the length over which light fades,
 # and the power of charges per square with which it falls. Estimate of ten shapes by 85 to 1,540 charges: .7 to 1.6
 # times as much; of a hare 1.1 and 1.7 times.
@@ -97,7 +98,9 @@ def tetrahedra_of(request: Request, deposit: Deposit) -> float:
     if kind == "spot":
         return OF_SPOT * float(ratio**RATE_OF_SPOT) + _squares_of_entry(deposit) * OF_ENTRY
     if kind == "beam":
-        of_entry = _squares_of_entry(deposit) * OF_ENTRY * max(1.0, TOLERANCE_OF_ENTRY / TOLERANCE * ratio)
+        has_layers = request.surface.shape is not None and not request.inner
+        share = OF_BEAM if has_layers else OF_BEAM_ON_SCAN
+        of_entry = _squares_of_entry(deposit) * OF_ENTRY * share * float(ratio**RATE_OF_BEAM)
         return max(of_entry, SHARE_OF_BEAM * _of_layer(request, ratio))
     if kind == "layer":
         return _of_layer(request, ratio)

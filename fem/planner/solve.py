@@ -74,7 +74,7 @@ def solve_by_plan(
     watch = Stopwatch()
     found, missed = _solve_by(request, elements, report, plan)
     if request.runs == 1:
-        _learn(request, plan.best, found, watch.read()["total"])
+        _learn(request, plan.best, found, watch.read_undisturbed())
     if missed:
         plan = plan.without(plan.chosen, missed)
         report(f"{missed}: going on with {plan.chosen}")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tetlux.meshing.arrays import FloatArray, IntArray
+from tetlux.meshing.surface.subdivide import NEXT_CORNER
 from tetlux.meshing.surface.triangles import longest_sides
 
 # Levels of the octree; what shares a cell of the finest one is a group of its own each below it.
@@ -72,11 +73,13 @@ class TriangleGroups:
 
 def bisect(corners: FloatArray) -> FloatArray:
     """Cut triangles (f, 3, 3) in the middle of their longest sides, (2 f, 3, 3)."""
-    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
-    turn = (_largest(sides)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(corners, turn[:, :, None], axis=1).transpose(1, 0, 2)
-    middle = 0.5 * (a + b)
-    return np.stack([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)], axis=1).reshape(-1, 3, 3)
+    sides = np.linalg.norm(corners - corners[:, NEXT_CORNER], axis=2)
+    longest, rows = _largest(sides), np.arange(len(corners))
+    a, b, c = (corners[rows, (longest + turn) % 3] for turn in range(3))
+    halves = np.empty((len(corners), 2, 3, 3))
+    halves[:, 0, 0], halves[:, 1, 1], halves[:, :, 2] = a, b, c[:, None]
+    halves[:, 0, 1] = halves[:, 1, 0] = 0.5 * (a + b)
+    return halves.reshape(-1, 3, 3)
 
 
 def cut_long_triangles(corners: FloatArray) -> tuple[IntArray, FloatArray]:
