@@ -45,9 +45,11 @@ def _case_file_of(case: Case) -> dict[str, Any]:
 
 def _make_paths_absolute(value: dict[str, Any] | list[Any], folder: Path) -> None:
     """Replace relative paths anywhere within plain data, in place."""
-    entries = value.items() if isinstance(value, dict) else enumerate(value)
-    for key, entry in entries:
+    if isinstance(value, dict):
+        for key in PATHS:
+            if isinstance(value.get(key), str):
+                value[key] = os.path.abspath(folder / value[key])  # noqa: PTH100
+        value = list(value.values())
+    for entry in value:
         if isinstance(entry, dict | list):
             _make_paths_absolute(entry, folder)
-        elif key in PATHS and isinstance(entry, str):
-            value[key] = os.path.abspath(folder / entry)  # noqa: PTH100
