@@ -95,6 +95,7 @@ def wait_until(true: Callable[[], bool], seconds: float = 20.0) -> bool:
 
 
 @linux
+@pytest.mark.slow
 @pytest.mark.parametrize("notes", [False, True], ids=["alone", "beside notes"])
 def test_killed_at_twenty_moments(notes: bool, tmp_path: Path) -> None:
     """Every run has a power of its own, by which its files are known, and makes its own mesh."""

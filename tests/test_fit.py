@@ -35,6 +35,7 @@ def problem_on(mesh: TetMesh, surface: Surface, readings: FloatArray, names: lis
     return FitProblem(surface, mesh, [BEAM], DETECTORS, (), unknowns, measured, np.full(measured.shape, NOISE))
 
 
+@pytest.mark.slow
 def test_coefficients_of_a_torus_are_found_again() -> None:
     """By ten detectors from a start a factor of 3 off, of readings that are not those of the mesh."""
     truth = Medium(sigma_a=0.02, sigma_s_prime=1.1, eta=1.4)
@@ -79,6 +80,7 @@ def test_covariance_is_that_of_repeated_fits(ball: Surface) -> None:
     assert correlations[0, 1] == pytest.approx(found.covariance[0, 1] / np.prod(list(found.errors.values())), abs=0.1)
 
 
+@pytest.mark.slow
 def test_places_of_lights_are_found(ball: Surface) -> None:
     """A point from 4 mm away with the absorption, and a beam from 2 mm away, with readings of charges."""
     truth = replace(START, sigma_a=0.02)
@@ -99,6 +101,7 @@ def test_places_of_lights_are_found(ball: Surface) -> None:
     assert found.undetermined == ()
 
 
+@pytest.mark.slow
 def test_moves_along_a_beam_are_not_told(ball: Surface, ball_mesh: TetMesh) -> None:
     readings = sensitivity(System(ball_mesh, START, ball), [BEAM], DETECTORS[:3], per="region").readings
     begin, names = replace(BEAM, origin=(0.1, 0.0, 20.0)), ["light1.x", "light1.z"]
@@ -120,6 +123,7 @@ def test_a_light_outside_of_the_body_is_no_step(ball: Surface, ball_mesh: TetMes
     assert np.isinf(problem.residuals(outside)).all()
 
 
+@pytest.mark.slow
 def test_a_region_is_fitted(ball: Surface) -> None:
     medium = Medium(sigma_a=0.03, sigma_s_prime=1.3, eta=1.4)
     inner = Region(sphere(5.0, center=(0.0, 1.0, 0.0)), medium)
@@ -135,6 +139,7 @@ def test_a_region_is_fitted(ball: Surface) -> None:
     assert result.values["sigma_a"] == pytest.approx(0.01, rel=0.03)
 
 
+@pytest.mark.slow
 def test_oxygen_is_found_at_two_wavelengths_with_modulated_light(ball: Surface) -> None:
     given = {"wavelengths": [690.0, 830.0], "hbo2": 60e-6, "hhb": 40e-6, "water": 0.7, "a": 1.2, "b": 1.3, "eta": 1.4}
     media = tissue(**given)  # type: ignore[arg-type]

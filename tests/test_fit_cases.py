@@ -45,6 +45,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out" / "ball"
 
 
+@pytest.mark.slow
 def test_coefficients_are_found(finished: Path) -> None:
     data = json.loads((finished / "fit.json").read_text())
     for name, truth in (("sigma_a", 0.02), ("sigma_s_prime", 1.1)):
@@ -212,6 +213,7 @@ def test_chromophores_of_regions_are_unknowns(tmp_path: Path) -> None:
     assert case.fit.bounds[2, 1] < 1.0
 
 
+@pytest.mark.slow
 def test_a_case_has_the_light_that_was_found(tmp_path: Path) -> None:
     beam, there = PencilBeam((1, 0, 20), (0, 0, -1)), [PointDetector(place) for place in PLACES.values()]
     medium = Medium(sigma_a=0.015, sigma_s_prime=1.3, eta=1.4)

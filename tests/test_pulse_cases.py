@@ -35,6 +35,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out" / "ball"
 
 
+@pytest.mark.slow
 def test_readings_over_time_are_those_of_the_series(finished: Path) -> None:
     with (finished / "pulse.csv").open(encoding="utf-8") as file:
         rows = {(row["name"], row["channel"], float(row["time [s]"])): row for row in csv.DictReader(file)}

@@ -29,6 +29,7 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text_of(page), flags=re.DOTALL)
 
 
+@pytest.mark.slow
 def test_the_python_lines_run_and_say_what_they_promise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     first, second, third = blocks("docs/python.md", "python")

@@ -73,21 +73,30 @@ class ChargeDerivative:
         dtype = np.result_type(equation.dtype, self.strengths)
         fluence, gradient = np.empty(len(points), dtype), np.empty((len(points), 3), dtype)
         k, origin = equation.wave_number, charges.positions[0]
-        near = charges.positions - origin
+        # Sums over charges are products with thin matrices, and powers are products: twice as fast as by each charge.
+        ends = np.column_stack([charges.positions - origin, np.ones(len(charges.positions))])
+        own, turned = charges.strengths, self.wave_number * charges.strengths
+        changed = self.strengths - self.diffusion / equation.diffusion * own
+        by_value = np.column_stack([changed, -k * turned[:, None] * ends])
+        by_slope = np.column_stack([self.strengths[:, None] * ends, own[:, None] * self.positions])
+        by_curve = own[:, None] * ends
 
         def work(rows: slice) -> None:
             some = points[rows]
             distance, along = distances_between(some, charges.positions), self._along(some)
             value = equation.unit_fluence(distance)
-            slope = value * (k + 1.0 / distance) / distance
-            # By the charges as they are, and by their strengths, wave number and places.
-            direct = self.strengths - charges.strengths * self.wave_number * distance
-            moved = charges.strengths * slope
-            curved = charges.strengths * value * ((k * distance) ** 2 + 3.0 * k * distance + 3.0) / distance**4
-            fluence[rows] = (value * direct + moved * along).sum(axis=1)
-            fluence[rows] -= self.diffusion / equation.diffusion * (value @ charges.strengths)
-            outward = slope * direct + charges.strengths * self.wave_number * value / distance + curved * along
-            gradient[rows] = outward @ near - outward.sum(axis=1)[:, None] * (some - origin) + moved @ self.positions
+            inverse = np.reciprocal(distance)
+            slope = value * inverse
+            slope *= inverse + k
+            curve = k**2 * value
+            curve += 3.0 * slope
+            inverse *= inverse
+            inverse *= along
+            curve *= inverse
+            of_value, of_slope = value @ by_value, slope @ by_slope
+            fluence[rows] = of_value[:, 0] + (slope * along) @ own - (value * distance) @ turned
+            outward = of_value[:, 1:] + of_slope[:, :4] + curve @ by_curve
+            gradient[rows] = outward[:, :3] - outward[:, 3:] * (some - origin) + of_slope[:, 4:]
 
         run_in_blocks(work, len(points), rows_per_block(charges.positions))
         return fluence, equation.diffusion * gradient

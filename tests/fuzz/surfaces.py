@@ -32,8 +32,8 @@ class Malformed:
 def off(points: FloatArray, faces: IntArray) -> bytes:
     """A text that keeps every digit."""
     rows = [f"OFF\n{len(points)} {len(faces)} 0"]
-    rows += [" ".join(repr(float(x)) for x in point) for point in points]
-    rows += ["3 " + " ".join(str(int(i)) for i in face) for face in faces]
+    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(points, dtype=float).tolist()]
+    rows += [f"3 {a} {b} {c}" for a, b, c in faces.tolist()]
     return ("\n".join(rows) + "\n").encode()
 
 
@@ -554,7 +554,8 @@ def exports(seed: int = 0) -> Iterator[tuple[str, Arrays]]:
     for gap in (0.2e-7, 0.5e-7, 1e-7, 2e-7, 1e-6, 1e-5):
         apart = soup + random.choice([0.0, gap * 34.6], size=soup.shape)
         yield f"corners {gap:g} of the size apart", (apart, np.arange(len(soup)).reshape(-1, 3))
-    crumb = sphere(1.0, subdivisions=1)
+    # Cubes have the fewest triangles of the shapes that are as large as a ball of radius 1.
+    crumb = box((2.0, 2.0, 2.0))
     for size in (1e-6, 1e-3, 0.05, 0.2, 0.5, 1.0):
         for count in (1, 30, 1200):
             at = random.normal(scale=20.0, size=(count, 3))
