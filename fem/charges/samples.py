@@ -276,21 +276,18 @@ def _close_pairs(points: FloatArray, radii: FloatArray) -> tuple[IntArray, IntAr
 
     Points are asked for their neighbours in groups of like radii, beyond which no search needs to go.
     """
-    tree, count = cKDTree(points), len(points)
+    tree, most, pairs = cKDTree(points), min(CHECKED_NEIGHBOURS, len(points)), []
     classes = np.floor(RADII_PER_OCTAVE * np.log2(radii))
-    pairs = []
     for each in np.unique(classes):
         some = np.flatnonzero(classes == each)
-        largest = float(radii[some].max())
-        found = tree.query(points[some], k=min(CHECKED_NEIGHBOURS, count), distance_upper_bound=largest)
-        distance, near = np.asarray(found[0]), np.asarray(found[1])
+        nearest = tree.query(points[some], most, distance_upper_bound=radii[some].max())
+        distance, near = (np.asarray(found) for found in nearest)
         # Where there are fewer neighbours, there is the number of points in place of that of a neighbour.
         place, column = np.nonzero(near < some[:, None])
         first, second = some[place], near[place, column]
         close = distance[place, column] < np.minimum(radii[first], radii[second])
         pairs.append((first[close], second[close]))
-    late, early = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    return late, early
+    return np.concatenate([late for late, _ in pairs]), np.concatenate([early for _, early in pairs])
 
 
 def spread(cells: Cells, rng: np.random.Generator) -> tuple[Samples, Samples]:
