@@ -48,7 +48,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 FACET_WEIGHT = 0.5
 # Where light is deposited just below facets, it moves with them, and the errors of gradients and facets add up.
 LIT_FACET_WEIGHT = 1.0
-# In layers, where light varies with depth alone, the square of the difference of gradients from their average is a third
+# In layers light varies with depth alone: the mean square of the difference of gradients from their average is a third
 # of that at the corners.
 LAYER_GRADIENT_WEIGHT = 0.4
 # A bright spot is smaller than facets if its norm, where charges are fitted, is less than this share of that at nodes.
@@ -128,7 +128,7 @@ def estimate_error(
         count = len(mesh.tetrahedra)
         no_duals = np.zeros((len(mesh.points), 2))
         nothing = np.zeros((2, count))
-        return Estimate(*nothing, np.ones(count, dtype=np.int64), no_duals, nothing)
+        return Estimate(nothing[0], nothing[1], np.ones(count, dtype=np.int64), no_duals, nothing)
     duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
     (indicators, power_indicators), of_heights = _weigh(solution, coefficients, duals, emission, inner, fitting, load)
     indicators += ripple_indicators(mesh, coefficients, load, norm)

@@ -20,6 +20,8 @@ LARGEST_SPLIT_SHARE = 0.8
 MOST_ROUNDS = 2
 # The error of the exitance that refinement aims at, as a share of the tolerance.
 AIM_SHARE = 0.65
+# The same on meshes with layers, on which the estimate of large bodies is below the error.
+LAYERED_AIM_SHARE = 0.55
 # The error of the total exited power that refinement aims at, as a share of the tolerance.
 POWER_AIM_SHARE = 0.4
 # The shares of these errors that the heights of layers may have at most, and that they are given when they are changed.
@@ -76,7 +78,8 @@ def height_ratio(estimates: Iterable[Estimate], tolerance: float) -> float:
 
 def _aims(estimate: Estimate, tolerance: float) -> list[tuple[FloatArray, FloatArray, float]]:
     """The indicators (m,) of the exitance and of the power, what is due to heights in them, and the aims of both."""
-    aims = AIM_SHARE * tolerance, POWER_AIM_SHARE * tolerance
+    share = LAYERED_AIM_SHARE if estimate.of_heights.any() else AIM_SHARE
+    aims = share * tolerance, POWER_AIM_SHARE * tolerance
     return list(zip((estimate.exitance_indicators, estimate.power_indicators), estimate.of_heights, aims, strict=True))
 
 

@@ -33,8 +33,8 @@ LATERAL_SIZE = 1.0
 NODES_OF_REGULAR = 22.0
 # Layers are made if they are expected to need at most this share of the nodes.
 MUCH_SMALLER = 0.25
-# Size of tetrahedra at rims and creases, in the resolution without layers.
-RIM_SIZE = 1.4
+# Sizes of tetrahedra at creases and at rims, in the resolution without layers.
+CREASE_SIZE, RIM_SIZE = 2.0, 1.0
 # Least spacing of places along creases, relative to the diagonal of the body.
 LEAST_SPACING = 0.005
 
@@ -129,8 +129,8 @@ class Layers:
         points = ends[own, 0] + along[:, None] * (ends[own, 1] - ends[own, 0])
         if len(points):
             points = points[self.lights(points)]
-        points = np.vstack([points, self.rims])
-        return points, np.full(len(points), RIM_SIZE * self.resolution)
+        sizes = np.repeat([CREASE_SIZE, RIM_SIZE], [len(points), len(self.rims)])
+        return np.vstack([points, self.rims]), sizes * self.resolution
 
     def on(self, mesh: TetMesh) -> tuple[TetMesh, IntArray]:
         """A mesh with the layers, and what each of its tetrahedra belongs to: see `add_layers`."""

@@ -35,7 +35,7 @@ THREE_POINTS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0
 # cosine than the second one is refracted by flat facets.
 LEAST_BEND_COSINE, LEAST_COSINE = 0.8, 0.02
 # Where light meets a surface at a smaller cosine, it varies along the surface as fast as with depth.
-GRAZING = 0.25
+GRAZING = 0.18
 
 
 @dataclass(frozen=True)

@@ -164,9 +164,7 @@ def _joined(mesh: TetMesh, layers: _Filled) -> tuple[TetMesh, IntArray]:
     parents = np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[layers.facets]])
     tetrahedra = np.vstack([mesh.tetrahedra, layers.tetrahedra])
     columns = np.concatenate([np.repeat(mesh.tetrahedra[:, :, None], 2, axis=2), layers.columns])
-    layered = TetMesh(
-        layers.points, tetrahedra, mesh.unit, labels=mesh.labels, columns=columns, warnings=mesh.warnings
-    )
+    layered = TetMesh(layers.points, tetrahedra, mesh.unit, labels=mesh.labels, columns=columns, warnings=mesh.warnings)
     return (replace(layered, regions=mesh.regions[parents]) if mesh.regions.any() else layered), parents
 
 
