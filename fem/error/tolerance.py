@@ -60,7 +60,8 @@ def cells_to_split(estimates: Sequence[Estimate], tolerance: float, rounds: int 
     """
     splits = np.zeros(len(estimates[0].splits), dtype=np.int64)
     for estimate in estimates:
-        for (indicators, of_heights, aim), often in zip(_aims(estimate, tolerance), (estimate.splits, 1), strict=True):
+        each = (estimate.splits, np.ones_like(estimate.splits))
+        for (indicators, of_heights, aim), often in zip(_aims(estimate, tolerance), each, strict=True):
             left = aim - min(float(of_heights.sum()), LARGEST_HEIGHT_SHARE * aim)
             splits = np.maximum(splits, np.minimum(often * _rounds(indicators - of_heights, left, rounds), MOST_SPLITS))
     return splits

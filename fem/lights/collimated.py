@@ -208,8 +208,8 @@ def _rays_on_curved(
     """
     at_corners = vertex_normals(mesh.boundary_points, mesh.boundary_triangles)[mesh.boundary_triangles[facets]]
     flat = mesh.surface.normals[facets][:, None]
-    is_smooth = (at_corners @ flat.swapaxes(1, 2) > LEAST_BEND_COSINE).all(axis=(1, 2))[:, None, None]
-    normals = np.where(is_smooth, THREE_POINTS @ at_corners, flat)
+    is_smooth = np.einsum("fci,fki->fc", at_corners, flat).min(axis=1) > LEAST_BEND_COSINE
+    normals = np.where(is_smooth[:, None, None], THREE_POINTS @ at_corners, flat)
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     cosines = np.maximum(-normals @ direction, 0.0)
     # Where all are in the dark, the facet is at the border of the light.

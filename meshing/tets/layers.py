@@ -155,8 +155,8 @@ def _fill(mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArra
             facets.append(solid)
             least.append(share[solid])
             columns.append(own[solid])
-    each = (np.concatenate(parts) for parts in (cells, facets, least, columns))
-    return _Filled(np.vstack(points), *each)
+    every = np.concatenate(columns)
+    return _Filled(np.vstack(points), np.vstack(cells), np.concatenate(facets), np.concatenate(least), every)
 
 
 def _joined(mesh: TetMesh, layers: _Filled) -> tuple[TetMesh, IntArray]:
