@@ -33,8 +33,6 @@ from tetlux.meshing.tets.mesh import TetMesh
 
 # Refinement stops at this many tetrahedra unless told otherwise.
 MOST_TETRAHEDRA = 1_000_000
-# Where a finer mesh has more than this share of the error, it is the layers that have to be finer.
-SLOW = 0.8
 # With room for fewer than this many times as many tetrahedra, and below layers, they are split in one round at a time.
 ROOM = 5
 # A shared mesh is graded for the lights of some runs. One that is good for them but for this factor serves for others.
@@ -277,12 +275,13 @@ def solve_and_refine(
         with problem.watch.stage("solve"):
             once = layers is not None or ROOM * len(mesh.tetrahedra) > most_tetrahedra
             found = tolerances.assess(steps, rounds=1 if once else MOST_ROUNDS)
-        if layers is not None and found.largest_error_ratio > SLOW * least_ratio:
-            layers = layers.thinner()
+        higher = layers
+        if layers is not None:
+            layers = layers.scaled(found.heights)
         if found.largest_error_ratio < least_ratio:
             best_steps, least_ratio = steps, found.largest_error_ratio
         report(f"solved on {len(mesh.tetrahedra):,} tetrahedra: {found.summary}")
-        fine_enough = not found.splits.any()
+        fine_enough = not found.splits.any() and layers is higher
         if not fine_enough and len(mesh.tetrahedra) < most_tetrahedra:
             with problem.watch.stage("mesh"):
                 surfaces = problem.scenes.surface, problem.scenes.inner

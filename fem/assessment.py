@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.error.tolerance import MOST_ROUNDS, cells_to_split, splits_for_fields, splits_for_readings
+from tetlux.fem.error.tolerance import MOST_ROUNDS, cells_to_split, height_ratio, splits_for_fields, splits_for_readings
 from tetlux.fem.outcome.detectors import PlacedDetector, estimate_reading
 from tetlux.fem.quadratic.field_error import field_errors
 from tetlux.fem.quadratic.reading_error import ReadingError
@@ -73,10 +73,12 @@ class Tolerances:
         steps = list(by_scene.values())
         splits = np.zeros(len(steps[0].solution.mesh.tetrahedra), dtype=np.int64)
         error = max(step.estimate.error for step in steps)
-        largest_ratio, summary = 0.0, f"estimated error {error:.2%}"
+        largest_ratio, heights, summary = 0.0, 1.0, f"estimated error {error:.2%}"
         if self.exitance is not None:
             largest_ratio = error / self.exitance
-            splits += cells_to_split((step.estimate for step in steps), self.exitance, rounds)
+            estimates = [step.estimate for step in steps]
+            splits += cells_to_split(estimates, self.exitance, rounds)
+            heights = height_ratio(estimates, self.exitance)
         if self.readings is not None:
             readings = [reading for scene, step in by_scene.items() for reading in self._read(scene, step)]
             of_readings = max((reading.relative for reading in readings), default=0.0)
@@ -90,7 +92,7 @@ class Tolerances:
             largest_ratio = max(largest_ratio, error / tolerance)
             summary += f", {FIELD_NAMES[where]} {error:.2%}"
             splits = np.maximum(splits, splits_for_fields(bands, tolerance, len(splits)))
-        return Assessment(largest_ratio, splits, summary)
+        return Assessment(largest_ratio, splits, heights, summary)
 
     def _read(self, scene: int, step: MeshSolution) -> list[ReadingError]:
         quadratic = step.solution.quadratic
@@ -115,10 +117,13 @@ class Assessment:
         The largest ratio of an estimated error to its tolerance.
     splits : (m,) ndarray of int
         How often to split each tetrahedron.
+    heights : float
+        What to multiply the heights of layers by.
     summary : str
         The errors, in a few words.
     """
 
     largest_error_ratio: float
     splits: IntArray
+    heights: float
     summary: str

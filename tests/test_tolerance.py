@@ -44,7 +44,7 @@ def test_tetrahedra_are_split_as_often_as_the_error_asks_for(error: float, most:
     large = np.arange(100) < 5
     indicators = error * np.where(large, 0.1, 0.5 / 95.0)
     none = np.zeros(100)
-    once = Estimate(indicators, none, np.ones(100, dtype=np.int64), np.zeros((0, 2)))
+    once = Estimate(indicators, none, np.ones(100, dtype=np.int64), np.zeros((0, 2)), np.zeros((2, 100)))
     splits = cells_to_split([once], 0.01)
     assert splits.max() == most
     assert (splits[large] == most).all()

@@ -56,4 +56,5 @@ def estimate_by_operator(
         np.sum([each.power_indicators for each in estimates], axis=0),
         np.max([each.splits for each in estimates], axis=0),
         estimates[-1].duals,
+        np.sum([each.of_heights for each in estimates], axis=0),
     )

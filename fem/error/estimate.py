@@ -39,6 +39,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
+from tetlux.meshing.tets.layers import are_layered, tops_of
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Weight of the indicators of facets, whose errors partly cancel those of gradients. With it the estimate is 0.6 to 3
@@ -47,6 +48,9 @@ from tetlux.meshing.tets.mesh import TetMesh
 FACET_WEIGHT = 0.5
 # Where light is deposited just below facets, it moves with them, and the errors of gradients and facets add up.
 LIT_FACET_WEIGHT = 1.0
+# In layers light varies with depth alone: the mean square of the difference of gradients from their average is a third
+# of that at the corners.
+LAYER_GRADIENT_WEIGHT = 0.4
 # A bright spot is smaller than facets if its norm, where charges are fitted, is less than this share of that at nodes.
 SMALL_SPOT = 0.5
 # Exited power below this share of the incident power is rounding error of the linear solver.
@@ -65,12 +69,15 @@ class Estimate:
         How often a tetrahedron has to be split at once for its error in the exitance to become less.
     duals : (n, 2) ndarray
         The dual solutions of both; of several parts those of the last.
+    of_heights : (2, m) ndarray
+        What is due to the heights of layers in the indicators of both, and no split removes.
     """
 
     exitance_indicators: FloatArray
     power_indicators: FloatArray
     splits: IntArray
     duals: NumberArray
+    of_heights: FloatArray
 
     @property
     def error(self) -> float:
@@ -120,13 +127,14 @@ def estimate_error(
         # Where no light leaves, the exitance has no error.
         count = len(mesh.tetrahedra)
         no_duals = np.zeros((len(mesh.points), 2))
-        return Estimate(np.zeros(count), np.zeros(count), np.ones(count, dtype=np.int64), no_duals)
+        nothing = np.zeros((2, count))
+        return Estimate(nothing[0], nothing[1], np.ones(count, dtype=np.int64), no_duals, nothing)
     duals = solver.solve_to_low_accuracy(_dual_loads(mesh, coefficients, whole.exitance, norm, total)).x
-    indicators, power_indicators = weigh_residual(solution, coefficients, duals, emission, inner, fitting, load)
+    (indicators, power_indicators), of_heights = _weigh(solution, coefficients, duals, emission, inner, fitting, load)
     indicators += ripple_indicators(mesh, coefficients, load, norm)
     unresolved = _unresolved_indicators(solution, norm)
     splits = np.where(unresolved > indicators, _splits_to_resolve(solution), 1)
-    return Estimate(indicators + unresolved, power_indicators, splits, duals)
+    return Estimate(indicators + unresolved, power_indicators, splits, duals, of_heights)
 
 
 def weigh_residual(
@@ -135,10 +143,21 @@ def weigh_residual(
     duals: NumberArray,
     emission: float | FloatArray = 0.0,
     inner: Sequence[Surface] = (),
+) -> FloatArray:
+    """Indicators of the tetrahedra, (k, m), by each of several dual solutions (n, k): see `estimate_error`."""
+    return _weigh(solution, coefficients, duals, emission, inner)[0]
+
+
+def _weigh(
+    solution: Solution,
+    coefficients: Coefficients,
+    duals: NumberArray,
+    emission: float | FloatArray = 0.0,
+    inner: Sequence[Surface] = (),
     fitting: LayerFitting | None = None,
     load: FloatArray | None = None,
-) -> list[FloatArray]:
-    """Indicators of the tetrahedra, (m,), by each of several dual solutions (n, k): see `estimate_error`."""
+) -> tuple[FloatArray, FloatArray]:
+    """Indicators of the tetrahedra, (k, m), by each of several dual solutions (n, k), and what is due to heights."""
     mesh, mean = solution.mesh, nodal_averaging(solution.mesh)
     smooth, difference = subtract_patches(solution, mean)
     gradient_error = root_mean_square(difference)
@@ -149,7 +168,10 @@ def weigh_residual(
     afar = 1.0 if load is None else _share_from_afar(mesh, coefficients, load, outward_flux)
     facet_weight = afar * FACET_WEIGHT + (1.0 - afar) * LIT_FACET_WEIGHT
 
-    def indicators_for_dual(dual: NumberArray) -> FloatArray:
+    layered = are_layered(mesh, np.arange(len(mesh.tetrahedra)))
+    gradient_error[layered] *= LAYER_GRADIENT_WEIGHT
+
+    def indicators_for_dual(dual: NumberArray) -> tuple[FloatArray, FloatArray]:
         at_corners = dual[mesh.tetrahedra]
         indicators = (
             diffusion
@@ -158,6 +180,7 @@ def weigh_residual(
             * root_mean_square(recovered_gradient_difference(mesh, mean, dual))
         )
         indicators += scale * np.abs(coefficients.sigma) * mesh.volumes * lumping_error(smooth, at_corners)
+        of_heights = np.where(layered, indicators, 0.0)
         indicators += _boundary_lumping(mesh, coefficients, smooth, dual)
         if fitting is not None:
             indicators += boundary_layers(mesh, coefficients, fitting, smooth[mesh.boundary_cells], dual)
@@ -166,11 +189,11 @@ def weigh_residual(
             mesh, coefficients, solution.surface, values, float(indicators.sum()), scale * afar
         )
         indicators += interface_layers(mesh, coefficients, smooth, at_corners)
-        return indicators + FACET_WEIGHT * interface_facets(
-            mesh, coefficients, inner, emission, (solution.fluence, dual)
-        )
+        indicators += FACET_WEIGHT * interface_facets(mesh, coefficients, inner, emission, (solution.fluence, dual))
+        return indicators, of_heights
 
-    return map_in_threads(indicators_for_dual, list(duals.T))
+    found = np.array(map_in_threads(indicators_for_dual, list(duals.T)))
+    return found[:, 0], found[:, 1]
 
 
 def _share_from_afar(
@@ -180,6 +203,10 @@ def _share_from_afar(
     cells = mesh.boundary_cells
     # Below an area, light that decays over a mean free path leaves that much times its density at the surface.
     entering = density_below_facets(mesh, load) * 3.0 * at_cells(coefficients.diffusion, cells)
+    if mesh.columns is not None:
+        # Below layers all of it is known, however thick they are.
+        columns = np.bincount(tops_of(mesh), load, minlength=len(load))[mesh.boundary_nodes]
+        entering = np.maximum(entering, (columns / mesh.boundary_node_areas)[mesh.boundary_triangles].mean(axis=1))
     flux = np.abs(outward_flux[mesh.boundary_faces].mean(axis=1))
     share = np.ones(len(mesh.tetrahedra))
     np.minimum.at(share, cells, np.clip(1.0 - entering / np.maximum(flux, np.finfo(float).tiny), 0.0, 1.0))

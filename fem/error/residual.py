@@ -22,6 +22,7 @@ from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.outcome.solution import Solution
 from tetlux.meshing.arrays import FloatArray, NumberArray
+from tetlux.meshing.tets.layers import are_layered
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import corner_groups
 
@@ -105,6 +106,8 @@ def ripple_indicators(mesh: TetMesh, coefficients: Coefficients, load: FloatArra
     square = edge * np.maximum(edge, along)
     robin = boundary_condition_of(coefficients.outer).robin
     ripple = RIPPLE_FACTOR * square * density_below_facets(mesh, load) * robin / diffusion
+    # Layers have the light of prisms, which does not ripple.
+    ripple[are_layered(mesh, cells)] = 0.0
     indicators = np.bincount(cells, mesh.boundary_areas * ripple**2, minlength=len(mesh.tetrahedra))
     total = float(np.sqrt(indicators.sum()))
     return np.asarray(indicators / (total * norm if total > 0 else 1.0), dtype=np.float64)

@@ -1,6 +1,6 @@
 """Tolerances of the exitance and of readings: their range, and which tetrahedra to split to meet them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -20,8 +20,13 @@ LARGEST_SPLIT_SHARE = 0.8
 MOST_ROUNDS = 2
 # The error of the exitance that refinement aims at, as a share of the tolerance.
 AIM_SHARE = 0.65
+# The same on meshes with layers, on which the estimate of large bodies is below the error.
+LAYERED_AIM_SHARE = 0.55
 # The error of the total exited power that refinement aims at, as a share of the tolerance.
 POWER_AIM_SHARE = 0.4
+# The shares of these errors that the heights of layers may have at most, and that they are given when they are changed.
+# They are changed by no more than the last factor at once.
+LARGEST_HEIGHT_SHARE, HEIGHT_SHARE, LARGEST_CHANGE = 0.4, 0.3, 0.5
 # An error of at most this many times the aim is not refined further.
 REFINE_ABOVE = 1.05
 # The estimated error of a reading that refinement aims at, as a share of the tolerance; it leaves room for true errors
@@ -48,23 +53,35 @@ def check_tolerance(tolerance: float, name: str = "tolerance") -> None:
         raise InputError(f"{name} is {tolerance:g}; give a relative error between 0.0001 and 1, such as 0.02.")
 
 
-def cells_to_split(estimates: Iterable[Estimate], tolerance: float, rounds: int = MOST_ROUNDS) -> IntArray:
+def cells_to_split(estimates: Sequence[Estimate], tolerance: float, rounds: int = MOST_ROUNDS) -> IntArray:
     """How often to split each tetrahedron, (m,): the fewest that bring the errors of each estimate to their aims.
 
     Each round splits those with the largest errors that are left.
     """
-    wanted = [
-        aim
-        for estimate in estimates
-        for aim in (
-            (estimate.exitance_indicators, AIM_SHARE * tolerance, estimate.splits),
-            (estimate.power_indicators, POWER_AIM_SHARE * tolerance, np.ones_like(estimate.splits)),
-        )
-    ]
-    splits = np.zeros(len(wanted[0][0]), dtype=np.int64)
-    for indicators, aim, often in wanted:
-        splits = np.maximum(splits, np.minimum(often * _rounds(indicators, aim, rounds), MOST_SPLITS))
+    splits = np.zeros(len(estimates[0].splits), dtype=np.int64)
+    for estimate in estimates:
+        each = (estimate.splits, np.ones_like(estimate.splits))
+        for (indicators, of_heights, aim), often in zip(_aims(estimate, tolerance), each, strict=True):
+            left = aim - min(float(of_heights.sum()), LARGEST_HEIGHT_SHARE * aim)
+            splits = np.maximum(splits, np.minimum(often * _rounds(indicators - of_heights, left, rounds), MOST_SPLITS))
     return splits
+
+
+def height_ratio(estimates: Iterable[Estimate], tolerance: float) -> float:
+    """What the heights of layers have to be multiplied by to bring the errors of each estimate to their aims."""
+    ratio = 1.0
+    for estimate in estimates:
+        for indicators, of_heights, aim in _aims(estimate, tolerance):
+            if indicators.sum() > REFINE_ABOVE * aim and of_heights.sum() > LARGEST_HEIGHT_SHARE * aim:
+                ratio = min(ratio, max(HEIGHT_SHARE * aim / float(of_heights.sum()), LARGEST_CHANGE))
+    return ratio
+
+
+def _aims(estimate: Estimate, tolerance: float) -> list[tuple[FloatArray, FloatArray, float]]:
+    """The indicators (m,) of the exitance and of the power, what is due to heights in them, and the aims of both."""
+    share = LAYERED_AIM_SHARE if estimate.of_heights.any() else AIM_SHARE
+    aims = share * tolerance, POWER_AIM_SHARE * tolerance
+    return list(zip((estimate.exitance_indicators, estimate.power_indicators), estimate.of_heights, aims, strict=True))
 
 
 def _rounds(indicators: FloatArray, aim: float, most: int) -> IntArray:

@@ -22,9 +22,9 @@ from tetlux.meshing.tets.refine import refine_often
 # Layers below a surface that light covers: the height of the first for a tolerance of .02, in depths over which the
 # light decays to 1/e; by how much each is higher than the one above it, for each depth that it lies deeper; and the
 # depth of the last. The error is proportional to the square of the heights.
-FIRST_LAYER, LAYER_TOLERANCE, LAYER_GROWTH, DEEPEST_LAYER = 0.07, 0.02, 6.0, 30.0
-# Layers become thinner by this factor where they are what limits the error, down to the second share of their height.
-THINNER, THINNEST = 0.7, 0.1
+FIRST_LAYER, LAYER_TOLERANCE, LAYER_GROWTH, DEEPEST_LAYER = 0.4, 0.02, 1.5, 30.0
+# Layers that limit the error become thinner, down to this share of their height.
+THINNEST = 0.05
 # A node is lit if a place where light enters is nearer than this many times the distance between neighbouring ones.
 NEAR_PLACES = 3.0
 # Lateral size of tetrahedra that a curved surface needs, over its radius of curvature and the root of the tolerance.
@@ -33,8 +33,8 @@ LATERAL_SIZE = 1.0
 NODES_OF_REGULAR = 22.0
 # Layers are made if they are expected to need at most this share of the nodes.
 MUCH_SMALLER = 0.25
-# Size of tetrahedra at rims and creases, in the resolution without layers.
-RIM_SIZE = 2.0
+# Sizes of tetrahedra at creases and at rims, in the resolution without layers.
+CREASE_SIZE, RIM_SIZE = 2.0, 1.0
 # Least spacing of places along creases, relative to the diagonal of the body.
 LEAST_SPACING = 0.005
 
@@ -102,9 +102,10 @@ class Layers:
         count = int(np.log1p(LAYER_GROWTH * DEEPEST_LAYER) / np.log(ratio))
         return np.asarray(self.depth / LAYER_GROWTH * (ratio ** np.arange(1, count + 1) - 1.0))
 
-    def thinner(self) -> "Layers":
-        """Layers of smaller heights."""
-        return replace(self, thinned=max(THINNER * self.thinned, THINNEST))
+    def scaled(self, factor: float) -> "Layers":
+        """Layers of smaller heights, or the same if these are the least."""
+        thinned = max(factor * self.thinned, THINNEST)
+        return replace(self, thinned=thinned) if thinned < self.thinned else self
 
     def lights(self, points: FloatArray) -> BoolArray:
         """Whether points of the surface (q, 3) are lit."""
@@ -128,8 +129,8 @@ class Layers:
         points = ends[own, 0] + along[:, None] * (ends[own, 1] - ends[own, 0])
         if len(points):
             points = points[self.lights(points)]
-        points = np.vstack([points, self.rims])
-        return points, np.full(len(points), RIM_SIZE * self.resolution)
+        sizes = np.repeat([CREASE_SIZE, RIM_SIZE], [len(points), len(self.rims)])
+        return np.vstack([points, self.rims]), sizes * self.resolution
 
     def on(self, mesh: TetMesh) -> tuple[TetMesh, IntArray]:
         """A mesh with the layers, and what each of its tetrahedra belongs to: see `add_layers`."""

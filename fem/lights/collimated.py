@@ -17,11 +17,11 @@ from tetlux.fem.media.coefficients import Coefficients
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.footprint import Footprint
 from tetlux.fem.sources.hints import MeshHints
-from tetlux.meshing.arrays import FloatArray, Vector, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, Vector, sum_by_index
 from tetlux.meshing.describe import as_text
 from tetlux.meshing.errors import InputError
 from tetlux.meshing.surface.surface import Surface
-from tetlux.meshing.surface.triangles import triangle_areas
+from tetlux.meshing.surface.triangles import triangle_areas, vertex_normals
 from tetlux.meshing.tets.mesh import TetMesh
 
 # Entries, at most, at which the penetration depth is computed.
@@ -29,8 +29,13 @@ DEPTH_SAMPLES = 64
 # Arrows of light on the whole body in pictures.
 ARROWS = 3
 
+# Barycentric coordinates of three points of a triangle, whose mean is exact for quadratic functions.
+THREE_POINTS = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0
+# A facet whose normal differs from one at a corner by an angle of less than this cosine is flat, and light at a smaller
+# cosine than the second one is refracted by flat facets.
+LEAST_BEND_COSINE, LEAST_COSINE = 0.8, 0.02
 # Where light meets a surface at a smaller cosine, it varies along the surface as fast as with depth.
-GRAZING = 0.12
+GRAZING = 0.18
 
 
 @dataclass(frozen=True)
@@ -154,7 +159,8 @@ class CollimatedBeam:
     def _incident_rays(self, mesh: TetMesh) -> tuple[Rays, FloatArray]:
         """One ray for each illuminated facet of a mesh, with its power at an irradiance of 1, and the normals (r, 3).
 
-        With three rays a facet, the error of the exitance is 5 % smaller and the computation takes twice as long.
+        There are three rays a facet where layers of tetrahedra have their light exactly. Elsewhere the error of the
+        exitance would be 5 % smaller and the computation would take twice as long.
         """
         direction = unit_vector(self.direction, "direction")
         normals, _ = triangle_areas(mesh.points, mesh.boundary_faces)
@@ -174,6 +180,8 @@ class CollimatedBeam:
         starts = np.column_stack(
             [sum_by_index(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T]
         )
+        if self.spot is None and mesh.columns is not None:
+            return _rays_on_curved(mesh, facets, total, direction)
         directions = np.broadcast_to(direction, starts.shape)
         return Rays(starts, directions, total, mesh.boundary_cells[facets]), normals[facets]
 
@@ -187,3 +195,28 @@ class CollimatedBeam:
         if self.from_center:
             reach = (points - np.asarray(self.spot.center, dtype=float)) @ direction
         return points, brightness * projected_areas, reach
+
+
+def _rays_on_curved(
+    mesh: TetMesh, facets: IntArray, powers: FloatArray, direction: FloatArray
+) -> tuple[Rays, FloatArray]:
+    """Three rays for each of some facets (f,) with their powers (f,), and the normals (3f, 3).
+
+    The facets stand for a curved surface, on which the incidence, and so the irradiance, differs between the three. Of
+    oblique light, which moves along the surface as it goes down, one ray gives some nodes too much and others too
+    little, by several per cent.
+    """
+    at_corners = vertex_normals(mesh.boundary_points, mesh.boundary_triangles)[mesh.boundary_triangles[facets]]
+    flat = mesh.surface.normals[facets][:, None]
+    is_smooth = np.einsum("fci,fki->fc", at_corners, flat).min(axis=1) > LEAST_BEND_COSINE
+    normals = np.where(is_smooth[:, None, None], THREE_POINTS @ at_corners, flat)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    cosines = np.maximum(-normals @ direction, 0.0)
+    # Where all are in the dark, the facet is at the border of the light.
+    cosines[cosines.max(axis=1) == 0] = 1.0
+    shares = cosines / cosines.sum(axis=1, keepdims=True)
+    normals = np.where(cosines[..., None] > LEAST_COSINE, normals, flat).reshape(-1, 3)
+    starts = (THREE_POINTS @ mesh.points[mesh.boundary_faces[facets]]).reshape(-1, 3)
+    directions = np.broadcast_to(direction, starts.shape)
+    cells = np.repeat(mesh.boundary_cells[facets], 3)
+    return Rays(starts, directions, (powers[:, None] * shares).reshape(-1), cells), normals

@@ -18,6 +18,8 @@ from tetlux.fem.sources.segments import Segments
 from tetlux.fem.sources.terms import SourceTerms
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.search.cell_tree import PathSegments
+from tetlux.meshing.tets.layers import are_layered
 from tetlux.meshing.tets.march import march
 from tetlux.meshing.tets.mesh import TetMesh
 
@@ -134,7 +136,7 @@ def _line_load(
         cells = cells_of(mesh, coefficients, part, segments.starts, segments.directions)
         extinction = at_cells(coefficients.extinction, cells)
         step = part.leave - part.enter
-        phi1, phi2 = _phi(extinction * step)
+        phi1, phi2, phi3 = _phi(extinction * step)
         carried = segments.fluxes[part.paths] * at_cells(coefficients.delta_eddington_scattering, cells) * step
         carried *= np.exp(-optical_depths(part, coefficients.extinction, cells))
         mean = carried * phi1
@@ -144,6 +146,9 @@ def _line_load(
         # Both are 0 outside, whatever the nodes there.
         for corner, weights, slopes in zip(mesh.tetrahedra[part.cells].T, part.weights.T, part.slopes.T, strict=True):
             load += np.bincount(corner, mean * weights + along * slopes, len(load))
+        if mesh.columns is not None:
+            twice = carried * step * (step * phi3 + 2.0 * at_cells(forward, cells) * phi2)
+            load += _rest_of_prisms(mesh, part, mean, along, twice)
         outside = np.flatnonzero(part.cells < 0)
         paths, middle = part.paths[outside], 0.5 * (part.enter + part.leave)[outside]
         points.append(segments.starts[paths] + middle[:, None] * segments.directions[paths])
@@ -151,14 +156,47 @@ def _line_load(
     return load, np.concatenate(points), np.concatenate(powers)
 
 
-def _phi(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """``∫0..1 exp(-x u) du`` and ``∫0..1 u exp(-x u) du``."""
+def _rest_of_prisms(
+    mesh: TetMesh, part: PathSegments, mean: FloatArray, along: FloatArray, twice: FloatArray
+) -> FloatArray:
+    """What nodes of prisms get less what they get as corners of tetrahedra, (n,).
+
+    In a prism a hat function is the product of one along its triangle and one along its height. A prism is divided into
+    tetrahedra in one of several ways, by which nodes next to each other would have their light at different depths, and
+    the exitance would differ from node to node; with these products it does not, however high the prism is.
+
+    Parameters
+    ----------
+    mesh : TetMesh
+    part : PathSegments
+    mean, along, twice : (s,) ndarray
+        Factors of a function's value at the start of a segment, of its first derivative along it, and of half of its
+        second.
+    """
+    assert mesh.columns is not None
+    some = np.flatnonzero(are_layered(mesh, part.cells) & (part.cells >= 0))
+    cells, weights, slopes = part.cells[some], part.weights[some], part.slopes[some]
+    nodes, ends = mesh.tetrahedra[cells], mesh.columns[cells]
+    # The height in the prism, from 0 to 1, is linear in a tetrahedron as all of its weights are.
+    is_low = nodes == ends[:, :, 1]
+    height, rise = (np.where(is_low, each, 0.0).sum(axis=1)[:, None] for each in (weights, slopes))
+    lower = mean[some, None] * weights * height
+    lower += along[some, None] * (weights * rise + slopes * height) + twice[some, None] * slopes * rise
+    linear = mean[some, None] * weights + along[some, None] * slopes
+    rest = np.stack([np.where(is_low, linear, 0.0) - lower, lower - np.where(is_low, linear, 0.0)], axis=2)
+    return sum_by_index(ends, rest, len(mesh.points))
+
+
+def _phi(x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """``∫0..1 u^k exp(-x u) du`` for k of 0, 1 and 2."""
     small = np.flatnonzero(x < 1e-2)
     with np.errstate(divide="ignore", invalid="ignore"):
         less = np.expm1(-x)
         first = -less / x
         second = (first - 1.0 - less) / x
+        third = (2.0 * second - 1.0 - less) / x
     x = x[small]
     first[small] = 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720
     second[small] = 1 / 2 - x / 3 + x**2 / 8 - x**3 / 30 + x**4 / 144 - x**5 / 840
-    return first, second
+    third[small] = 1 / 3 - x / 4 + x**2 / 10 - x**3 / 36 + x**4 / 168 - x**5 / 960
+    return first, second, third

@@ -15,6 +15,18 @@ def triangle_areas(points: FloatArray, faces: IntArray) -> tuple[FloatArray, Flo
     return np.ascontiguousarray((normal / np.where(length > 0, length, 1.0)).T), 0.5 * length
 
 
+def vertex_normals(points: FloatArray, faces: IntArray) -> FloatArray:
+    """Unit normals (n, 3) at the vertices of triangles (m, 3), exact on a sphere (Max 1999); zero without triangles."""
+    corners, sums = points[faces], np.zeros_like(points)
+    for corner in range(3):
+        first, second = (corners[:, (corner + step) % 3] - corners[:, corner] for step in (1, 2))
+        squares = np.einsum("fi,fi->f", first, first) * np.einsum("fi,fi->f", second, second)
+        weighted = np.cross(first, second) / np.where(squares > 0, squares, 1.0)[:, None]
+        sums += np.column_stack([sum_by_index(faces[:, corner], axis, len(points)) for axis in weighted.T])
+    lengths = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.asarray(sums / np.where(lengths > 0, lengths, 1.0))
+
+
 def body_sizes(points: FloatArray, faces: IntArray, body: IntArray) -> tuple[FloatArray, FloatArray]:
     """Volume and area of each body, (b,), of either orientation; `body` (m,) is the body of each triangle, from 0."""
     corners = points[faces]

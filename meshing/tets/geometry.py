@@ -66,3 +66,11 @@ def barycentric_coordinates(corners: FloatArray, queries: FloatArray) -> FloatAr
     matrix = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     three = np.linalg.solve(matrix, (queries - corners[:, 0])[..., None])[..., 0]
     return np.column_stack([1.0 - three.sum(axis=1), three])
+
+
+def distribute(shares: FloatArray, nodes: IntArray, count: int) -> FloatArray:
+    """Distribute integrals over tetrahedra (m,) evenly to nodes of each, (m, k), which may be repeated: (count,)."""
+    sums = np.zeros(count)
+    for corner in nodes.T:
+        sums += np.bincount(corner, shares / nodes.shape[1], minlength=count)
+    return sums

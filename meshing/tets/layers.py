@@ -27,6 +27,11 @@ SMALLEST_SHARE = 0.25
 THINNER, ATTEMPTS = 0.6, 6
 # Relative accuracy of the displacement of inner nodes: any that keeps volumes positive will do.
 ACCURACY = 1e-2
+# The three tetrahedra of a prism: of each corner its edge, and whether it is the upper (0) or the lower end of it.
+_PARTS = [
+    (np.array(edges), np.array(ends))
+    for edges, ends in (((0, 2, 1, 2), (0, 0, 0, 1)), ((0, 1, 1, 2), (0, 0, 1, 1)), ((0, 1, 0, 2), (0, 1, 1, 1)))
+]
 # Odd orders of three corners, as numbers to the base 3.
 _ODD_ORDERS = [int(np.dot(order, [9, 3, 1])) for order in ((0, 2, 1), (1, 0, 2), (2, 1, 0))]
 
@@ -69,8 +74,29 @@ def add_layers(mesh: TetMesh, depths: FloatArray, where: BoolArray) -> tuple[Tet
         nodes = np.union1d(mesh.tetrahedra[squashed], mesh.boundary_faces[folded])
         if not reach[nodes].any():  # they are within the body, next to a region
             nodes = np.flatnonzero(reach)
+        if attempt >= ATTEMPTS:  # a node without layers may be squashed by what is beside it
+            nodes = np.unique(mesh.tetrahedra[np.isin(mesh.tetrahedra, nodes).any(axis=1)])
         reach[nodes] *= THINNER if attempt < ATTEMPTS else 0.0
     return mesh, np.arange(len(mesh.tetrahedra))
+
+
+def are_layered(mesh: TetMesh, cells: IntArray) -> BoolArray:
+    """Whether each of some tetrahedra (c,) is a part of a prism of a layer, (c,)."""
+    if mesh.columns is None:
+        return np.zeros(len(cells), dtype=bool)
+    ends = mesh.columns[cells]
+    return np.asarray((ends[:, :, 0] != ends[:, :, 1]).all(axis=1))
+
+
+def tops_of(mesh: TetMesh) -> IntArray:
+    """The node of the boundary above each node of layers, and other nodes themselves, (n,)."""
+    above = np.arange(len(mesh.points))
+    if mesh.columns is not None:
+        upper, lower = mesh.columns.reshape(-1, 2).T
+        above[lower[upper != lower]] = upper[upper != lower]
+    while (above != (higher := above[above])).any():
+        above = higher
+    return above
 
 
 class _Filled(NamedTuple):
@@ -86,12 +112,15 @@ class _Filled(NamedTuple):
         The boundary triangle above each.
     least : (t,) ndarray
         The least volume of each, unit³: those of a fold are smaller.
+    columns : (t, 4, 2) ndarray
+        The nodes above and below each corner, see `TetMesh`.
     """
 
     points: FloatArray
     tetrahedra: IntArray
     facets: IntArray
     least: FloatArray
+    columns: IntArray
 
 
 def _fill(mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArray, normals: FloatArray) -> _Filled:
@@ -109,24 +138,33 @@ def _fill(mesh: TetMesh, lower: FloatArray, numbers: IntArray, depths: FloatArra
     corners = np.take_along_axis(mesh.boundary_faces, order, axis=1)
     is_odd = np.isin(order @ [9, 3, 1], _ODD_ORDERS)
     cells, facets, least = [np.zeros((0, 4), np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    columns = [np.zeros((0, 4, 2), np.int64)]
     for level, (upper, below) in enumerate(pairwise(nodes)):
-        a, b = upper[corners].T, below[corners].T
+        ends = np.stack([upper[corners], below[corners]], axis=2)
+        is_whole = (ends[:, :, 0] != ends[:, :, 1]).all(axis=1)
         share = SMALLEST_SHARE / 3.0 * (depths[level + 1] - depths[level]) * mesh.boundary_areas
-        for four in ((a[0], a[2], a[1], b[2]), (a[0], a[1], b[1], b[2]), (a[0], b[1], b[0], b[2])):
-            tetrahedra = np.column_stack(four)
-            tetrahedra[is_odd] = tetrahedra[is_odd][:, [0, 2, 1, 3]]
-            solid = np.flatnonzero((np.diff(np.sort(tetrahedra, axis=1), axis=1) > 0).all(axis=1))
-            cells.append(tetrahedra[solid])
+        for column, end in _PARTS:
+            own = ends[:, column]
+            own[is_odd] = own[is_odd][:, [0, 2, 1, 3]]
+            side = np.where(is_odd[:, None], end[[0, 2, 1, 3]], end)[:, :, None]
+            tetrahedra = np.take_along_axis(own, side, axis=2)
+            # A prism that has lost an edge has the nodes of its tetrahedra.
+            own = np.where(is_whole[:, None, None], own, tetrahedra)
+            solid = np.flatnonzero((np.diff(np.sort(tetrahedra[:, :, 0], axis=1), axis=1) > 0).all(axis=1))
+            cells.append(tetrahedra[solid, :, 0])
             facets.append(solid)
             least.append(share[solid])
-    return _Filled(np.vstack(points), np.vstack(cells), np.concatenate(facets), np.concatenate(least))
+            columns.append(own[solid])
+    every = np.concatenate(columns)
+    return _Filled(np.vstack(points), np.vstack(cells), np.concatenate(facets), np.concatenate(least), every)
 
 
 def _joined(mesh: TetMesh, layers: _Filled) -> tuple[TetMesh, IntArray]:
     """The pulled mesh with its layers, and its parents: see `add_layers`."""
     parents = np.concatenate([np.arange(len(mesh.tetrahedra)), mesh.boundary_cells[layers.facets]])
     tetrahedra = np.vstack([mesh.tetrahedra, layers.tetrahedra])
-    layered = TetMesh(layers.points, tetrahedra, mesh.unit, labels=mesh.labels, warnings=mesh.warnings)
+    columns = np.concatenate([np.repeat(mesh.tetrahedra[:, :, None], 2, axis=2), layers.columns])
+    layered = TetMesh(layers.points, tetrahedra, mesh.unit, labels=mesh.labels, columns=columns, warnings=mesh.warnings)
     return (replace(layered, regions=mesh.regions[parents]) if mesh.regions.any() else layered), parents
 
 

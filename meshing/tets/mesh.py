@@ -40,6 +40,9 @@ class TetMesh:
         Names of labels; not every label needs one.
     repairs, warnings : tuple of str
         Sentences: what was repaired when the mesh was read, and what the user should know about it.
+    columns : (m, 4, 2) ndarray of int, optional
+        The upper and the lower end of the edge of a prism on which each corner lies, where tetrahedra are parts of
+        prisms (`tetlux.meshing.tets.layers`); elsewhere twice the corner itself.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class TetMesh:
     labels: Mapping[int, str] = field(default_factory=dict)
     repairs: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    columns: IntArray | None = None
 
     def __post_init__(self) -> None:
         topology.check_arrays(self.points, self.tetrahedra)
@@ -192,11 +196,9 @@ class TetMesh:
         return self.to_nodes(self.volumes)
 
     def to_nodes(self, shares: FloatArray) -> FloatArray:
-        """Distribute integrals over tetrahedra (m,) to nodes (n,), a quarter to each corner."""
-        sums = np.zeros(len(self.points))
-        for corner in self.tetrahedra.T:
-            sums += np.bincount(corner, shares / 4.0, minlength=len(sums))
-        return sums
+        """Distribute integrals over tetrahedra (m,) to nodes (n,), a quarter to each corner or its edge of a prism."""
+        nodes = self.tetrahedra if self.columns is None else self.columns.reshape(-1, 8)
+        return geometry.distribute(shares, nodes, len(self.points))
 
     @cached_property
     def hat_gradients(self) -> FloatArray:
@@ -255,11 +257,7 @@ class TetMesh:
         return geometry.barycentric_coordinates(self.points[self.tetrahedra[cells]], queries)
 
     def locate(self, queries: FloatArray) -> tuple[IntArray, FloatArray]:
-        """The tetrahedron that contains each point.
-
-        Parameters
-        ----------
-        queries : (q, 3) ndarray
+        """The tetrahedron that contains each of some points (q, 3).
 
         Returns
         -------
