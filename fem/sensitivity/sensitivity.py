@@ -27,6 +27,7 @@ from tetlux.fem.system import System
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.host.blocks import map_in_threads
 
 COEFFICIENTS: tuple[Coefficient, ...] = ("sigma_a", "sigma_s_prime")
 # Relative residual at which iterations stop: readings are corrected by the product of those of lights and duals, and
@@ -145,7 +146,7 @@ def sensitivity(
     scene = replace(solution.quadratic.scene, stop_residual=STOP_RESIDUAL)
     measured = [scene.operator.discretise(place_detector(each, solution).measurement) for each in detectors]
     _check_layers(scene, measured)
-    duals = scene.operator.solve(np.column_stack([each.load for each in measured]), STOP_RESIDUAL)
+    duals = scene.solve_with(np.column_stack([each.load for each in measured]))
     readout = Readout(system, lights, subtract, scene, measured, duals)
     readings = readout.readings()
     if log:
@@ -173,17 +174,17 @@ def _derivatives(
     factors = np.ascontiguousarray(np.broadcast_to(squares, media.shape[0]))
     sums = multiply(space, fluences, duals, factors, shares, media, dtype)
     added_mass, added_stiffness = np.zeros((2, *sums.mass_of_media.shape), sums.mass_of_media.dtype)
-    for light, patches in enumerate(readout.scene.patches):
-        for patch in patches:
-            missing = missing_charges(space, patch)
-            dual = duals[space.cells[missing.cells]]
-            for values, target, added in (
-                (missing.mass, sums.mass, added_mass),
-                (factors[missing.cells, None] * missing.stiffness, sums.stiffness, added_stiffness),
-            ):
-                products = np.einsum("ca,cad->cd", values, dual)
-                target[:, light] += shares[missing.cells].T @ products
-                added[:, light] += media[missing.cells].T @ products
+    every = [(light, patch) for light, patches in enumerate(readout.scene.patches) for patch in patches]
+    missed = map_in_threads(lambda each: missing_charges(space, each[1]), every)
+    for (light, _), missing in zip(every, missed, strict=True):
+        dual = duals[space.cells[missing.cells]]
+        for values, target, added in (
+            (missing.mass, sums.mass, added_mass),
+            (factors[missing.cells, None] * missing.stiffness, sums.stiffness, added_stiffness),
+        ):
+            products = np.einsum("ca,cad->cd", values, dual)
+            target[:, light] += shares[missing.cells].T @ products
+            added[:, light] += media[missing.cells].T @ products
     mass = sums.mass_of_media + added_mass
     found: dict[str, NumberArray] = {}
     if "sigma_a" in to:

@@ -119,10 +119,11 @@ class Readout:
         else:
             step, weights = STEP_OF_PAIR * least, WEIGHTS_OF_PAIR
         for _ in range(SHORTENINGS):
-            found: list[Nearby] = []
-            for steps, weight in weights.items():
-                changed = change_medium(self.system, label, coefficient, steps * step)
-                found.append(Nearby(weight / step, changed, self.split(self.lights, changed)))
+            changed = [change_medium(self.system, label, coefficient, steps * step) for steps in weights]
+            splits = map_in_threads(lambda system: self.split(self.lights, system), changed)
+            found = [
+                Nearby(weight / step, *each) for weight, *each in zip(weights.values(), changed, splits, strict=True)
+            ]
             counts = {tuple(len(each.positions) for each in every_charges(one.split)) for one in found}
             if len(counts) == 1:
                 break
@@ -179,7 +180,9 @@ class Readout:
             value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
             return np.asarray(change * value)
         derived = _differentiate(patch.charges, charges, weights, own)
-        nodes = np.unique(self.system.mesh.tetrahedra[patch.cells])
+        marked = np.zeros(len(self.system.mesh.points), dtype=bool)
+        marked[self.system.mesh.tetrahedra[patch.cells]] = True
+        nodes = np.flatnonzero(marked)
         at_nodes = np.zeros(len(self.system.mesh.points), patch.charges.equation.dtype)
         at_nodes[nodes] = derived.fluence(self.system.mesh.points[nodes])
         interpolant = interpolant_of(operator.space, patch, derived, at_nodes)
