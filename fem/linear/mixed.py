@@ -64,7 +64,8 @@ def mixed_conjugate_gradients(
             continue
         solution += part
         part[:] = 0.0
-        rest = loads - product(solution)
+        rest = product(solution)
+        np.subtract(loads, rest, out=rest)
         largest = norms(rest).max(initial=0.0)
         if largest <= STOP_RESIDUAL:
             return solution, iteration

@@ -95,8 +95,7 @@ class _Level:
     @property
     def single(self) -> "_Level":
         """The level in single precision."""
-        products = (each.single for each in (self.product, self.down, self.up))
-        return _Level(*products, self.smoother.astype(np.float32))
+        return _Level(self.product.single, self.down.single, self.up.single, self.smoother.astype(np.float32))
 
 
 def _level(product: Product) -> _Level | None:

@@ -31,7 +31,7 @@ from tetlux.meshing.tets.mesh import TetMesh
 # rougher ones.
 STOP_RESIDUAL, STOP_RESIDUAL_OF_DUALS = 1e-10, 1e-5
 # Largest number of right-hand sides that are iterated together: a pass over the matrix serves all of them.
-COLUMNS_PER_GROUP = 16
+COLUMNS_PER_GROUP = 8
 # Damping of the diagonal; and the stiffness of a value at a node over that of a hat, in any straight tetrahedron.
 DAMPING, SHARE_OF_HAT = 0.8, 0.6
 # Number of right-hand sides for which the solver of the linear part is chosen.
@@ -202,8 +202,10 @@ class QuadraticOperator:
         The combination of them with the least residual is close to the solution for shifts that are next to each
         other on a contour.
         """
+        if not known:
+            return self.solve(loads, stop_residual)
         start = np.zeros(loads.shape, dtype=np.result_type(loads, self.matrix.dtype))
-        for column in range(loads.shape[1] if known else 0):
+        for column in range(loads.shape[1]):
             basis = np.column_stack([each[:, column] for each in known])
             start[:, column] = basis @ np.linalg.lstsq(self.matrix @ basis, loads[:, column])[0]
         rest = loads - self.matrix @ start

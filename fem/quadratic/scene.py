@@ -137,26 +137,18 @@ class QuadraticScene:
         That is the fluence with the interpolants of its patches, and of patches that are the whole body the fluence
         less that of their charges.
         """
-        fitted, loads = self._remainder
-        return fitted + self.operator.solve_near(loads, self.known, self.stop_residual)
-
-    def solve_with(self, more: NumberArray) -> NumberArray:
-        """Solutions for more loads (size, d), solved for together with the lights, which takes less time."""
-        fitted, loads = self._remainder
-        found = self.operator.solve(np.hstack([loads, more]), self.stop_residual)
-        count = loads.shape[1]
-        vars(self)["solved"] = fitted + found[:, :count]
-        return np.ascontiguousarray(found[:, count:])
-
-    @property
-    def _remainder(self) -> tuple[NumberArray, NumberArray]:
-        """Fitted charges, and the loads of the remainder, two (size, k): it is far smaller near the light than they."""
+        if not any(each.is_fitted and not each.is_whole for own in self.patches for each in own):
+            return self.operator.solve_near(self.loads, self.known, self.stop_residual)
+        # The remainder is far smaller near the light than the fitted charges.
         fitted = self._interpolants(lambda each: each.is_fitted and not each.is_whole)
-        return fitted, self.loads - self.operator.matrix @ fitted if fitted.any() else self.loads
+        loads = self.loads - self.operator.matrix @ fitted
+        return fitted + self.operator.solve_near(loads, self.known, self.stop_residual)
 
     @cached_property
     def fluence(self) -> NumberArray:
         """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
+        if not any(each.is_whole for own in self.patches for each in own):
+            return self.solved
         return self.solved + self._interpolants(lambda each: each.is_whole)
 
     def _interpolants(self, which: Callable[[QuadraticPatch], bool]) -> NumberArray:

@@ -146,7 +146,7 @@ def sensitivity(
     scene = replace(solution.quadratic.scene, stop_residual=STOP_RESIDUAL)
     measured = [scene.operator.discretise(place_detector(each, solution).measurement) for each in detectors]
     _check_layers(scene, measured)
-    duals = scene.solve_with(np.column_stack([each.load for each in measured]))
+    duals = scene.operator.solve(np.column_stack([each.load for each in measured]), STOP_RESIDUAL)
     readout = Readout(system, lights, subtract, scene, measured, duals)
     readings = readout.readings()
     if log:
@@ -189,15 +189,14 @@ def _derivatives(
     found: dict[str, NumberArray] = {}
     if "sigma_a" in to:
         found["sigma_a"] = np.subtract(sums.stiffness, sums.mass, out=sums.mass)
-        _add_rest(found["sigma_a"], readout, "sigma_a", shares, added_stiffness - added_mass)
     if "sigma_s_prime" in to:
         found["sigma_s_prime"] = sums.stiffness
-        _add_rest(sums.stiffness, readout, "sigma_s_prime", shares, added_stiffness)
+    _add_rest(found, readout, shares, {"sigma_a": added_stiffness - added_mass, "sigma_s_prime": added_stiffness})
     return found, mass
 
 
 def _add_rest(
-    derivatives: NumberArray, readout: Readout, coefficient: Coefficient, shares: csr_array, added: NumberArray
+    derivatives: dict[str, NumberArray], readout: Readout, shares: csr_array, added: dict[str, NumberArray]
 ) -> None:
     """Add what derivatives of media have besides products to derivatives (p, l, d), in place.
 
@@ -205,10 +204,12 @@ def _add_rest(
     """
     system = readout.system
     labels, numbers = _media(system)
-    rest = np.array([readout.derivative(label, coefficient) for label in labels]) - added
+    names: list[Coefficient] = [name for name in COEFFICIENTS if name in derivatives]
+    rest = np.array([readout.derivatives(label, names) for label in labels])
     for light, deposit in enumerate(readout.deposits()):
-        ways = entry_shares(deposit, system.mesh, system.true_surface, numbers, len(labels))
-        derivatives[:, light] += (shares.T @ ways) @ rest[:, light]
+        ways = shares.T @ entry_shares(deposit, system.mesh, system.true_surface, numbers, len(labels))
+        for number, name in enumerate(names):
+            derivatives[name][:, light] += ways @ (rest[:, number, light] - added[name][:, light])
 
 
 def _media(system: System) -> tuple[tuple[int, ...], IntArray]:
