@@ -105,15 +105,14 @@ class QuadraticOperator:
     @cached_property
     def mass(self) -> csr_array:
         """The mass matrix, (size, size)."""
-        return assemble(self.space, element_matrices(self.space, 0.0, 1.0))
+        return assemble(self.space, 0.0, 1.0)
 
     @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size); complex for modulated light."""
         if self.steady is not None:
             return csr_array(self.steady.matrix + self.coefficients.shift * self.steady.mass)
-        elements = element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
-        return matrix_of(self.space, self.coefficients, elements)
+        return matrix_of(self.space, self.coefficients)
 
     @cached_property
     def _order(self) -> IntArray:

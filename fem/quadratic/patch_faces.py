@@ -52,7 +52,7 @@ class InnerFaces:
         """``∮ (D G - I D G) dv/dn`` over the inner faces of a patch, by interpolants (size, k) of D G, (size, k)."""
         some = np.searchsorted(self.keys, inner_keys(patch))
         points = self.points[some]
-        potential = field.potential(points.reshape(-1, 3)).reshape(*points.shape[:2], -1)
+        potential = field.potential(points.reshape(-1, 3)).reshape(*points.shape[:2], interpolant.shape[1])
         jumps = potential - self.shape_values @ interpolant[self.faces[some]]
         values = np.swapaxes(self.slopes[some], 1, 2) @ jumps
         return sum_columns(self.cells[some], values, len(interpolant))
