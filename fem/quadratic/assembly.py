@@ -1,6 +1,7 @@
 """The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of loads."""
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 
 from tetlux.fem.media.coefficients import Coefficients
@@ -18,8 +19,10 @@ from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
-# Number of curved tetrahedra that are integrated at once.
+# Number of tetrahedra that are integrated at once.
 BLOCK = 2048
+
+Indices = npt.NDArray[np.int32]
 
 
 def matrix_of(space: QuadraticSpace, coefficients: Coefficients) -> csr_array:
@@ -49,9 +52,9 @@ def assemble(
 
     def work(block: slice) -> None:
         some = np.arange(block.start, block.stop)
-        own = (each if np.ndim(each) == 0 else np.asarray(each)[block] for each in (diffusion, sigma))
+        own = [each if np.ndim(each) == 0 else np.asarray(each)[block] for each in (diffusion, sigma)]
         place = slice(block.start * each_cell, block.stop * each_cell)
-        _fill(cells[block], element_matrices(space, *own, some), values[place], rows[place], columns[place])
+        _fill(cells[block], element_matrices(space, own[0], own[1], some), values[place], rows[place], columns[place])
 
     run_in_blocks(work, len(cells), BLOCK)
     if boundary is not None:
@@ -60,7 +63,7 @@ def assemble(
     return csr_array(upper + csr_array(upper.T))
 
 
-def _fill(dofs: IntArray, matrices: NumberArray, values: NumberArray, rows: IntArray, columns: IntArray) -> None:
+def _fill(dofs: IntArray, matrices: NumberArray, values: NumberArray, rows: Indices, columns: Indices) -> None:
     """Put the upper triangles of matrices (m, c, c), and half of their diagonals, into parts of a `coo_array`."""
     first, second = np.triu_indices(dofs.shape[1])
     values[:] = (matrices[:, first, second] * np.where(first == second, 0.5, 1.0)).ravel()
