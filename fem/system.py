@@ -35,6 +35,7 @@ from tetlux.fem.validity.local import Validity
 from tetlux.meshing.arrays import BoolArray, NumberArray
 from tetlux.meshing.describe import count, one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.host.blocks import map_in_threads
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.tets.mesh import TetMesh
 from tetlux.meshing.tets.regions import own_volumes
@@ -188,8 +189,7 @@ class System:
         self._require_diffusion("errors are estimated; call System.solve")
         solved = self._solve(split, watch, coarser)
         with watch.stage("solve"):
-            inner = [region.surface for region in self.regions]
-            estimate = estimate_by_operator(solved.loads, solved.of_lights, solved.whole, inner)
+            estimate = estimate_by_operator(solved.loads, solved.of_lights, solved.whole, self.quadratic.inner)
         return MeshSolution(replace(solved.whole, error_estimate=estimate.error), estimate, solved.accurate_nodes)
 
     def _solve(self, split: SplitLights, watch: Stopwatch, coarser: MeshSolution | None) -> "_Solved":
@@ -252,7 +252,7 @@ class System:
         """Subtract charges where they were accurate on the coarser mesh, or as before on this one, or everywhere."""
         lights = zip(split.owners, split.charges, strict=True)
         if coarser is None:
-            return [subtract_as_before(self.mesh, *light, self.mass) for light in lights]
+            return map_in_threads(lambda light: subtract_as_before(self.mesh, *light, self.mass), list(lights))
         coarse = coarser.solution.mesh.points
         accurate = [inherit_accurate_nodes(each, coarse, self.mesh) for each in coarser.accurate_nodes]
         return [subtract_on(self.mesh, *light, self.mass, nodes) for light, nodes in zip(lights, accurate, strict=True)]
@@ -265,8 +265,8 @@ class System:
         if not shrinking:
             return []
         with watch.stage("assemble"):
-            for i in shrinking:
-                subtractions[i] = subtractions[i].shrink_to(accurate[i])
+            for n, each in enumerate(map_in_threads(lambda i: subtractions[i].shrink_to(accurate[i]), shrinking)):
+                subtractions[shrinking[n]] = each
         with watch.stage("solve"):
             result = self.plain.solver.solve(np.column_stack([subtractions[i].terms.load for i in shrinking]))
             fluences[:, shrinking] = result.x

@@ -23,6 +23,11 @@ def sum_by_index(indices: npt.NDArray[np.integer], values: NumberArray, count: i
     return np.asarray(np.bincount(indices.reshape(-1), values.reshape(-1), count), dtype=np.float64)
 
 
+def sum_columns(indices: npt.NDArray[np.integer], values: NumberArray, count: int) -> NumberArray:
+    """`sum_by_index` of each of k columns of values, whose shape is that of `indices` and k, (count, k)."""
+    return np.stack([sum_by_index(indices, values[..., column], count) for column in range(values.shape[-1])], axis=-1)
+
+
 def freeze(array: FloatArray) -> FloatArray:
     """The array, or a copy if it is a view of another, that cannot be written to: what is found for it can be kept."""
     frozen = array if array.base is None else array.copy()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tetlux.fem.charges.derivative import ChargeDerivative
+from tetlux.fem.charges.derivative import ChargeDerivatives
 from tetlux.fem.charges.field import ChargeField
 from tetlux.fem.charges.kernel import Equation
 from tetlux.meshing.arrays import NumberArray
@@ -21,11 +21,20 @@ def field_at(way: float, wave_number: complex, closest: float) -> ChargeField:
     return ChargeField(equation, PLACES + way * moved, 1.0 + way * stronger, closest * (1.0 + way))
 
 
-def derivative_of(wave_number: complex, closest: float) -> ChargeDerivative:
+def derivative_of(wave_number: complex, closest: float) -> ChargeDerivatives:
     random = np.random.default_rng(4)
     moved, stronger = random.uniform(-1.0, 1.0, (7, 3)), random.uniform(-1.0, 1.0, 7)
     known = field_at(0.0, wave_number, closest)
-    return ChargeDerivative(known, moved, stronger, wave_number, -0.6, closest)
+    # The second is half of the first.
+    halves = np.array([1.0, 0.5])
+    return ChargeDerivatives(
+        known,
+        np.multiply.outer(halves, moved),
+        np.multiply.outer(halves, stronger),
+        wave_number * halves,
+        -0.6 * halves,
+        closest * halves,
+    )
 
 
 @pytest.mark.parametrize("wave_number", [0.4, 0.4 + 0.3j])
@@ -37,16 +46,18 @@ def test_fluence_and_flux_have_the_slopes_of_differences(wave_number: complex) -
     def slope(of: str) -> NumberArray:
         return np.asarray((getattr(after, of)(POINTS) - getattr(before, of)(POINTS)) / (2.0 * step))
 
-    assert found.fluence(POINTS) == pytest.approx(slope("fluence"), rel=1e-6, abs=1e-8)
-    assert found.potential(POINTS) == pytest.approx(slope("potential"), rel=1e-6, abs=1e-8)
     fluence, flux = found.fluence_and_flux(POINTS)
-    assert fluence == pytest.approx(slope("fluence"), rel=1e-6, abs=1e-8)
     pairs = zip(before.fluence_and_flux(POINTS), after.fluence_and_flux(POINTS), strict=True)
-    assert flux == pytest.approx([(b - a) / (2.0 * step) for a, b in pairs][1], rel=1e-5, abs=1e-8)
+    slope_of_flux = [(b - a) / (2.0 * step) for a, b in pairs][1]
+    for number, share in enumerate((1.0, 0.5)):
+        assert found.fluence(POINTS)[:, number] == pytest.approx(share * slope("fluence"), rel=1e-6, abs=1e-8)
+        assert found.potential(POINTS)[:, number] == pytest.approx(share * slope("potential"), rel=1e-6, abs=1e-8)
+        assert fluence[:, number] == pytest.approx(share * slope("fluence"), rel=1e-6, abs=1e-8)
+        assert flux[..., number] == pytest.approx(share * slope_of_flux, rel=1e-5, abs=1e-8)
 
 
 def test_points_next_to_a_charge_have_the_slope_at_the_least_distance() -> None:
     step, beside = 1e-4, PLACES + 1e-3
     before, after = (field_at(way, 0.4, 0.05) for way in (-step, step))
     slope = (after.fluence(beside) - before.fluence(beside)) / (2.0 * step)
-    assert derivative_of(0.4, 0.05).fluence(beside) == pytest.approx(slope, rel=1e-6, abs=1e-8)
+    assert derivative_of(0.4, 0.05).fluence(beside)[:, 0] == pytest.approx(slope, rel=1e-6, abs=1e-8)

@@ -53,6 +53,13 @@ class Product:
         return len(self._blocks) > 1
 
     @property
+    def single(self) -> "Product":
+        """Products with the matrix in single precision, which shares its pattern."""
+        matrix = self.matrix
+        dtype = np.complex64 if self.is_complex else np.float32
+        return Product(csr_array((matrix.data.astype(dtype), matrix.indices, matrix.indptr), shape=matrix.shape))
+
+    @property
     def is_complex(self) -> bool:
         """Whether the matrix is complex."""
         return np.iscomplexobj(self.matrix)
@@ -93,9 +100,10 @@ def make_preconditioned_cg(product: Product, precondition: Preconditioner) -> Me
 
     def iterate_on_groups(loads: NumberArray) -> tuple[NumberArray, int]:
         count = loads.shape[1]
-        size = GROUP if count >= GROUP * THREADS and not product.on_all_cores else 1
+        size = GROUP if count >= GROUP * THREADS else 1
         groups = [np.ascontiguousarray(loads[:, start : start + size]) for start in range(0, count, size)]
-        solved = [iterate(group) for group in groups] if product.on_all_cores else map_in_threads(iterate, groups)
+        in_turn = product.on_all_cores and size == 1
+        solved = [iterate(group) for group in groups] if in_turn else map_in_threads(iterate, groups)
         return np.hstack([x for x, _ in solved]), max(iterations for _, iterations in solved)
 
     return iterate_on_groups
@@ -112,12 +120,13 @@ def real_majorant(matrix: csr_array) -> csr_array:
 
 def split_complex(values: NumberArray) -> FloatArray:
     """Real and imaginary parts of complex columns (n, k), as the real columns (n, 2k)."""
-    return np.ascontiguousarray(values).view(np.float64)
+    values = np.ascontiguousarray(values)
+    return values.view(values.real.dtype)
 
 
 def join_complex(parts: FloatArray) -> NumberArray:
     """The complex columns (n, k) of given real and imaginary parts (n, 2k)."""
-    return np.ascontiguousarray(parts).view(np.complex128)
+    return np.ascontiguousarray(parts).view(np.result_type(parts, np.complex64))
 
 
 def apply_to_parts(function: Preconditioner, values: NumberArray) -> NumberArray:

@@ -1,6 +1,8 @@
 """Multigrid by smoothed aggregation, as the preconditioner of conjugate gradients."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.util import find_spec
 
 import numpy as np
@@ -27,7 +29,7 @@ class Multigrid:
     """
 
     product: Product
-    cycle: Preconditioner
+    cycle: "Cycle"
 
     def __call__(self, loads: NumberArray) -> tuple[NumberArray, int]:
         """See `tetlux.fem.linear.krylov.Method`."""
@@ -47,18 +49,38 @@ def multigrid(product: Product) -> Multigrid:
     while product.matrix.shape[0] > COARSEST and (level := _level(product)) is not None:
         levels.append(level)
         product = Product(csr_array(level.down.matrix @ (product.matrix @ level.up.matrix)))
-    coarsest = factors_of(product.matrix)
+    return Multigrid(finest, Cycle(levels, factors_of(product.matrix)))
 
-    def cycle(residuals: FloatArray, depth: int = 0) -> FloatArray:
-        if depth == len(levels):
-            return coarsest(residuals)
-        level = levels[depth]
+
+@dataclass(frozen=True, eq=False)
+class Cycle:
+    """A V-cycle through levels, from the finest to factors of the coarsest matrix."""
+
+    levels: "Sequence[_Level]"
+    coarsest: Preconditioner
+
+    def __call__(self, residuals: FloatArray) -> FloatArray:
+        """A rough solution for residuals (n, k)."""
+        return self._from_level(residuals, 0)
+
+    @cached_property
+    def single(self) -> "Cycle":
+        """The cycle in single precision, but for the coarsest matrix."""
+        coarsest = self.coarsest
+        return Cycle(
+            [level.single for level in self.levels], lambda rest: coarsest(rest.astype(np.float64)).astype(np.float32)
+        )
+
+    def _from_level(self, residuals: FloatArray, depth: int) -> FloatArray:
+        if depth == len(self.levels):
+            return self.coarsest(residuals)
+        level = self.levels[depth]
         result = level.smoother * residuals
-        result += level.up(cycle(level.down(residuals - level.product(result)), depth + 1))
+        result += level.up(self._from_level(level.down(residuals - level.product(result)), depth + 1))
         result += level.smoother * (residuals - level.product(result))
         return result
 
-    return Multigrid(finest, cycle)
+    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +91,11 @@ class _Level:
     down: Product
     up: Product
     smoother: FloatArray
+
+    @property
+    def single(self) -> "_Level":
+        """The level in single precision."""
+        return _Level(self.product.single, self.down.single, self.up.single, self.smoother.astype(np.float32))
 
 
 def _level(product: Product) -> _Level | None:

@@ -9,8 +9,8 @@ from scipy.sparse import csr_array
 from tetlux.fem.linear import krylov
 from tetlux.fem.linear.direct import direct
 from tetlux.fem.linear.krylov import GROUP, Method, Preconditioner, Product, jacobi, join_complex, norms, split_complex
-from tetlux.fem.linear.multigrid import HAS_PYAMG, Multigrid, multigrid
-from tetlux.meshing.arrays import NumberArray
+from tetlux.fem.linear.multigrid import HAS_PYAMG, Cycle, Multigrid, multigrid
+from tetlux.meshing.arrays import FloatArray, NumberArray
 from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.blocks import THREADS
 from tetlux.meshing.notes import Note
@@ -81,20 +81,23 @@ class Solver:
         self.note = ""
 
     @property
-    def cycle(self) -> Preconditioner | None:
+    def cycle(self) -> Cycle | None:
         """The multigrid cycle that preconditions it, if there is one."""
         first = self._prepared[0]
         return first.cycle if isinstance(first, Multigrid) else None
 
     @property
     def preconditioner(self) -> Preconditioner:
-        """What preconditions larger matrices that hold this one: its cycle, its factors, or its diagonal."""
+        """What preconditions larger matrices that hold this one: its cycle, its factors, or its diagonal.
+
+        It takes residuals in single precision.
+        """
         first = self._prepared[0]
         if isinstance(first, Multigrid):
-            return first.cycle
+            return first.cycle.single
         if self._methods[0] is direct:
-            return lambda rest: first(rest)[0]
-        inverse = 1.0 / self.matrix.diagonal()[:, None]
+            return lambda rest: np.asarray(first(rest.astype(np.float64))[0].astype(np.float32))
+        inverse: FloatArray = (1.0 / self.matrix.diagonal()[:, None]).astype(np.float32)
         return lambda rest: inverse * rest
 
     def solve(self, load: NumberArray) -> LinearResult:
@@ -214,7 +217,7 @@ class _State:
     method: str
 
 
-def solver_for(matrix: csr_array, expected_right_hand_sides: int = 1, cycle: Preconditioner | None = None) -> Solver:
+def solver_for(matrix: csr_array, expected_right_hand_sides: int = 1, cycle: Cycle | None = None) -> Solver:
     """The solver that is quickest for a matrix.
 
     Parameters

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from tetlux.fem.linear.krylov import Preconditioner
+from tetlux.fem.linear.multigrid import Cycle
 from tetlux.fem.linear.solver import Solver, solver_for
 from tetlux.fem.media.coefficients import Coefficients, coefficients_of
 from tetlux.fem.media.medium import Medium
@@ -71,7 +71,7 @@ class Assembly:
     """
 
     mesh: TetMesh
-    multigrid_cycles: list[tuple[Model, Preconditioner]] = field(default_factory=list)
+    multigrid_cycles: list[tuple[Model, Cycle]] = field(default_factory=list)
 
     def solver(self, model: Model, matrix: csr_array, expected_right_hand_sides: int) -> Solver:
         """A solver for the matrix of a model with one unknown; it takes the multigrid cycle of a similar one."""

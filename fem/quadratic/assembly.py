@@ -1,6 +1,7 @@
 """The matrix of the weak form in `tetlux.fem.operators.forms` for quadratic elements, and integrals of loads."""
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 
 from tetlux.fem.media.coefficients import Coefficients
@@ -18,28 +19,56 @@ from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.meshing.arrays import FloatArray, IntArray, Number, NumberArray, sum_by_index
 from tetlux.meshing.host.blocks import run_in_blocks
 
-# Number of curved tetrahedra that are integrated at once.
+# Number of tetrahedra that are integrated at once.
 BLOCK = 2048
 
-
-def matrix_of(space: QuadraticSpace, coefficients: Coefficients, elements: NumberArray) -> csr_array:
-    """The symmetric matrix of a space, (size, size), from its `element_matrices`."""
-    faces = space.boundary_faces
-    boundary_matrices = boundary_condition_of(coefficients.outer).robin * face_matrices(space, faces)
-    return csr_array(assemble(space, elements) + _assemble(faces, boundary_matrices, space.size))
+Indices = npt.NDArray[np.int32]
 
 
-def assemble(space: QuadraticSpace, elements: NumberArray) -> csr_array:
-    """The matrix of a space, (size, size), without boundary terms, from the matrices of tetrahedra (m, 10, 10)."""
-    return _assemble(space.cells, elements, space.size)
+def matrix_of(space: QuadraticSpace, coefficients: Coefficients) -> csr_array:
+    """The symmetric matrix of a space, (size, size)."""
+    robin = boundary_condition_of(coefficients.outer).robin
+    return assemble(
+        space, coefficients.diffusion, coefficients.sigma, robin * face_matrices(space, space.boundary_faces)
+    )
 
 
-def _assemble(dofs: IntArray, values: NumberArray, size: int) -> csr_array:
-    """The sum of element matrices (m, c, c) by their DOF numbers (m, c)."""
-    count = dofs.shape[1]
-    rows = np.repeat(dofs.astype(np.int32), count, axis=1).ravel()
-    columns = np.tile(dofs.astype(np.int32), count).ravel()
-    return csr_array(coo_array((values.ravel(), (rows, columns)), shape=(size, size)))
+def assemble(
+    space: QuadraticSpace,
+    diffusion: Number | NumberArray,
+    sigma: Number | NumberArray,
+    boundary: FloatArray | None = None,
+) -> csr_array:
+    """The matrix of a space, (size, size), by `element_matrices` and those of its boundary triangles (f, 6, 6).
+
+    The upper triangle alone is summed, which takes a third of the memory, and mirrored.
+    """
+    cells, faces = space.cells, space.boundary_faces[: 0 if boundary is None else None]
+    each_cell, each_face = (len(np.triu_indices(dofs.shape[1])[0]) for dofs in (cells, faces))
+    of_cells, of_faces = len(cells) * each_cell, len(faces) * each_face
+    values = np.empty(of_cells + of_faces, np.result_type(diffusion, sigma, np.float64))
+    rows, columns = np.empty((2, len(values)), dtype=np.int32)
+    _curved_elements(space)  # before threads ask for them
+
+    def work(block: slice) -> None:
+        some = np.arange(block.start, block.stop)
+        own = [each if np.ndim(each) == 0 else np.asarray(each)[block] for each in (diffusion, sigma)]
+        place = slice(block.start * each_cell, block.stop * each_cell)
+        _fill(cells[block], element_matrices(space, own[0], own[1], some), values[place], rows[place], columns[place])
+
+    run_in_blocks(work, len(cells), BLOCK)
+    if boundary is not None:
+        _fill(faces, boundary, values[of_cells:], rows[of_cells:], columns[of_cells:])
+    upper = csr_array(coo_array((values, (rows, columns)), shape=(space.size, space.size)))
+    return csr_array(upper + csr_array(upper.T))
+
+
+def _fill(dofs: IntArray, matrices: NumberArray, values: NumberArray, rows: Indices, columns: Indices) -> None:
+    """Put the upper triangles of matrices (m, c, c), and half of their diagonals, into parts of a `coo_array`."""
+    first, second = np.triu_indices(dofs.shape[1])
+    values[:] = (matrices[:, first, second] * np.where(first == second, 0.5, 1.0)).ravel()
+    rows[:] = np.minimum(dofs[:, first], dofs[:, second]).ravel()
+    columns[:] = np.maximum(dofs[:, first], dofs[:, second]).ravel()
 
 
 def element_matrices(

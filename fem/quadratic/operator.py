@@ -10,8 +10,9 @@ from scipy.sparse import csr_array, csr_matrix
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from tetlux.fem.linear import krylov
-from tetlux.fem.linear.krylov import Preconditioner, Product, conjugate_gradients, norms
-from tetlux.fem.media.coefficients import Coefficients
+from tetlux.fem.linear.krylov import Preconditioner, Product, norms
+from tetlux.fem.linear.mixed import mixed_conjugate_gradients
+from tetlux.fem.media.coefficients import Coefficients, at_cells
 from tetlux.fem.models.boundary import boundary_condition_of
 from tetlux.fem.models.diffusion import Diffusion
 from tetlux.fem.operators.assembly import Assembly
@@ -39,7 +40,7 @@ EXPECTED_RIGHT_HAND_SIDES = 10
 BYTES_OF_KEPT_DUALS = 2**28
 BYTES_OF_KEPT_STEPS = 2**28
 # Names of what solves.
-SOLVING = ("_product", "_precondition", "_order")
+SOLVING = ("_product", "_single", "_precondition", "_order")
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ class QuadraticOperator:
 
     def release(self) -> None:
         """Drop the matrices, which are made anew when they are needed."""
-        for name in ("elements", "matrix", *SOLVING):
+        for name in ("matrix", *SOLVING):
             vars(self).pop(name, None)
 
     @cached_property
@@ -96,28 +97,22 @@ class QuadraticOperator:
         """The finite-element space."""
         return quadratic_space(self.mesh, self.surface, self.inner)
 
-    @cached_property
-    def elements(self) -> NumberArray:
-        """The matrices of tetrahedra, (m, 10, 10)."""
-        return element_matrices(self.space, self.coefficients.diffusion, self.coefficients.sigma)
-
     def elements_of(self, cells: IntArray) -> NumberArray:
-        """The matrices of some tetrahedra (c,), (c, 10, 10)."""
-        if self.steady is None:
-            return np.asarray(self.elements[cells])
-        return self.steady.elements_of(cells) + self.coefficients.shift * element_matrices(self.space, 0.0, 1.0, cells)
+        """The matrices of some tetrahedra (c,), ascending, (c, 10, 10)."""
+        diffusion, sigma = (at_cells(each, cells) for each in (self.coefficients.diffusion, self.coefficients.sigma))
+        return element_matrices(self.space, diffusion, sigma, cells)
 
     @cached_property
     def mass(self) -> csr_array:
         """The mass matrix, (size, size)."""
-        return assemble(self.space, element_matrices(self.space, 0.0, 1.0))
+        return assemble(self.space, 0.0, 1.0)
 
     @cached_property
     def matrix(self) -> csr_array:
         """The matrix, (size, size); complex for modulated light."""
         if self.steady is not None:
             return csr_array(self.steady.matrix + self.coefficients.shift * self.steady.mass)
-        return matrix_of(self.space, self.coefficients, self.elements)
+        return matrix_of(self.space, self.coefficients)
 
     @cached_property
     def _order(self) -> IntArray:
@@ -137,12 +132,16 @@ class QuadraticOperator:
         return Product(_in_order(self.matrix, self._order))
 
     @cached_property
+    def _single(self) -> Product:
+        return self._product.single
+
+    @cached_property
     def _precondition(self) -> Preconditioner:
         """The sum of a solver of the linear part and of a damped Jacobi in the basis of values at nodes and middles.
 
         The condition number does not depend on the size of tetrahedra (additive Schwarz of two levels; Bramble, Pasciak
         & Xu 1990): about 40 iterations, of which the diagonal of bubbles alone takes 75. Both parts are real, with the
-        modulus of a complex shift: see `tetlux.fem.linear.krylov.real_majorant`.
+        modulus of a complex shift: see `tetlux.fem.linear.krylov.real_majorant`; and in single precision.
         """
         mesh, nodes = self.mesh, len(self.mesh.points)
         assembly = Assembly(mesh)
@@ -152,11 +151,15 @@ class QuadraticOperator:
         matrix = _in_order(terms.combine(real.shift), order[:nodes])
         linear = assembly.solver(real, matrix, EXPECTED_RIGHT_HAND_SIDES).preconditioner
         diagonal = np.abs(self.matrix.diagonal())[order, None]
-        of_nodes, of_middles = DAMPING / (SHARE_OF_HAT * diagonal[:nodes]), DAMPING / diagonal[nodes:]
+        of_nodes, of_middles = (
+            each.astype(np.float32)
+            for each in (DAMPING / (SHARE_OF_HAT * diagonal[:nodes]), DAMPING / diagonal[nodes:])
+        )
         # A value at a node is a hat less half of the bubbles of its edges.
         rank = np.argsort(order[:nodes])
         ends = rank[mesh.edges[order[nodes:] - nodes]]
-        halves = csr_array((np.full(ends.size, 0.5), ends.ravel(), np.arange(0, ends.size + 1, 2)), (len(ends), nodes))
+        weights = np.full(ends.size, 0.5, np.float32)
+        halves = csr_array((weights, ends.ravel(), np.arange(0, ends.size + 1, 2)), (len(ends), nodes))
         to_nodes = csr_array(halves.T)
 
         def precondition(rest: FloatArray) -> FloatArray:
@@ -175,18 +178,20 @@ class QuadraticOperator:
 
     def solve(self, loads: NumberArray, stop_residual: float = STOP_RESIDUAL) -> NumberArray:
         """Solutions (size, k) for loads (size, k), to about a relative residual."""
-        product, precondition = self._product, self._precondition
-        loads = loads.astype(np.result_type(loads, self.matrix.dtype), copy=False)
-        # Loads are scaled so that the iteration stops at this residual.
-        size = norms(loads) * stop_residual / krylov.STOP_RESIDUAL
-        size[size == 0] = 1.0
-        scaled = (loads / size)[self._order]
+        product, single, precondition = self._product, self._single, self._precondition
+        order, solved = self._order, np.empty(loads.shape, np.result_type(loads, self.matrix.dtype, float))
+
+        def work(columns: slice) -> None:
+            group = np.asarray(loads[order, columns], dtype=solved.dtype)
+            # Loads are scaled so that the iteration stops at this residual.
+            size = norms(group) * stop_residual / krylov.STOP_RESIDUAL
+            size[size == 0] = 1.0
+            group /= size
+            solved[order, columns] = size * mixed_conjugate_gradients(product, single, precondition, group)[0]
+
         count = min(COLUMNS_PER_GROUP, -(-loads.shape[1] // THREADS)) or 1
-        groups = [np.ascontiguousarray(scaled[:, i : i + count]) for i in range(0, loads.shape[1], count)]
-        found = map_in_threads(lambda group: conjugate_gradients(product, precondition, group)[0], groups)
-        solved = np.empty(loads.shape, np.result_type(loads, float))
-        solved[self._order] = np.hstack([np.zeros((len(loads), 0)), *found])
-        return np.asarray(solved * size)
+        map_in_threads(work, [slice(i, i + count) for i in range(0, loads.shape[1], count)])
+        return solved
 
     def solve_near(
         self, loads: NumberArray, known: Sequence[NumberArray], stop_residual: float = STOP_RESIDUAL
@@ -196,8 +201,10 @@ class QuadraticOperator:
         The combination of them with the least residual is close to the solution for shifts that are next to each
         other on a contour.
         """
+        if not known:
+            return self.solve(loads, stop_residual)
         start = np.zeros(loads.shape, dtype=np.result_type(loads, self.matrix.dtype))
-        for column in range(loads.shape[1] if known else 0):
+        for column in range(loads.shape[1]):
             basis = np.column_stack([each[:, column] for each in known])
             start[:, column] = basis @ np.linalg.lstsq(self.matrix @ basis, loads[:, column])[0]
         rest = loads - self.matrix @ start

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tetlux.fem.charges.derivative import ChargeDerivative
+from tetlux.fem.charges.derivative import ChargeDerivatives
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.patch import Patch
 from tetlux.fem.quadratic.assembly import face_normals
 from tetlux.fem.quadratic.elements import TRIANGLE_EDGES, shape_derivatives, shape_functions
 from tetlux.fem.quadratic.space import QuadraticSpace
 from tetlux.fem.simplex_rules import cut_near_charges, triangle_rule
-from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_by_index
+from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray, sum_columns
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.topology import FACES
 
@@ -21,8 +21,8 @@ from tetlux.meshing.tets.topology import FACES
 FACE_DEGREES = ((0.1, 4), (0.4, 6), (1.0, 10))
 # Degree of the rule for jumps at inner faces: of 4, 6, 10 readings are off by 1e-6, 1e-8 and 1e-11 (ball in a ball).
 JUMP_DEGREE = 6
-# What is integrated: charges, or their derivative.
-Field = Charges | ChargeDerivative
+# What is integrated: charges, or their derivatives.
+Field = Charges | ChargeDerivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +49,13 @@ class InnerFaces:
     slopes: FloatArray
 
     def jump_load(self, patch: Patch, field: Field, interpolant: NumberArray) -> NumberArray:
-        """``∮ (D G - I D G) dv/dn`` over the inner faces of a patch, by the interpolant (size,) of D G, (size,)."""
+        """``∮ (D G - I D G) dv/dn`` over the inner faces of a patch, by interpolants (size, k) of D G, (size, k)."""
         some = np.searchsorted(self.keys, inner_keys(patch))
         points = self.points[some]
-        potential = field.potential(points.reshape(-1, 3)).reshape(points.shape[:2])
-        jumps = potential - interpolant[self.faces[some]] @ self.shape_values.T
-        values = np.einsum("fq,fqa->fa", jumps, self.slopes[some])
-        return sum_by_index(self.cells[some], values, len(interpolant))
+        potential = field.potential(points.reshape(-1, 3)).reshape(*points.shape[:2], interpolant.shape[1])
+        jumps = potential - self.shape_values @ interpolant[self.faces[some]]
+        values = np.swapaxes(self.slopes[some], 1, 2) @ jumps
+        return sum_columns(self.cells[some], values, len(interpolant))
 
     __repr__ = one_line
 
@@ -91,12 +91,13 @@ def inner_faces(space: QuadraticSpace, patches: Iterable[Patch]) -> InnerFaces:
 def integrate_over_faces(
     space: QuadraticSpace, faces: IntArray, positions: FloatArray, field: Field
 ) -> tuple[NumberArray, NumberArray]:
-    """Integrals over triangles (f, 6) of G and of ``D dG/dn`` times their shape functions, (f, 6) each.
+    """Integrals over triangles (f, 6) of G and of ``D dG/dn`` times their shape functions, (f, 6, k) each.
 
-    Triangles are cut near the charges at given positions (c, 3).
+    There are k fields G: one of charges, or their derivatives. Triangles are cut near charges at positions (c, 3).
     """
     shapes = space.corners_and_bends(faces)
-    value, flux = np.zeros((2, len(faces), 6), np.complex128 if field.is_complex else np.float64)
+    count = len(field.positions) if isinstance(field, ChargeDerivatives) else 1
+    value, flux = np.zeros((2, len(faces), 6, count), np.complex128 if field.is_complex else np.float64)
 
     def locate(owner: IntArray, places: FloatArray) -> FloatArray:
         return np.asarray(shape_functions(places, TRIANGLE_EDGES) @ shapes[owner])
@@ -109,8 +110,12 @@ def integrate_over_faces(
         normals = 0.5 * np.cross(slopes[:, :, 1] - slopes[:, :, 0], slopes[:, :, 2] - slopes[:, :, 0])
         normals *= pieces.share * pieces.rule.weights[:, None]
         fluence, gradient = field.fluence_and_flux(points.reshape(-1, 3))
-        through = np.einsum("fqi,fqi->fq", gradient.reshape(points.shape), normals)
-        amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)
-        np.add.at(value, owner, np.einsum("fq,fqa->fa", amount, shape_values))
-        np.add.at(flux, owner, np.einsum("fq,fqa->fa", through, shape_values))
+        through = (normals[:, :, None] @ gradient.reshape(*points.shape, count))[:, :, 0]
+        amount = fluence.reshape(through.shape) * np.linalg.norm(normals, axis=2)[..., None]
+        functions = np.swapaxes(shape_values, -1, -2)
+        for target, values in ((value, functions @ amount), (flux, functions @ through)):
+            if pieces.share == 1.0:
+                target[owner] += values
+            else:
+                np.add.at(target, owner, values)
     return value, flux

@@ -16,7 +16,7 @@ from tetlux.fem.quadratic.loads import point_load
 from tetlux.fem.quadratic.operator import QuadraticOperator
 from tetlux.fem.quadratic.patch_faces import Field, InnerFaces, integrate_over_faces
 from tetlux.fem.quadratic.space import QuadraticSpace
-from tetlux.meshing.arrays import BoolArray, IntArray, NumberArray, sum_by_index
+from tetlux.meshing.arrays import BoolArray, IntArray, NumberArray, sum_columns
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.tets.topology import FACES
 
@@ -54,9 +54,9 @@ class QuadraticPatch:
 
 
 def interpolant_of(space: QuadraticSpace, patch: Patch, field: Field, at_nodes: NumberArray) -> NumberArray:
-    """The quadratic interpolant of a field on a patch, given its values at the nodes (n,), (size,)."""
+    """The quadratic interpolants of fields on a patch, given their values at the nodes (n, ...), (size, ...)."""
     if not patch.cells.any():
-        return np.zeros(space.size)
+        return np.zeros((space.size, *at_nodes.shape[1:]))
     mesh = space.mesh
     marked = np.zeros(len(mesh.edges), dtype=bool)
     marked[mesh.tetrahedron_edges[patch.cells]] = True
@@ -75,10 +75,11 @@ def quadratic_patch(operator: QuadraticOperator, patch: Patch, inner: InnerFaces
             patch, space, point_load(space, charges.positions[sources], charges.strengths[sources].real)
         )
     if patch.cells.all() and operator.coefficients.uniform:
-        return QuadraticPatch(patch, space, -_leaving(operator, patch, charges), is_whole=True)
+        return QuadraticPatch(patch, space, -_leaving(operator, patch, charges)[:, 0], is_whole=True)
     interpolant = interpolant_of(space, patch, charges, patch.at_nodes)
-    load = field_load(operator, patch, charges, interpolant, charges.equation.diffusion * interpolant, inner)
-    found = QuadraticPatch(patch, space, load)
+    function = interpolant[:, None]
+    load = field_load(operator, patch, charges, function, charges.equation.diffusion * function, inner)
+    found = QuadraticPatch(patch, space, load[:, 0])
     vars(found)["interpolant"] = interpolant
     return found
 
@@ -93,45 +94,47 @@ def field_load(
 ) -> NumberArray:
     """What a field G on a patch adds to the load: ``a(I G, v) - ∮ (D dG/dn + G/(2A)) v + ∮ (D G - I D G) dv/dn``.
 
+    There are k of them: one of charges, or their derivatives.
+
     Parameters
     ----------
     operator : QuadraticOperator
     patch : Patch
         Not empty.
-    field : Charges or ChargeDerivative
-    interpolant, of_potential : (size,) ndarray
+    field : Charges or ChargeDerivatives
+    interpolant, of_potential : (size, k) ndarray
         Interpolants of G and of D G.
     inner : InnerFaces
         Among them those at which the patch ends.
 
     Returns
     -------
-    (size,) ndarray
+    (size, k) ndarray
     """
     load = _product(operator, patch, interpolant) - _leaving(operator, patch, field)
     return load + inner.jump_load(patch, field, of_potential)
 
 
 def _leaving(operator: QuadraticOperator, patch: Patch, field: Field) -> NumberArray:
-    """``∮ (D dG/dn + G/(2A)) v`` over the faces of a patch, the second term at the surface of the body, (size,)."""
+    """``∮ (D dG/dn + G/(2A)) v`` over the faces of a patch, the second term at the surface of the body, (size, k)."""
     space = operator.space
     cell, face, on_boundary = patch.outer
     faces = space.faces(space.mesh.tetrahedra[cell[:, None], FACES[face]])
     value, flux = integrate_over_faces(space, faces, patch.charges.positions, field)
-    return sum_by_index(faces, flux + (operator.robin * on_boundary)[:, None] * value, space.size)
+    return sum_columns(faces, flux + (operator.robin * on_boundary)[:, None, None] * value, space.size)
 
 
-def _product(operator: QuadraticOperator, patch: Patch, function: NumberArray) -> NumberArray:
-    """The matrix of the tetrahedra of a patch and their boundary triangles times a function (size,), (size,).
+def _product(operator: QuadraticOperator, patch: Patch, functions: NumberArray) -> NumberArray:
+    """The matrix of the tetrahedra of a patch and their boundary triangles times functions (size, k), (size, k).
 
     That is the matrix of the body less the tetrahedra around the patch, which are fewer.
     """
     space, cells = operator.space, patch.cells
     if cells.all():
-        return np.asarray(operator.matrix @ function)
+        return np.asarray(operator.matrix @ functions)
     within = np.zeros(space.size, dtype=bool)
     within[space.cells[cells]] = True
-    values = np.where(within, function, 0.0)
+    values = np.where(within[:, None], functions, 0.0)
     around = np.flatnonzero(_touch(within, space.cells) & ~cells)
     faces = space.boundary_faces[~cells[space.mesh.boundary_cells]]
     faces = faces[_touch(within, faces)]
@@ -140,7 +143,7 @@ def _product(operator: QuadraticOperator, patch: Patch, function: NumberArray) -
         (operator.elements_of(around), space.cells[around]),
         (operator.robin * face_matrices(space, faces), faces),
     ):
-        product -= sum_by_index(dofs, np.einsum("cab,cb->ca", matrices, values[dofs]), space.size)
+        product -= sum_columns(dofs, matrices @ values[dofs], space.size)
     return np.asarray(product)
 
 

@@ -137,6 +137,8 @@ class QuadraticScene:
         That is the fluence with the interpolants of its patches, and of patches that are the whole body the fluence
         less that of their charges.
         """
+        if not any(each.is_fitted and not each.is_whole for own in self.patches for each in own):
+            return self.operator.solve_near(self.loads, self.known, self.stop_residual)
         # The remainder is far smaller near the light than the fitted charges.
         fitted = self._interpolants(lambda each: each.is_fitted and not each.is_whole)
         loads = self.loads - self.operator.matrix @ fitted
@@ -145,6 +147,8 @@ class QuadraticScene:
     @cached_property
     def fluence(self) -> NumberArray:
         """The fluence of each light, with the interpolants of its patches, (size, k), W/unit²."""
+        if not any(each.is_whole for own in self.patches for each in own):
+            return self.solved
         return self.solved + self._interpolants(lambda each: each.is_whole)
 
     def _interpolants(self, which: Callable[[QuadraticPatch], bool]) -> NumberArray:

@@ -36,6 +36,25 @@ class Nearby:
     split: SplitLights
 
 
+@dataclass(frozen=True, eq=False)
+class Change:
+    """Charges of a patch as some coefficient changes.
+
+    Attributes
+    ----------
+    nearby : sequence of Charges
+        In lights and media that are a little different.
+    weights : sequence of float
+        Of each in the difference.
+    coefficient : {"sigma_a", "sigma_s_prime"}, optional
+        That of their medium that changes; None where that stays as it is.
+    """
+
+    nearby: Sequence[Charges]
+    weights: Sequence[float]
+    coefficient: Coefficient | None = None
+
+
 def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
     """A system with a coefficient of one medium larger by a step, 1/unit."""
     changed = dict(by_label(system.media))
@@ -74,10 +93,12 @@ def every_charges(split: SplitLights) -> list[Charges]:
     return [*split.charges, *(each.charges for each in split.fitted.values())]
 
 
-def power_change(known: Charges, nearby: Sequence[Charges], weights: Sequence[float]) -> float | None:
+def power_change(known: Charges, changed: Change) -> float | None:
     """The relative derivative of power where nothing else of charges changes; None if anything does."""
+    if changed.coefficient is not None:
+        return None
     change = 0.0
-    for weight, each in zip(weights, nearby, strict=True):
+    for weight, each in zip(changed.weights, changed.nearby, strict=True):
         power = (each.strengths[0] / known.strengths[0]).item()
         change += weight * power
         if not (

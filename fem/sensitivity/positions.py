@@ -6,7 +6,7 @@ import numpy as np
 
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.lights.places import free_direction, move_to, place_of
-from tetlux.fem.sensitivity.nearby import STEP, WEIGHTS, Nearby, charges_of
+from tetlux.fem.sensitivity.nearby import STEP, WEIGHTS, Change, Nearby, charges_of
 from tetlux.fem.sensitivity.subtracted import Readout
 from tetlux.fem.sources.light import Light
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -66,7 +66,8 @@ def _along(readout: Readout, light: int, place: FloatArray, step: FloatArray, le
         charges.append(charges_of(split, 0))
     found = readout.of_load(nearby, 0)
     for number, known in enumerate(readout.scene.patches[light]):
-        found = found + readout.of_charges(known, nearby, _of_patch(charges, number), None)
+        change = Change(_of_patch(charges, number), [each.weight for each in nearby])
+        found = found + readout.of_charges(known, [change])[0]
     return found
 
 

@@ -27,6 +27,7 @@ from tetlux.fem.system import System
 from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.errors import InputError
+from tetlux.meshing.host.blocks import map_in_threads
 
 COEFFICIENTS: tuple[Coefficient, ...] = ("sigma_a", "sigma_s_prime")
 # Relative residual at which iterations stop: readings are corrected by the product of those of lights and duals, and
@@ -173,30 +174,29 @@ def _derivatives(
     factors = np.ascontiguousarray(np.broadcast_to(squares, media.shape[0]))
     sums = multiply(space, fluences, duals, factors, shares, media, dtype)
     added_mass, added_stiffness = np.zeros((2, *sums.mass_of_media.shape), sums.mass_of_media.dtype)
-    for light, patches in enumerate(readout.scene.patches):
-        for patch in patches:
-            missing = missing_charges(space, patch)
-            dual = duals[space.cells[missing.cells]]
-            for values, target, added in (
-                (missing.mass, sums.mass, added_mass),
-                (factors[missing.cells, None] * missing.stiffness, sums.stiffness, added_stiffness),
-            ):
-                products = np.einsum("ca,cad->cd", values, dual)
-                target[:, light] += shares[missing.cells].T @ products
-                added[:, light] += media[missing.cells].T @ products
+    every = [(light, patch) for light, patches in enumerate(readout.scene.patches) for patch in patches]
+    missed = map_in_threads(lambda each: missing_charges(space, each[1]), every)
+    for (light, _), missing in zip(every, missed, strict=True):
+        dual = duals[space.cells[missing.cells]]
+        for values, target, added in (
+            (missing.mass, sums.mass, added_mass),
+            (factors[missing.cells, None] * missing.stiffness, sums.stiffness, added_stiffness),
+        ):
+            products = np.einsum("ca,cad->cd", values, dual)
+            target[:, light] += shares[missing.cells].T @ products
+            added[:, light] += media[missing.cells].T @ products
     mass = sums.mass_of_media + added_mass
     found: dict[str, NumberArray] = {}
     if "sigma_a" in to:
         found["sigma_a"] = np.subtract(sums.stiffness, sums.mass, out=sums.mass)
-        _add_rest(found["sigma_a"], readout, "sigma_a", shares, added_stiffness - added_mass)
     if "sigma_s_prime" in to:
         found["sigma_s_prime"] = sums.stiffness
-        _add_rest(sums.stiffness, readout, "sigma_s_prime", shares, added_stiffness)
+    _add_rest(found, readout, shares, {"sigma_a": added_stiffness - added_mass, "sigma_s_prime": added_stiffness})
     return found, mass
 
 
 def _add_rest(
-    derivatives: NumberArray, readout: Readout, coefficient: Coefficient, shares: csr_array, added: NumberArray
+    derivatives: dict[str, NumberArray], readout: Readout, shares: csr_array, added: dict[str, NumberArray]
 ) -> None:
     """Add what derivatives of media have besides products to derivatives (p, l, d), in place.
 
@@ -204,10 +204,12 @@ def _add_rest(
     """
     system = readout.system
     labels, numbers = _media(system)
-    rest = np.array([readout.derivative(label, coefficient) for label in labels]) - added
+    names: list[Coefficient] = [name for name in COEFFICIENTS if name in derivatives]
+    rest = np.array([readout.derivatives(label, names) for label in labels])
     for light, deposit in enumerate(readout.deposits()):
-        ways = entry_shares(deposit, system.mesh, system.true_surface, numbers, len(labels))
-        derivatives[:, light] += (shares.T @ ways) @ rest[:, light]
+        ways = shares.T @ entry_shares(deposit, system.mesh, system.true_surface, numbers, len(labels))
+        for number, name in enumerate(names):
+            derivatives[name][:, light] += ways @ (rest[:, number, light] - added[name][:, light])
 
 
 def _media(system: System) -> tuple[tuple[int, ...], IntArray]:

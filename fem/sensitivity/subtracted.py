@@ -6,13 +6,13 @@ and strengths of charges are differentiated by central differences, their fields
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
-from tetlux.fem.charges.derivative import ChargeDerivative
+from tetlux.fem.charges.derivative import ChargeDerivatives
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.kept_fits import fits_of
 from tetlux.fem.known.patch import Patch
@@ -20,6 +20,7 @@ from tetlux.fem.known.split import SplitLights, Subtract, split_lights
 from tetlux.fem.media.coefficients import at_cells
 from tetlux.fem.quadratic.loads import line_load, point_load, quadratic_load
 from tetlux.fem.quadratic.measurement import DiscreteMeasurement
+from tetlux.fem.quadratic.patch_faces import Field
 from tetlux.fem.quadratic.patches import QuadraticPatch, field_load, interpolant_of
 from tetlux.fem.quadratic.scene import QuadraticScene
 from tetlux.fem.quadratic.solution import QuadraticSolution
@@ -30,6 +31,7 @@ from tetlux.fem.sensitivity.nearby import (
     STEP_OF_PAIR,
     WEIGHTS,
     WEIGHTS_OF_PAIR,
+    Change,
     Coefficient,
     Nearby,
     change_medium,
@@ -42,7 +44,7 @@ from tetlux.fem.sensitivity.products import multiply_on
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
-from tetlux.meshing.arrays import Number, NumberArray
+from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.blocks import map_in_threads
 
@@ -70,8 +72,6 @@ class Readout:
     scene: QuadraticScene
     measurements: Sequence[DiscreteMeasurement]
     duals: NumberArray
-    # Of each label, see `_multiply`.
-    _products: dict[int, dict[QuadraticPatch, tuple[NumberArray, NumberArray]]] = field(default_factory=dict)
 
     def readings(self) -> NumberArray:
         """What each detector reads of each light, (l, d), W/unit²."""
@@ -87,27 +87,34 @@ class Readout:
             for light in self.lights
         ]
 
-    def derivative(self, label: int, coefficient: Coefficient) -> NumberArray:
-        """Derivative of readings to the coefficient of a medium by loads and charges alone, (l, d), W/unit."""
-        found = np.zeros((len(self.lights), len(self.measurements)), self.scene.fluence.dtype)
-        least = self._least(label, coefficient)
-        if least == 0:
-            # Where nothing is absorbed a charge has no derivative, while readings do: that of the mesh is left.
-            return found
-        nearby = self._nearby(label, coefficient, least)
-        if label not in self._products:
-            self._products[label] = self._multiply(label)
-        of_matrix = self._products[label]
+    def derivatives(self, label: int, coefficients: Sequence[Coefficient]) -> NumberArray:
+        """Derivatives of readings to k coefficients of a medium by loads and charges alone, (k, l, d), W/unit."""
+        shape = len(coefficients), len(self.lights), len(self.measurements)
+        found = np.zeros(shape, self.scene.fluence.dtype)
+        least = [self._least(label, coefficient) for coefficient in coefficients]
+        # Where nothing is absorbed a charge has no derivative, while readings do: that of the mesh is left.
+        some = [number for number in range(len(coefficients)) if least[number] != 0]
+        nearby = [self._nearby(label, coefficients[number], least[number]) for number in some]
+        of_matrix = self._multiply(label) if some else {}
 
         def work(light: int) -> None:
-            found[light] = self.of_load(nearby, light)
-            for number, known in enumerate(self.scene.patches[light]):
-                charges = [charges_of(each.split, light)[number] for each in nearby]
-                own = coefficient if _is_in(known.patch, label) else None
-                found[light] += self.of_charges(known, nearby, charges, own)
+            for number, each in zip(some, nearby, strict=True):
+                found[number, light] = self.of_load(each, light)
+            for patch, known in enumerate(self.scene.patches[light]):
+                is_own = _is_in(known.patch, label)
+                changes = [
+                    Change(
+                        [charges_of(one.split, light)[patch] for one in each],
+                        [one.weight for one in each],
+                        coefficients[number] if is_own else None,
+                    )
+                    for number, each in zip(some, nearby, strict=True)
+                ]
+                found[some, light] += self.of_charges(known, changes)
                 if known in of_matrix:
                     mass, stiffness = of_matrix[known]
-                    found[light] += mass - stiffness if coefficient == "sigma_a" else -stiffness
+                    for number in some:
+                        found[number, light] += (mass if coefficients[number] == "sigma_a" else 0.0) - stiffness
 
         map_in_threads(work, range(len(self.lights)))
         return found
@@ -119,10 +126,12 @@ class Readout:
         else:
             step, weights = STEP_OF_PAIR * least, WEIGHTS_OF_PAIR
         for _ in range(SHORTENINGS):
-            found: list[Nearby] = []
-            for steps, weight in weights.items():
-                changed = change_medium(self.system, label, coefficient, steps * step)
-                found.append(Nearby(weight / step, changed, self.split(self.lights, changed)))
+            changed = [change_medium(self.system, label, coefficient, steps * step) for steps in weights]
+            splits = map_in_threads(lambda system: self.split(self.lights, system), changed)
+            found = [
+                Nearby(weight / step, system, split)
+                for weight, system, split in zip(weights.values(), changed, splits, strict=True)
+            ]
             counts = {tuple(len(each.positions) for each in every_charges(one.split)) for one in found}
             if len(counts) == 1:
                 break
@@ -161,33 +170,48 @@ class Readout:
             load = load + each.weight * quadratic_load(space, system.coefficients, deposit.terms, lines)
         return np.asarray(load @ self.duals)
 
-    def of_charges(
-        self, known: QuadraticPatch, nearby: Sequence[Nearby], charges: Sequence[Charges], own: Coefficient | None
-    ) -> NumberArray:
-        """Derivative of ``z.b + G(detector) - d.I G`` of the charges of a patch, (d,).
+    def of_charges(self, known: QuadraticPatch, changes: Sequence[Change]) -> NumberArray:
+        """Derivatives of ``z.b + G(detector) - d.I G`` by k changes of the charges of a patch, (k, d)."""
+        found = np.zeros((len(changes), len(self.measurements)), self.scene.fluence.dtype)
+        others = []
+        for number, change in enumerate(changes):
+            if not known.patch.cells.any():
+                found[number] = self._of_points(change)
+            elif (power := power_change(known.patch.charges, change)) is not None:
+                found[number] = power * self._of_patch(known)
+            else:
+                others.append(number)
+        if others:
+            found[others] = self._of_derivatives(known, [changes[number] for number in others])
+        return found
 
-        `own` is the coefficient of their medium that changes; None where that stays as it is.
-        """
-        patch, operator = known.patch, self.scene.operator
-        weights = [each.weight for each in nearby]
-        if not patch.cells.any():
-            points = [(each.positions[: each.sources], each.strengths[: each.sources].real) for each in charges]
-            loads = [weight * point_load(operator.space, *each) for weight, each in zip(weights, points, strict=True)]
-            return np.asarray(np.sum(loads, axis=0) @ self.duals)
-        if own is None and (change := power_change(patch.charges, charges, weights)) is not None:
-            value = known.load @ self.duals
-            value += [_read_missing(patch, patch.charges, known.interpolant, each) for each in self.measurements]
-            return np.asarray(change * value)
-        derived = _differentiate(patch.charges, charges, weights, own)
-        nodes = np.unique(self.system.mesh.tetrahedra[patch.cells])
-        at_nodes = np.zeros(len(self.system.mesh.points), patch.charges.equation.dtype)
-        at_nodes[nodes] = derived.fluence(self.system.mesh.points[nodes])
+    def _of_points(self, change: Change) -> NumberArray:
+        """Derivative of the load of points that are not subtracted, times each dual, (d,)."""
+        space = self.scene.operator.space
+        loads = [
+            weight * point_load(space, each.positions[: each.sources], each.strengths[: each.sources].real)
+            for weight, each in zip(change.weights, change.nearby, strict=True)
+        ]
+        return np.asarray(np.sum(loads, axis=0) @ self.duals)
+
+    def _of_patch(self, known: QuadraticPatch) -> NumberArray:
+        """``z.b + G(detector) - d.I G`` of the charges of a patch, (d,)."""
+        missing = _read_missing(known.patch, known.patch.charges, known.interpolant[:, None], self.measurements)
+        return np.asarray(known.load @ self.duals + missing[:, 0])
+
+    def _of_derivatives(self, known: QuadraticPatch, changes: Sequence[Change]) -> NumberArray:
+        """The same of derivatives of the charges by k changes, (k, d)."""
+        patch, operator, mesh = known.patch, self.scene.operator, self.system.mesh
+        derived = _differentiate(patch.charges, changes)
+        marked = np.zeros(len(mesh.points), dtype=bool)
+        marked[mesh.tetrahedra[patch.cells]] = True
+        at_nodes = np.zeros((len(mesh.points), len(changes)), patch.charges.equation.dtype)
+        at_nodes[marked] = derived.fluence(mesh.points[marked])
         interpolant = interpolant_of(operator.space, patch, derived, at_nodes)
-        diffusion = patch.charges.equation.diffusion
-        of_potential = diffusion * interpolant + derived.diffusion * known.interpolant
+        of_potential = patch.charges.equation.diffusion * interpolant
+        of_potential += known.interpolant[:, None] * derived.diffusion
         load = field_load(operator, patch, derived, interpolant, of_potential, self.scene.inner_faces)
-        missing = [_read_missing(patch, derived, interpolant, each) for each in self.measurements]
-        return np.asarray(missing + load @ self.duals)
+        return np.asarray(load.T @ self.duals + _read_missing(patch, derived, interpolant, self.measurements).T)
 
     def _multiply(self, label: int) -> dict[QuadraticPatch, tuple[NumberArray, NumberArray]]:
         """Products of the interpolants of charges in a medium with the duals on their patches, two (d,) for each."""
@@ -211,30 +235,33 @@ def _is_in(patch: Patch, label: int) -> bool:
 
 
 def _read_missing(
-    patch: Patch, field: Charges | ChargeDerivative, interpolant: NumberArray, discrete: DiscreteMeasurement
-) -> Number:
-    """What a detector reads of a field on a patch less its interpolant (size,)."""
-    inside = np.flatnonzero(patch.cells[discrete.cells])
-    if len(inside) == 0:
-        return 0.0
-    points, weights = discrete.measurement.points[inside], discrete.measurement.weights[inside]
-    return discrete.scale * (weights @ (field.fluence(points) - discrete.values(interpolant)[inside])).item()
+    patch: Patch, field: Field, interpolant: NumberArray, measurements: Sequence[DiscreteMeasurement]
+) -> NumberArray:
+    """What each of d detectors reads of k fields on a patch less their interpolants (size, k), (d, k)."""
+    found = np.zeros((len(measurements), interpolant.shape[1]), interpolant.dtype)
+    for number, discrete in enumerate(measurements):
+        inside = np.flatnonzero(patch.cells[discrete.cells])
+        if len(inside):
+            points, weights = discrete.measurement.points[inside], discrete.measurement.weights[inside]
+            known = np.column_stack([discrete.values(each)[inside] for each in interpolant.T])
+            found[number] = discrete.scale * (weights @ (field.fluence(points).reshape(known.shape) - known))
+    return found
 
 
-def _differentiate(
-    known: Charges, nearby: Sequence[Charges], weights: Sequence[float], coefficient: Coefficient | None
-) -> ChargeDerivative:
-    """The derivative of charges to a coefficient of their medium, or to one of another medium if it is None."""
+def _differentiate(known: Charges, changes: Sequence[Change]) -> ChargeDerivatives:
+    """The derivatives of charges by some changes."""
     positions, strengths, closest = (
-        sum(weight * getattr(each, name) for weight, each in zip(weights, nearby, strict=True))
+        np.array(
+            [
+                sum(weight * getattr(each, name) for weight, each in zip(one.weights, one.nearby, strict=True))
+                for one in changes
+            ]
+        )
         for name in ("positions", "strengths", "closest")
     )
     k, diffusion = known.equation.wave_number, known.equation.diffusion
-    of_diffusion, of_wave_number = 0.0, 0.0 * k
-    if coefficient is not None:
-        # k² = sigma_a/D, and D = 1/(3 sigma_t').
-        of_diffusion = -3.0 * diffusion**2
-        of_wave_number = -0.5 * k * of_diffusion / diffusion
-    if coefficient == "sigma_a":
-        of_wave_number += 0.5 / (k * diffusion)
-    return ChargeDerivative(known, positions, strengths, of_wave_number, of_diffusion, closest)
+    of_diffusion = np.array([0.0 if one.coefficient is None else -3.0 * diffusion**2 for one in changes])
+    # k² = sigma_a/D, and D = 1/(3 sigma_t').
+    of_wave_number = -0.5 * k * of_diffusion / diffusion
+    of_wave_number += np.array([0.5 / (k * diffusion) if one.coefficient == "sigma_a" else 0.0 for one in changes])
+    return ChargeDerivatives(known, positions, strengths, of_wave_number, of_diffusion, closest)

@@ -5,11 +5,12 @@ a mesh that is halved N times everywhere (0: 6,000 nodes, 1: 22,000, 2: 69,000; 
 Fits: ten fibres on a ball, read by charges, from starts a factor of 3 off (targets .5 % in 15 times a solve), and
 `TRIALS` fits to readings with 1 % of noise (60 to 75 % within one standard deviation), by polynomials through what is
 read on one mesh, and `WHOLE` of them as a whole. With the argument ``fits`` these alone. Times are processor seconds.
-On a busy machine (load 3): 14 s with 6,000 nodes (.4 GB), 41 with 22,000 (.85 GB), 118 with 68,800 (2.2 GB), which
-misses both targets. Half of the latter are the 32 solves of 511,000 unknowns, 32 iterations each; a quarter what is
-subtracted and its derivatives, a tenth each linear elements, by which patches are chosen, and products. Fits within
-.01 % in 11.9 and 13.3 solves of 1.6 s; 68 and 66 % of the 200 fits within one standard deviation, whole fits within
-.01 of it of these.
+On a machine with a load of 7, one thread: 38 s with 22,000 nodes (.76 GB). With 68,800 nodes, two threads and the same
+load it took 123 s of CPU (2.2 GB), before matrices were assembled in half of the memory; both targets are missed. A
+quarter of it are the 32 solves of 511,000 unknowns, 31 iterations each, a third what is subtracted and its derivatives,
+a seventh linear elements, by which patches are chosen, a ninth products, a fifteenth the matrix. Fits within .01 % in
+11.9 and 13.3 solves of 1.6 s; 68 and 66 % of the 200 fits within one standard deviation, whole fits within .01 of it of
+these.
 """
 
 import itertools
