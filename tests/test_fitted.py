@@ -10,7 +10,8 @@ from tetlux.cases.shipped import library_folder
 from tetlux.fem import Medium, PencilBeam, PointSource, Region, System, VaryingMedium, solve, solve_each
 from tetlux.fem.body.body import Body
 from tetlux.fem.exact import sphere as exact_sphere
-from tetlux.fem.known.fitted import MOST_SOURCES, residual_at
+from tetlux.fem.known.boundary_residual import residual_at
+from tetlux.fem.known.fitted import MOST_SOURCES
 from tetlux.fem.known.fitted_patch import FittedPatch, _unchanged, fitted_patch
 from tetlux.fem.known.kept_fits import KeptFits
 from tetlux.fem.known.split import split_lights

@@ -37,10 +37,13 @@ class LeastSquaresFactors:
     columns: np.ndarray[tuple[int], np.dtype[np.int64]]
     scales: FloatArray
 
-    def solve(self, right: NumberArray) -> NumberArray:
-        """Least-squares solutions (c, s) for right sides (m, s)."""
+    def solve(self, right: NumberArray, normal: NumberArray | None = None) -> NumberArray:
+        """Least-squares solutions (c, s) for right sides (m, s), and for more (c, s) of the normal equations."""
         found = np.zeros((len(self.scales), right.shape[1]), dtype=np.result_type(self.reflectors, right))
         projected = self.q2.conj().T @ self._project(right)
+        if normal is not None:
+            scaled = (normal / self.scales[:, None])[self.columns]
+            projected = projected + scipy.linalg.solve_triangular(self.r, scaled, trans="C", check_finite=False)
         found[self.columns] = scipy.linalg.solve_triangular(self.r, projected, check_finite=False)
         return found / self.scales[:, None]
 

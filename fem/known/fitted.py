@@ -32,11 +32,12 @@ from tetlux.fem.charges.placement import EQUATION_REFINEMENT, ChargePlacement
 from tetlux.fem.charges.quadrature import group_size, quadrature
 from tetlux.fem.charges.readings import reading_goal
 from tetlux.fem.charges.samples import Samples, Spacing
+from tetlux.fem.known.boundary_residual import BoundaryResidual, residual_at
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.images import CLOSEST
 from tetlux.fem.media.medium import Medium
 from tetlux.fem.sources.deposit import Deposit
-from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray, Number, NumberArray
+from tetlux.meshing.arrays import BoolArray, FloatArray, IntArray
 from tetlux.meshing.describe import one_line
 from tetlux.meshing.host.by_pair import ByPair
 from tetlux.meshing.surface.surface import Surface
@@ -46,12 +47,8 @@ from tetlux.meshing.tets.mesh import TetMesh
 SHALLOWEST = 1e-3
 # More sources than this are not fitted: charges would be needed near each of them.
 MOST_SOURCES = 30
-# Points that differ by less than this share of their coordinates are the same, if their normals are.
-SAME = 1e-12
 # Values near a charge are taken no nearer than this share of the least distance of charges from fitted points.
 CLEAR = 0.25
-# The power that flows out is corrected where less than this share of all is absorbed.
-LITTLE = 0.05
 # Charges that finite elements subtract are fitted until they alone read within this share of the tolerance: the rest of
 # it is for the elements. Largest error of forty readings of plates and blocks, at .01, in %, for .2 / .1 / .05: .12 /
 # .10 / .02, by up to 540 / 550 / 640 charges.
@@ -61,31 +58,8 @@ READING_SHARE = 0.05
 # once or twice the exitance there.
 ACCURATE, AVERAGED = 0.3, 12
 
-# Many runs have the same points on one mesh: the point nearest to each node, and which of other points are the same.
+# Many runs have the same points on one mesh: the point nearest to each node.
 _NEAREST: ByPair[TetMesh, Samples, IntArray] = ByPair()
-_SAME_POINTS: ByPair[Samples, Samples, tuple[IntArray, IntArray, IntArray]] = ByPair()
-
-
-@dataclass(frozen=True, eq=False)
-class BoundaryResidual:
-    """The residual of the boundary condition that charges leave on the true surface.
-
-    Attributes
-    ----------
-    points : Samples
-        The q points at which it is integrated; their `spacing` is that of charges, unit.
-    exitance, values : (q,) ndarray
-        ``G/(2A)`` and the residual ``D dG/dn + G/(2A)``, W/unit².
-    missed : float or complex
-        What the sum of ``-D dG/dn`` over the points misses of its integral, W; 0 where that hardly matters.
-    """
-
-    points: Samples
-    exitance: NumberArray
-    values: NumberArray
-    missed: Number
-
-    __repr__ = one_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +103,12 @@ class FittedLight:
         field, _ = fit_strengths(self.placement, equation_of(known.medium, shift), lights)
         return replace(known, equation=field.equation, strengths=field.strengths[:, 0])
 
+    def with_sources(self, equation: Equation, lights: LightSources) -> ChargeField:
+        """These charges as they are, with other sources in another equation."""
+        known = self.charges
+        positions = np.vstack([lights.points, known.positions[known.sources :]])
+        return ChargeField(equation, positions, np.vstack([lights.powers, known.strengths[known.sources :, None]]))
+
     def accurate_on(self, mesh: TetMesh) -> BoolArray:
         """Whether the charges are accurate at the point of `residual` nearest to each node of a mesh, (n,)."""
         if self.accurate.all():
@@ -152,6 +132,7 @@ def fit_light(
     readings: tuple[FloatArray, float] | None = None,
     like: FittedLight | None = None,
     shift: complex = 0.0,
+    refit: bool = True,
 ) -> FittedLight | None:
     """Fit charges to the points of a deposit.
 
@@ -169,6 +150,8 @@ def fit_light(
     shift : complex
         What is added to sigma_a, 1/unit. Places of charges are chosen for the real part of the wave number: complex
         fits take four times as long.
+    refit : bool
+        Whether charges that are put where those of `like` are have strengths of their own, not those of `like`.
 
     Returns
     -------
@@ -191,7 +174,9 @@ def fit_light(
         if found is None:
             return None
         placement, field = found.placement, found.field
-    if field is None or shift != 0:
+    if like is not None and not refit:
+        field = like.with_sources(equation, lights)
+    elif field is None or shift != 0:
         field, _ = fit_strengths(placement, equation, lights)
     charges = _charges(field, placement, surface, medium)
     if like is not None and like.surface is surface:
@@ -258,39 +243,3 @@ def _residual_points(placement: ChargePlacement, surface: Surface, wanted: Spaci
     # Many runs may have these points on one mesh, which then finds them once.
     points.points.setflags(write=False)
     return replace(points, spacing=EQUATION_REFINEMENT * samples.spacing[samples.tree.query(points.points)[1]])
-
-
-def residual_at(points: Samples, charges: Charges, known: BoundaryResidual | None = None) -> BoundaryResidual:
-    """The residual of charges at points of the true surface, some of which may be those where it is known."""
-    exitance, values = np.empty((2, len(points)), charges.equation.dtype)
-    new = np.arange(len(points))
-    if known is not None:
-        of_known = known.points
-        old, same, new = _SAME_POINTS.get(of_known, points, lambda: _same_points(of_known, points))
-        exitance[same], values[same] = known.exitance[old], known.values[old]
-    exitance[new], values[new] = charges.exitance_and_residual(points.points[new], points.normals[new])
-    outflow = (points.areas @ (exitance - values)).item()
-    return BoundaryResidual(points, exitance, values, _missed(charges, points, outflow))
-
-
-def _same_points(known: Samples, points: Samples) -> tuple[IntArray, IntArray, IntArray]:
-    """Numbers of known points that are among some points, theirs among these, and those of all others of these."""
-    distance, nearest = (np.asarray(found) for found in known.tree.query(points.points))
-    same = distance <= SAME * float(np.abs(points.points).max())
-    # Two triangles may have a point in common and not its normal.
-    same &= np.abs(known.normals[nearest] - points.normals).max(axis=1) <= SAME
-    return nearest[same], np.flatnonzero(same), np.flatnonzero(~same)
-
-
-def _missed(charges: Charges, points: Samples, outflow: Number) -> Number:
-    """What a sum over points misses of the outflow of charges, of which they have that sum, W.
-
-    Without absorption all power of the sources flows out, so the sum for the same charges without absorption says how
-    far it is off. That matters where little is absorbed, which is what does not flow out.
-    """
-    power = charges.strengths[: charges.sources].sum().item()
-    if abs(power - outflow) > LITTLE * abs(power):
-        return 0.0
-    unabsorbed = replace(charges, equation=replace(charges.equation, wave_number=0.0))
-    exitance, values = unabsorbed.exitance_and_residual(points.points, points.normals)
-    return outflow * (power / (points.areas @ (exitance - values)).item() - 1.0)

@@ -8,7 +8,8 @@ from scipy.spatial import cKDTree
 
 from tetlux.fem.charges.check import exitance_error
 from tetlux.fem.charges.samples import Samples, Spacing
-from tetlux.fem.known.fitted import BoundaryResidual, FittedLight, residual_at
+from tetlux.fem.known.boundary_residual import BoundaryResidual, residual_at
+from tetlux.fem.known.fitted import FittedLight
 from tetlux.fem.known.patch import Patch, holds_sources
 from tetlux.fem.known.patch_terms import BoundaryIntegrals, PatchTerms, patch_terms
 from tetlux.fem.models.boundary import boundary_condition_of

@@ -81,6 +81,7 @@ def split_lights(
     kept: KeptFits | None = None,
     scene: int = 0,
     shift: complex = 0.0,
+    refit: bool = True,
 ) -> SplitLights:
     """Split the lights of a scene into what is subtracted and what is left to finite elements.
 
@@ -100,6 +101,8 @@ def split_lights(
         The number of the scene, by which patches are kept.
     shift : complex
         What the equation adds to sigma_a, 1/unit: 0 for steady light.
+    refit : bool
+        Whether charges that follow kept fits have strengths of their own, not those of the fits.
 
     Raises
     ------
@@ -121,7 +124,7 @@ def split_lights(
     for number, light in enumerate(lights):
         deposit = light.deposit_in(body)
         if subtract == "fitted" and sum(len(one.charges.positions) for one in fitted.values()) < MOST_FITTED:
-            found_fit = _fit(light, deposit, body, tolerance, readings, kept, shift)
+            found_fit = _fit(light, deposit, body, tolerance, readings, kept, shift, refit)
             if found_fit is not None:
                 fitted[number] = found_fit
                 deposits.append(deposit)
@@ -149,18 +152,19 @@ def _fit(
     readings: tuple[FloatArray, float] | None,
     kept: KeptFits | None,
     shift: complex,
+    refit: bool,
 ) -> FittedLight | None:
     """Fit charges to a light, placed as in its kept fit if there is one; None if charges would not do."""
     medium = body.only_medium
     if medium is None or len(deposit.terms.points) == 0:
         return None
-    if kept is None:
-        return fit_light(deposit, body.surface, medium, tolerance=tolerance, readings=readings, shift=shift)
-    chosen, like = kept.find(repr(light), deposit.hints.resolution)
+    chosen, like = (False, None) if kept is None else kept.find(repr(light), deposit.hints.resolution)
     if chosen and like is None:
         return None
-    found = fit_light(deposit, body.surface, medium, tolerance=tolerance, readings=readings, shift=shift, like=like)
-    if not chosen:
+    found = fit_light(
+        deposit, body.surface, medium, tolerance=tolerance, readings=readings, like=like, shift=shift, refit=refit
+    )
+    if kept is not None and not chosen:
         kept.keep(repr(light), deposit.hints.resolution, found)
     return found
 

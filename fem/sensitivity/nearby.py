@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from tetlux.fem.charges.placement import ChargePlacement
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.split import SplitLights
 from tetlux.fem.media.coefficients import AnyMedium, by_label
@@ -13,23 +14,25 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.system import System
+from tetlux.meshing.arrays import NumberArray
 
 Coefficient = Literal["sigma_a", "sigma_s_prime"]
-# Step of central differences of four points, as a share of the coefficient, and how it is shortened where a charge
-# comes or goes: those of images do at some ratios of coefficients.
-STEP = 2e-3
+# Step of central differences, as a share of the coefficient, and how it is shortened where a charge comes or goes:
+# those of images do at some ratios of coefficients.
+STEP = 2e-4
 SHORTER, SHORTENINGS = 0.1, 3
-# Weights of the values one and two steps to each side (Fornberg 1988).
-WEIGHTS = {1.0: 2.0 / 3.0, -1.0: -2.0 / 3.0, 2.0: -1.0 / 12.0, -2.0: 1.0 / 12.0}
-# Places and strengths that are not fitted have less rounding, and two points closer together are accurate enough.
-STEP_OF_PAIR, WEIGHTS_OF_PAIR = 2e-4, {1.0: 0.5, -1.0: -0.5}
+# Weights of the values one step to each side.
+WEIGHTS = {1.0: 0.5, -1.0: -0.5}
 # Positions and strengths that differ by less than this share are the same.
 SAME = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
-    """Lights in a medium that is a little different, one of some, with a weight of the value for differences."""
+    """Lights in a medium that is a little different, one of some, with a weight of the value for differences.
+
+    Strengths of fitted charges are not those of that medium.
+    """
 
     weight: float
     system: System
@@ -48,11 +51,34 @@ class Change:
         Of each in the difference.
     coefficient : {"sigma_a", "sigma_s_prime"}, optional
         That of their medium that changes; None where that stays as it is.
+    placement : ChargePlacement, optional
+        Where charges are that were fitted, and whose strengths follow from that.
     """
 
     nearby: Sequence[Charges]
     weights: Sequence[float]
     coefficient: Coefficient | None = None
+    placement: ChargePlacement | None = None
+
+    def sum(self, name: str) -> NumberArray:
+        """The derivative of an attribute of the charges."""
+        return np.asarray(sum(weight * getattr(each, name) for weight, each in self.weighted))
+
+    @property
+    def weighted(self) -> list[tuple[float, Charges]]:
+        """The charges with their weights."""
+        return list(zip(self.weights, self.nearby, strict=True))
+
+
+def change_of(nearby: Sequence[Nearby], light: int, patch: int, coefficient: Coefficient | None = None) -> Change:
+    """How the charges of a patch of a light change."""
+    fitted = nearby[0].split.fitted.get(light)
+    return Change(
+        [_charges_of(each.split, light)[patch] for each in nearby],
+        [each.weight for each in nearby],
+        coefficient,
+        None if fitted is None else fitted.placement,
+    )
 
 
 def change_medium(system: System, label: int, coefficient: Coefficient, step: float) -> System:
@@ -82,7 +108,7 @@ def has_rest(deposit: Deposit) -> bool:
     return len(deposit.terms.points) > 0 or len(deposit.terms.segments) > 0 or deposit.on_mesh is not None
 
 
-def charges_of(split: SplitLights, light: int) -> list[Charges]:
+def _charges_of(split: SplitLights, light: int) -> list[Charges]:
     """The charges of a light, in the order of its patches."""
     found = [charges for charges, owner in zip(split.charges, split.owners, strict=True) if owner == light]
     return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
@@ -95,10 +121,10 @@ def every_charges(split: SplitLights) -> list[Charges]:
 
 def power_change(known: Charges, changed: Change) -> float | None:
     """The relative derivative of power where nothing else of charges changes; None if anything does."""
-    if changed.coefficient is not None:
+    if changed.coefficient is not None or changed.placement is not None:
         return None
     change = 0.0
-    for weight, each in zip(changed.weights, changed.nearby, strict=True):
+    for weight, each in changed.weighted:
         power = (each.strengths[0] / known.strengths[0]).item()
         change += weight * power
         if not (

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tetlux.fem.known.charges import Charges
 from tetlux.fem.lights.places import free_direction, move_to, place_of
-from tetlux.fem.sensitivity.nearby import STEP, WEIGHTS, Change, Nearby, charges_of
+from tetlux.fem.sensitivity.nearby import STEP, WEIGHTS, Nearby, change_of
 from tetlux.fem.sensitivity.subtracted import Readout
 from tetlux.fem.sources.light import Light
 from tetlux.meshing.arrays import FloatArray, NumberArray
@@ -58,18 +57,12 @@ def check_places(lights: Sequence[Light], numbers: Sequence[int]) -> None:
 
 def _along(readout: Readout, light: int, place: FloatArray, step: FloatArray, length: float) -> NumberArray:
     """Derivative of the readings of a light along a step (3,) of some length, (d,)."""
-    nearby, charges = [], []
+    nearby = []
     for steps, weight in WEIGHTS.items():
         moved = move_to(readout.lights[light], place + steps * step)
         split = readout.split([moved], readout.system)
         nearby.append(Nearby(weight / length, readout.system, split))
-        charges.append(charges_of(split, 0))
     found = readout.of_load(nearby, 0)
     for number, known in enumerate(readout.scene.patches[light]):
-        change = Change(_of_patch(charges, number), [each.weight for each in nearby])
-        found = found + readout.of_charges(known, [change])[0]
+        found = found + readout.of_charges(known, [change_of(nearby, 0, number)])[0]
     return found
-
-
-def _of_patch(charges: Sequence[Sequence[Charges]], number: int) -> list[Charges]:
-    return [each[number] for each in charges]

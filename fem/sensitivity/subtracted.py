@@ -1,8 +1,9 @@
 """What readings change by because loads and subtracted charges depend on the coefficients.
 
 With the dual solution z of a reading fixed, the reading depends on them through ``z.b + G(detector) - d.I G``. Places
-and strengths of charges are differentiated by central differences, their fields in closed form
-(`tetlux.fem.charges.derivative`). No system is solved for that.
+and powers of charges are differentiated by central differences, strengths that are fitted by those of the equations
+that they are fitted to (`tetlux.fem.charges.change`), fields in closed form (`tetlux.fem.charges.derivative`). No
+system is solved for that, and no charges are fitted.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ import numpy as np
 
 from tetlux.fem.body.body import Body
 from tetlux.fem.body.partition import MeshPartition
+from tetlux.fem.charges.change import differentiate_strengths
 from tetlux.fem.charges.derivative import ChargeDerivatives
 from tetlux.fem.known.charges import Charges
 from tetlux.fem.known.kept_fits import fits_of
@@ -28,14 +30,12 @@ from tetlux.fem.sensitivity.nearby import (
     SHORTENINGS,
     SHORTER,
     STEP,
-    STEP_OF_PAIR,
     WEIGHTS,
-    WEIGHTS_OF_PAIR,
     Change,
     Coefficient,
     Nearby,
     change_medium,
-    charges_of,
+    change_of,
     every_charges,
     has_rest,
     power_change,
@@ -103,11 +103,7 @@ class Readout:
             for patch, known in enumerate(self.scene.patches[light]):
                 is_own = _is_in(known.patch, label)
                 changes = [
-                    Change(
-                        [charges_of(one.split, light)[patch] for one in each],
-                        [one.weight for one in each],
-                        coefficients[number] if is_own else None,
-                    )
+                    change_of(each, light, patch, coefficients[number] if is_own else None)
                     for number, each in zip(some, nearby, strict=True)
                 ]
                 found[some, light] += self.of_charges(known, changes)
@@ -121,16 +117,13 @@ class Readout:
 
     def _nearby(self, label: int, coefficient: Coefficient, least: float) -> list[Nearby]:
         """The lights with a coefficient a few steps away on both sides, as near as no charge comes or goes."""
-        if any(patch.is_fitted for own in self.scene.patches for patch in own):
-            step, weights = STEP * least, WEIGHTS
-        else:
-            step, weights = STEP_OF_PAIR * least, WEIGHTS_OF_PAIR
+        step = STEP * least
         for _ in range(SHORTENINGS):
-            changed = [change_medium(self.system, label, coefficient, steps * step) for steps in weights]
+            changed = [change_medium(self.system, label, coefficient, steps * step) for steps in WEIGHTS]
             splits = map_in_threads(lambda system: self.split(self.lights, system), changed)
             found = [
                 Nearby(weight / step, system, split)
-                for weight, system, split in zip(weights.values(), changed, splits, strict=True)
+                for weight, system, split in zip(WEIGHTS.values(), changed, splits, strict=True)
             ]
             counts = {tuple(len(each.positions) for each in every_charges(one.split)) for one in found}
             if len(counts) == 1:
@@ -150,9 +143,9 @@ class Readout:
         return float((absorption if coefficient == "sigma_a" else extinction - absorption).min())
 
     def split(self, lights: Sequence[Light], system: System) -> SplitLights:
-        """Lights in a system, with the charges that are kept with its mesh."""
+        """Lights in a system, with the charges that are kept with its mesh, which are not fitted to it."""
         kept = fits_of(system.mesh)
-        return split_lights(lights, self._body(system), self.subtract, kept=kept, shift=system.shift)
+        return split_lights(lights, self._body(system), self.subtract, kept=kept, shift=system.shift, refit=False)
 
     def _body(self, system: System) -> Body:
         return Body(system.true_surface, system.media, MeshPartition(system.mesh))
@@ -190,7 +183,7 @@ class Readout:
         space = self.scene.operator.space
         loads = [
             weight * point_load(space, each.positions[: each.sources], each.strengths[: each.sources].real)
-            for weight, each in zip(change.weights, change.nearby, strict=True)
+            for weight, each in change.weighted
         ]
         return np.asarray(np.sum(loads, axis=0) @ self.duals)
 
@@ -250,15 +243,11 @@ def _read_missing(
 
 def _differentiate(known: Charges, changes: Sequence[Change]) -> ChargeDerivatives:
     """The derivatives of charges by some changes."""
-    positions, strengths, closest = (
-        np.array(
-            [
-                sum(weight * getattr(each, name) for weight, each in zip(one.weights, one.nearby, strict=True))
-                for one in changes
-            ]
-        )
-        for name in ("positions", "strengths", "closest")
-    )
+    positions, closest = (np.array([one.sum(name) for one in changes]) for name in ("positions", "closest"))
+    strengths = np.array([one.sum("strengths") for one in changes])
+    if (placement := changes[0].placement) is not None:
+        of_charges = differentiate_strengths(placement, known, [one.weighted for one in changes])
+        strengths = np.hstack([strengths[:, : known.sources], of_charges])
     k, diffusion = known.equation.wave_number, known.equation.diffusion
     of_diffusion = np.array([0.0 if one.coefficient is None else -3.0 * diffusion**2 for one in changes])
     # k² = sigma_a/D, and D = 1/(3 sigma_t').
