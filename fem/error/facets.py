@@ -20,6 +20,7 @@ from tetlux.meshing.arrays import FloatArray, IntArray, NumberArray
 from tetlux.meshing.surface.surface import Surface
 from tetlux.meshing.surface.triangles import longest_sides, triangle_areas
 from tetlux.meshing.tets.mesh import TetMesh
+from tetlux.meshing.tets.queries import heights
 from tetlux.meshing.tets.regions import owners
 
 # Facets are not measured if together they can add at most this share of all other indicators.
@@ -119,5 +120,5 @@ def _interface_distances(middles: FloatArray, owner: IntArray, inner: Sequence[S
     distances = np.zeros(len(middles))
     for region in np.unique(owner):
         own = owner == region
-        distances[own] = inner[region - 1].distances(middles[own])
+        distances[own] = heights(inner[region - 1], middles[own])
     return distances

@@ -53,5 +53,15 @@ class BoundaryQueries:
         cached = self._distances.setdefault(surface, np.full(len(self._faces), np.nan))
         missing = faces[np.isnan(cached[faces])]
         middles = self._points[self._faces[missing]].mean(axis=1)
-        cached[missing] = surface.distances(middles)
+        cached[missing] = heights(surface, middles)
         return np.asarray(cached[faces])
+
+
+def heights(surface: Surface, points: FloatArray) -> FloatArray:
+    """Distances of points (q, 3) near a surface from its tangent planes where they project on it, (q,).
+
+    Where triangles bend much, even points of the smooth surface project beside themselves. As distances of facets from
+    it such errors are all that is left on fine meshes: the facets of a hare seemed to need a million tetrahedra.
+    """
+    places, normals = surface.project(points)
+    return np.asarray(np.abs(np.einsum("ij,ij->i", points - places, normals)))
