@@ -70,12 +70,16 @@ def test_points_next_to_a_charge_have_the_slope_at_the_least_distance() -> None:
 
 @pytest.mark.parametrize("attenuation", [0.2, 0.2 + 0.05j])
 def test_strengths_change_as_those_of_fits_nearby(ball: Surface, attenuation: complex) -> None:
-    """By what they give inside: where charges outweigh each other, strengths alone hardly matter."""
+    """By what they give inside: where charges outweigh each other, strengths alone hardly matter.
+
+    So few charges leave a residual that matters too.
+    """
     step, wide = 1e-4, 1e-2
     inside = np.random.default_rng(5).uniform(-5.0, 5.0, (50, 3))
     rough = fit_for_remainder(ball, Equation(0.2, 0.3, 2.5), lights_at(0.0), tolerance=0.1)
     assert rough is not None
-    placement, count = rough.placement, len(rough.placement.charges)
+    placement = replace(rough.placement, charges=rough.placement.charges[::8])
+    count = len(placement.charges)
 
     def fitted(way: float) -> ChargeField:
         equation = Equation(attenuation * (1.0 + way), 0.3 * (1.0 - 2.0 * way), 2.5)

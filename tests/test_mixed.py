@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 
 from tests.conftest import TISSUE, block
+from tetlux.fem import Medium, Region, System
 from tetlux.fem.linear import mixed
 from tetlux.fem.linear.krylov import STOP_RESIDUAL, Preconditioner, Product, conjugate_gradients
-from tetlux.fem.linear.mixed import mixed_conjugate_gradients
+from tetlux.fem.linear.mixed import _in_double, mixed_conjugate_gradients
 from tetlux.fem.operators.assembly import system_matrix
+from tetlux.meshing import Surface, sphere, tetrahedralize
 from tetlux.meshing.arrays import NumberArray
 
 COLUMNS = 5
@@ -33,7 +35,7 @@ def test_residuals_are_those_of_double_precision_in_as_many_iterations() -> None
     known, expected = conjugate_gradients(product, precondition, loads)
     assert np.linalg.norm(loads - product.matrix @ found, axis=0).max() <= STOP_RESIDUAL
     assert found == pytest.approx(known, rel=1e-7, abs=1e-9 * np.abs(known).max())
-    assert iterations <= 1.25 * expected
+    assert iterations <= 1.35 * expected
 
 
 def test_what_single_precision_cannot_solve_is_left_to_double_precision(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,3 +54,21 @@ def test_columns_of_zeros_stay_zero_and_others_are_solved() -> None:
     found, _ = mixed_conjugate_gradients(product, product.single, jacobi_of(product), loads)
     assert (found[:, 1] == 0.0).all()
     assert np.linalg.norm(loads - product.matrix @ found, axis=0).max() <= STOP_RESIDUAL
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.002j])
+def test_media_that_hardly_scatter_beside_others_take_no_more_iterations(ball: Surface, shift: complex) -> None:
+    """With directions that go on as residuals are replaced, 5 to 10 times as many."""
+    core, thin = sphere(5.0), Medium(sigma_a=0.0, sigma_s_prime=0.01, eta=1.4)
+    mesh = tetrahedralize(ball, regions=[core])
+    medium = Medium(sigma_a=0.0, sigma_s_prime=10.0, eta=1.4)
+    system = System(mesh, medium, ball, regions=(Region(core, thin),), shift=shift)
+    operator = system.quadratic
+    nodes = np.arange(0, len(mesh.points), len(mesh.points) // 8)
+    loads = np.zeros((operator.space.size, len(nodes)), complex if shift else float)
+    loads[nodes, np.arange(len(nodes))] = 0.1
+    loads = loads[operator._order]
+    found, iterations = mixed_conjugate_gradients(operator._product, operator._single, operator._precondition, loads)
+    _, expected = conjugate_gradients(operator._product, _in_double(operator._precondition), loads)
+    assert np.linalg.norm(loads - operator._product(found), axis=0).max() <= STOP_RESIDUAL
+    assert iterations <= 1.35 * expected

@@ -21,6 +21,7 @@ from tetlux.fem import (
     mesh_field,
     moments,
     sensitivity,
+    solve,
 )
 from tetlux.fem.exact import sphere as exact
 from tetlux.fem.known.split import Subtract
@@ -84,6 +85,15 @@ def test_fitted_charges_are_differentiated_too(even: System) -> None:
     for coefficient, step in (("sigma_a", 2e-5), ("sigma_s_prime", 2e-3)):
         changes = [read_at(change_medium(even, 0, coefficient, side * step), [SOURCE]) for side in (-1.0, 1.0)]  # type: ignore[arg-type]
         assert found.derivatives[coefficient][..., 0] == pytest.approx((changes[1] - changes[0]) / (2 * step), rel=2e-5)
+
+
+def test_steady_light_is_differentiated_on_the_mesh_of_modulated_light(ball: Surface) -> None:
+    """Charges that are kept with it have complex strengths."""
+    mesh = solve(ball, TISSUE, [SOURCE], detectors=DETECTORS, detector_tolerance=0.05, frequency=1e8).mesh
+    system = System(mesh, TISSUE, ball)
+    found = sensitivity(system, [SOURCE], [*DETECTORS, FIBRE], per="region", positions=[0])
+    changes = [read_at(change_medium(system, 0, "sigma_a", side * 2e-5), [SOURCE]) for side in (-1.0, 1.0)]
+    assert found.derivatives["sigma_a"][..., 0] == pytest.approx((changes[1] - changes[0]) / 4e-5, rel=2e-5)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.006j])

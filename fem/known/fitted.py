@@ -103,11 +103,11 @@ class FittedLight:
         field, _ = fit_strengths(self.placement, equation_of(known.medium, shift), lights)
         return replace(known, equation=field.equation, strengths=field.strengths[:, 0])
 
-    def with_sources(self, equation: Equation, lights: LightSources) -> ChargeField:
-        """These charges as they are, with other sources in another equation."""
-        known = self.charges
-        positions = np.vstack([lights.points, known.positions[known.sources :]])
-        return ChargeField(equation, positions, np.vstack([lights.powers, known.strengths[known.sources :, None]]))
+    def unfitted(self, equation: Equation, lights: LightSources) -> ChargeField:
+        """These charges without strengths, with other sources in another equation."""
+        positions = np.vstack([lights.points, self.placement.charges])
+        nothing = np.zeros((len(self.placement.charges), 1))
+        return ChargeField(equation, positions, np.vstack([lights.powers, nothing]))
 
     def accurate_on(self, mesh: TetMesh) -> BoolArray:
         """Whether the charges are accurate at the point of `residual` nearest to each node of a mesh, (n,)."""
@@ -151,7 +151,7 @@ def fit_light(
         What is added to sigma_a, 1/unit. Places of charges are chosen for the real part of the wave number: complex
         fits take four times as long.
     refit : bool
-        Whether charges that are put where those of `like` are have strengths of their own, not those of `like`.
+        Whether charges that are put where those of `like` are have strengths; else only their places are wanted.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def fit_light(
             return None
         placement, field = found.placement, found.field
     if like is not None and not refit:
-        field = like.with_sources(equation, lights)
+        field = like.unfitted(equation, lights)
     elif field is None or shift != 0:
         field, _ = fit_strengths(placement, equation, lights)
     charges = _charges(field, placement, surface, medium)

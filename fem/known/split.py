@@ -102,7 +102,7 @@ def split_lights(
     shift : complex
         What the equation adds to sigma_a, 1/unit: 0 for steady light.
     refit : bool
-        Whether charges that follow kept fits have strengths of their own, not those of the fits.
+        Whether charges that follow kept fits have strengths; else only their places are wanted.
 
     Raises
     ------

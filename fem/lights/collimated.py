@@ -176,12 +176,12 @@ class CollimatedBeam:
         lit = lit[distances >= reach[lit]]
         facets, places = np.unique(facets[lit], return_inverse=True)
         total = sum_by_index(places, powers[lit], len(facets))
+        if self.spot is None and mesh.columns is not None:
+            return _rays_on_curved(mesh, facets, total, direction)
         # The power of all pieces of a facet starts at their centroid.
         starts = np.column_stack(
             [sum_by_index(places, powers[lit] * axis, len(facets)) / total for axis in points[lit].T]
         )
-        if self.spot is None and mesh.columns is not None:
-            return _rays_on_curved(mesh, facets, total, direction)
         directions = np.broadcast_to(direction, starts.shape)
         return Rays(starts, directions, total, mesh.boundary_cells[facets]), normals[facets]
 
@@ -213,8 +213,8 @@ def _rays_on_curved(
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
     cosines = np.maximum(-normals @ direction, 0.0)
     # Where all are in the dark, the facet is at the border of the light.
-    cosines[cosines.max(axis=1) == 0] = 1.0
-    shares = cosines / cosines.sum(axis=1, keepdims=True)
+    weights = np.where(cosines.max(axis=1, keepdims=True) == 0, 1.0, cosines)
+    shares = weights / weights.sum(axis=1, keepdims=True)
     normals = np.where(cosines[..., None] > LEAST_COSINE, normals, flat).reshape(-1, 3)
     starts = (THREE_POINTS @ mesh.points[mesh.boundary_faces[facets]]).reshape(-1, 3)
     directions = np.broadcast_to(direction, starts.shape)

@@ -93,7 +93,7 @@ def jacobi(product: Product) -> Method:
 
 
 def make_preconditioned_cg(product: Product, precondition: Preconditioner) -> Method:
-    """Conjugate gradients on one or a few columns at a time, a core each, unless one product keeps all cores busy."""
+    """Conjugate gradients on one or a few columns at a time, a core each; few columns in turn on all cores."""
 
     def iterate(loads: NumberArray) -> tuple[NumberArray, int]:
         return conjugate_gradients(product, precondition, loads)

@@ -1,8 +1,9 @@
 """Conjugate gradients in single precision, with residuals in double precision from time to time.
 
 Products and vectors in single precision take half of the memory and less than half of the time. The residual that they
-update drifts from the true one, by which it is replaced whenever it has become much smaller; search directions go on
-(reliable updates, Clark et al. 2010, Comput. Phys. Commun. 181, 1517).
+update drifts from the true one, by which it is replaced whenever it has become much smaller (reliable updates, Clark et
+al. 2010, Comput. Phys. Commun. 181, 1517). Search directions begin anew then, not as there: in the norm of the
+preconditioner the true residual may be far larger than the one that drifted, which the old direction would outweigh.
 """
 
 import numpy as np
@@ -48,7 +49,7 @@ def mixed_conjugate_gradients(
     """
     dtype = single.matrix.dtype if not np.iscomplexobj(loads) else np.dtype(np.complex64)
     solution, residuals = np.zeros_like(loads), loads.astype(dtype)
-    part, last, since, image = np.zeros_like(residuals), norms(loads).max(initial=0.0), 0, residuals
+    part, last, since = np.zeros_like(residuals), norms(loads).max(initial=0.0), 0
     direction, product_of_residuals = np.zeros_like(residuals), np.zeros(loads.shape[1], dtype)
     for iteration in range(1, ITERATIONS + 1):
         corrections = apply_to_parts(precondition, residuals)
@@ -62,7 +63,8 @@ def mixed_conjugate_gradients(
         largest = _norms(residuals).max(initial=0.0)
         if largest > max(DECREASE * last, 0.5 * STOP_RESIDUAL) and since < MOST_BETWEEN:
             continue
-        solution += part
+        if np.isfinite(part).all():
+            solution += part
         part[:] = 0.0
         rest = product(solution)
         np.subtract(loads, rest, out=rest)
@@ -73,7 +75,8 @@ def mixed_conjugate_gradients(
             more, iterations = conjugate_gradients(product, _in_double(precondition), rest)
             return solution + more, iteration + iterations
         residuals, last, since = rest.astype(dtype), largest, 0
-    return solution, ITERATIONS
+        product_of_residuals[:] = 0.0
+    return solution + part, ITERATIONS
 
 
 def _in_double(precondition: Preconditioner) -> Preconditioner:

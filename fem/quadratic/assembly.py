@@ -72,7 +72,7 @@ def _fill(dofs: IntArray, matrices: NumberArray, values: NumberArray, rows: Indi
 
 
 def element_matrices(
-    space: QuadraticSpace, diffusion: Number | NumberArray, sigma: Number | NumberArray, cells: IntArray | None = None
+    space: QuadraticSpace, diffusion: Number | NumberArray, sigma: Number | NumberArray, cells: IntArray
 ) -> NumberArray:
     """Matrices of tetrahedra without boundary terms.
 
@@ -81,23 +81,20 @@ def element_matrices(
     space : QuadraticSpace
     diffusion, sigma : number or (c,) ndarray
         D, unit, and the coefficient of the fluence, 1/unit, of each; complex matrices if they are.
-    cells : (c,) ndarray, optional
-        Numbers of the tetrahedra, ascending; all if not given.
+    cells : (c,) ndarray
+        Numbers of the tetrahedra, ascending.
 
     Returns
     -------
     (c, 10, 10) ndarray
     """
     mesh = space.mesh
-    every = np.arange(len(mesh.tetrahedra)) if cells is None else cells
-    each_diffusion, each_sigma = (np.broadcast_to(value, len(every)) for value in (diffusion, sigma))
-    hats, volumes = (
-        (mesh.hat_gradients, mesh.volumes) if cells is None else (mesh.hat_gradients[cells], mesh.volumes[cells])
-    )
+    each_diffusion, each_sigma = (np.broadcast_to(value, len(cells)) for value in (diffusion, sigma))
+    hats, volumes = mesh.hat_gradients[cells], mesh.volumes[cells]
     products = (each_diffusion * volumes)[:, None] * np.einsum("mpi,mri->mpr", hats, hats).reshape(-1, 16)
     values = products @ reference_stiffness() + (each_sigma * volumes)[:, None] * reference_mass()
     values = values.reshape(-1, 10, 10)
-    places = space.places_of_curved[every]
+    places = space.places_of_curved[cells]
     curved = np.flatnonzero(places >= 0)
     stiffness, mass = _curved_elements(space)
     own = each_diffusion[curved, None, None] * stiffness[places[curved]]

@@ -114,9 +114,9 @@ def _charges_of(split: SplitLights, light: int) -> list[Charges]:
     return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
 
 
-def every_charges(split: SplitLights) -> list[Charges]:
-    """The charges of all lights."""
-    return [*split.charges, *(each.charges for each in split.fitted.values())]
+def counts_of(split: SplitLights, lights: int) -> list[int]:
+    """The numbers of charges of the patches of so many lights."""
+    return [len(charges.positions) for light in range(lights) for charges in _charges_of(split, light)]
 
 
 def power_change(known: Charges, changed: Change) -> float | None:

@@ -27,8 +27,7 @@ def derivatives_to_places(readout: Readout, numbers: Sequence[int]) -> NumberArr
         place = place_of(readout.lights[light])
         assert place is not None
         step = STEP * deposits[light].hints.resolution
-        for axis, way in enumerate(np.eye(3)):
-            found[row, :, axis] = _along(readout, light, place, step * way, step)
+        found[row] = _along_axes(readout, light, place, step)
         free = free_direction(readout.lights[light])
         if free is not None:
             # What rounding makes of 0 would lead a fit astray.
@@ -55,14 +54,18 @@ def check_places(lights: Sequence[Light], numbers: Sequence[int]) -> None:
             )
 
 
-def _along(readout: Readout, light: int, place: FloatArray, step: FloatArray, length: float) -> NumberArray:
-    """Derivative of the readings of a light along a step (3,) of some length, (d,)."""
+def _along_axes(readout: Readout, light: int, place: FloatArray, step: float) -> NumberArray:
+    """Derivatives of the readings of a light along each axis, by steps of some length, (d, 3)."""
     nearby = []
-    for steps, weight in WEIGHTS.items():
-        moved = move_to(readout.lights[light], place + steps * step)
-        split = readout.split([moved], readout.system)
-        nearby.append(Nearby(weight / length, readout.system, split))
-    found = readout.of_load(nearby, 0)
+    for way in np.eye(3):
+        moved = [move_to(readout.lights[light], place + steps * step * way) for steps in WEIGHTS]
+        nearby.append(
+            [
+                Nearby(weight / step, readout.system, readout.split([each], readout.system))
+                for weight, each in zip(WEIGHTS.values(), moved, strict=True)
+            ]
+        )
+    found = np.array([readout.of_load(each, 0) for each in nearby])
     for number, known in enumerate(readout.scene.patches[light]):
-        found = found + readout.of_charges(known, [change_of(nearby, 0, number)])[0]
-    return found
+        found = found + readout.of_charges(known, [change_of(each, 0, number) for each in nearby])
+    return np.asarray(found.T)

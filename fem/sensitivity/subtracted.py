@@ -3,11 +3,12 @@
 With the dual solution z of a reading fixed, the reading depends on them through ``z.b + G(detector) - d.I G``. Places
 and powers of charges are differentiated by central differences, strengths that are fitted by those of the equations
 that they are fitted to (`tetlux.fem.charges.change`), fields in closed form (`tetlux.fem.charges.derivative`). No
-system is solved for that, and no charges are fitted.
+system is solved for that.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -36,7 +37,7 @@ from tetlux.fem.sensitivity.nearby import (
     Nearby,
     change_medium,
     change_of,
-    every_charges,
+    counts_of,
     has_rest,
     power_change,
 )
@@ -46,6 +47,7 @@ from tetlux.fem.sources.light import Light
 from tetlux.fem.system import System
 from tetlux.meshing.arrays import NumberArray
 from tetlux.meshing.describe import one_line
+from tetlux.meshing.errors import RunError
 from tetlux.meshing.host.blocks import map_in_threads
 
 
@@ -116,8 +118,14 @@ class Readout:
         return found
 
     def _nearby(self, label: int, coefficient: Coefficient, least: float) -> list[Nearby]:
-        """The lights with a coefficient a few steps away on both sides, as near as no charge comes or goes."""
-        step = STEP * least
+        """The lights with a coefficient a step away on both sides, as near as no charge comes or goes.
+
+        Raises
+        ------
+        RunError
+            If some do however near, as where a light is so much deeper than the one that its charges are kept for.
+        """
+        step, own = STEP * least, [len(each.patch.charges.positions) for each in chain(*self.scene.patches)]
         for _ in range(SHORTENINGS):
             changed = [change_medium(self.system, label, coefficient, steps * step) for steps in WEIGHTS]
             splits = map_in_threads(lambda system: self.split(self.lights, system), changed)
@@ -125,11 +133,10 @@ class Readout:
                 Nearby(weight / step, system, split)
                 for weight, system, split in zip(WEIGHTS.values(), changed, splits, strict=True)
             ]
-            counts = {tuple(len(each.positions) for each in every_charges(one.split)) for one in found}
-            if len(counts) == 1:
-                break
+            if all(counts_of(one.split, len(self.lights)) == own for one in found):
+                return found
             step *= SHORTER
-        return found
+        raise RunError("charges of a light come or go at these coefficients; change one of them by a thousandth.")
 
     def _least(self, label: int, coefficient: Coefficient) -> float:
         """The least coefficient of a medium, 1/unit."""
