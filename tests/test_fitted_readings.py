@@ -9,7 +9,9 @@ from tetlux.fem.outcome.detectors import read_all
 from tetlux.meshing.arrays import FloatArray
 
 
-def solve_scene(scene: Scene, *, asked: bool, subtract: Subtract = "fitted") -> tuple[FloatArray, FloatArray]:
+def solve_scene(
+    scene: Scene, *, asked: bool, subtract: Subtract = "fitted", cache: bool = True
+) -> tuple[FloatArray, FloatArray]:
     """True relative errors of readings and their bars, of a run for detectors alone or for the exitance."""
     detectors = [PointDetector(tuple(place)) for place in scene.places.tolist()]
     light = [PointSource(scene.source)]
@@ -22,6 +24,7 @@ def solve_scene(scene: Scene, *, asked: bool, subtract: Subtract = "fitted") -> 
             detectors=detectors,
             detector_tolerance=0.01,
             subtract=subtract,
+            cache=cache,
         )
     else:
         solution = solve(scene.surface, scene.medium, light)
@@ -49,6 +52,8 @@ def test_bars_hold_what_ripples_of_charges_do_at_a_detector() -> None:
 
 def test_bars_are_as_large_as_what_elements_are_off_by() -> None:
     """Of a plate, which has no gaps, and with images in place of fitted charges, which have no ripples."""
-    errors, bars = solve_scene(random_scene(607), asked=True, subtract="half-space")
-    # Measured on four meshes: .53 to .69.
-    assert 0.3 < np.sqrt(np.mean((errors / bars) ** 2)) < 0.95
+    # Each time the mesher makes another mesh.
+    runs = [solve_scene(random_scene(607), asked=True, subtract="half-space", cache=False) for _ in range(3)]
+    ratios = np.concatenate([errors / bars for errors, bars in runs])
+    # Measured on 30 meshes: .22 to .99, and .37 to .89 of any three of them.
+    assert 0.3 < np.sqrt(np.mean(ratios**2)) < 0.95
