@@ -32,7 +32,7 @@ from tetlux.fem.sensitivity.nearby import Coefficient, change_medium
 from tetlux.fem.sensitivity.parameters import Per, parameter_shares
 from tetlux.fem.sensitivity.products import multiply
 from tetlux.fem.sensitivity.sensitivity import check_readings
-from tetlux.meshing import InputError, Surface, TetMesh, sphere, tetrahedralize
+from tetlux.meshing import InputError, RunError, Surface, TetMesh, sphere, tetrahedralize
 from tetlux.meshing.arrays import NumberArray
 
 ANGLES = np.radians([30.0, 90.0, 150.0])
@@ -94,6 +94,19 @@ def test_steady_light_is_differentiated_on_the_mesh_of_modulated_light(ball: Sur
     found = sensitivity(system, [SOURCE], [*DETECTORS, FIBRE], per="region", positions=[0])
     changes = [read_at(change_medium(system, 0, "sigma_a", side * 2e-5), [SOURCE]) for side in (-1.0, 1.0)]
     assert found.derivatives["sigma_a"][..., 0] == pytest.approx((changes[1] - changes[0]) / 4e-5, rel=2e-5)
+
+
+def test_where_charges_are_placed_anew_there_are_no_derivatives(ball: Surface) -> None:
+    """A light that is 1.5 times as deep as before has other charges; one step less deep it has the same."""
+    mesh, extinction = tetrahedralize(ball, cache=False), TISSUE.sigma_a + TISSUE.reduced_scattering
+
+    def at(depth: float) -> System:
+        return System(mesh, replace(TISSUE, sigma_s_prime=extinction * depth - TISSUE.sigma_a), ball)
+
+    for depth in (1.0, 1.4999):
+        assert (sensitivity(at(depth), [BEAM], DETECTORS, per="region").derivatives["sigma_a"] < 0.0).all()
+    with pytest.raises(RunError, match="charges of a light come or go"):
+        sensitivity(at(1.5 - 5e-8), [BEAM], DETECTORS, per="region")
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.006j])

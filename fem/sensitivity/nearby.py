@@ -14,7 +14,7 @@ from tetlux.fem.media.medium import Medium
 from tetlux.fem.media.varying import VaryingMedium
 from tetlux.fem.sources.deposit import Deposit
 from tetlux.fem.system import System
-from tetlux.meshing.arrays import NumberArray
+from tetlux.meshing.arrays import FloatArray, NumberArray
 
 Coefficient = Literal["sigma_a", "sigma_s_prime"]
 # Step of central differences, as a share of the coefficient, and how it is shortened where a charge comes or goes:
@@ -114,9 +114,19 @@ def _charges_of(split: SplitLights, light: int) -> list[Charges]:
     return [*found, *([split.fitted[light].charges] if light in split.fitted else [])]
 
 
-def counts_of(split: SplitLights, lights: int) -> list[int]:
-    """The numbers of charges of the patches of so many lights."""
-    return [len(charges.positions) for light in range(lights) for charges in _charges_of(split, light)]
+def has_charges_of(split: SplitLights, known: Sequence[Sequence[Charges]]) -> bool:
+    """Whether each light has as many charges as those that are known of it, and fitted ones at the same places."""
+    for light, own in enumerate(known):
+        found = _charges_of(split, light)
+        if [len(each.positions) for each in found] != [len(each.positions) for each in own]:
+            return False
+        if light in split.fitted and not np.array_equal(_outside(found[-1]), _outside(own[-1])):
+            return False
+    return True
+
+
+def _outside(charges: Charges) -> FloatArray:
+    return charges.positions[charges.sources :]
 
 
 def power_change(known: Charges, changed: Change) -> float | None:

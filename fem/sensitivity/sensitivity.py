@@ -113,7 +113,7 @@ def sensitivity(
     InputError
         If an argument is not sensible, or a reading is 0 or below and its logarithm is asked for.
     RunError
-        If the linear solver fails.
+        If the linear solver fails, or charges of a light come or go with the least change of a coefficient.
 
     Notes
     -----

@@ -8,7 +8,6 @@ system is solved for that.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -37,7 +36,7 @@ from tetlux.fem.sensitivity.nearby import (
     Nearby,
     change_medium,
     change_of,
-    counts_of,
+    has_charges_of,
     has_rest,
     power_change,
 )
@@ -125,7 +124,7 @@ class Readout:
         RunError
             If some do however near, as where a light is so much deeper than the one that its charges are kept for.
         """
-        step, own = STEP * least, [len(each.patch.charges.positions) for each in chain(*self.scene.patches)]
+        step, known = STEP * least, [[each.patch.charges for each in own] for own in self.scene.patches]
         for _ in range(SHORTENINGS):
             changed = [change_medium(self.system, label, coefficient, steps * step) for steps in WEIGHTS]
             splits = map_in_threads(lambda system: self.split(self.lights, system), changed)
@@ -133,7 +132,7 @@ class Readout:
                 Nearby(weight / step, system, split)
                 for weight, system, split in zip(WEIGHTS.values(), changed, splits, strict=True)
             ]
-            if all(counts_of(one.split, len(self.lights)) == own for one in found):
+            if all(has_charges_of(one.split, known) for one in found):
                 return found
             step *= SHORTER
         raise RunError("charges of a light come or go at these coefficients; change one of them by a thousandth.")
